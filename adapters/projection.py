@@ -1,0 +1,206 @@
+"""Projection mode, shared by the simulators: their residuals and Jacobians in one Newton loop over the samples.
+
+The loop walks from the design position outwards, both ways, with a tangent predictor. Convergence is judged here, by residual and
+finiteness, never by a simulator's own word; a step that does not converge, or converges to another assembly, is halved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..core.analysis.continuity import continuous
+from ..core.harness.case import Case
+from ..core.trajectory import Array, PointMotion, Trajectory
+
+MAX_ITERATIONS = 20
+# A step shorter than this part of the sample distance that still fails is the end of the motion, not a coarse grid.
+SMALLEST_STEP = 2.0**-10
+# Singular values below this part of the largest count as zero: far above round-off (1e-15), far below a sound mechanism (1e-2).
+RANK_TOLERANCE = 1e-9
+
+
+class ProjectionModel(Protocol):
+    """A simulator's kinematics: unknowns x (its tree or body coordinates), rows for closures and drivers.
+
+    All methods speak of the current configuration. `residual` updates whatever the other methods read.
+    """
+
+    def reset(self) -> None:
+        """Back to the design configuration."""
+        ...
+
+    def save(self) -> Any:
+        """A copy of the configuration."""
+        ...
+
+    def restore(self, saved: Any) -> None:
+        """Back to a saved configuration."""
+        ...
+
+    def move(self, dx: Array) -> None:
+        """Advance the configuration by dx, shape (unknowns,)."""
+        ...
+
+    def residual(self, c: float) -> Array:
+        """All rows with the swept driver at c, measured from the design position (`Sweep.change`), shape (rows,)."""
+        ...
+
+    def jacobian(self) -> Array:
+        """Derivative of the rows by dx, shape (rows, unknowns); a copy, or valid until the next call."""
+        ...
+
+    def rate_rows(self) -> Array:
+        """Derivative of the rows by c, negated: J v = rate * rate_rows, shape (rows,)."""
+        ...
+
+    def bias(self, v: Array) -> Array:
+        """Jdot v of all rows, shape (rows,)."""
+        ...
+
+    def points(self, v: Array, a: Array) -> Sequence[tuple[Array, Array, Array]]:
+        """Position, velocity and acceleration of each of case.points, in order, global axes."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class _Sample:
+    """A solved pose: everything the walk needs to go on from there."""
+
+    c: float
+    saved: Any
+    x: Array
+    v: Array
+    rows: tuple[Array, Array, Array]
+    iterations: int
+    residual: float
+
+
+def solve_by_projection(model: ProjectionModel, case: Case, tol: float, details: Mapping[str, Any] | None = None) -> Trajectory:
+    """Solve all samples of the case with the model; see `Engine.solve`."""
+    return _Walk(model, case, tol).trajectory(details or {})
+
+
+class _Walk:
+    def __init__(self, model: ProjectionModel, case: Case, tol: float) -> None:
+        self.model, self.case, self.tol = model, case, tol
+        corners = [np.asarray(case.mechanism.point(name).position) for name in case.points]
+        self.size = max(1e-3, float(np.ptp(np.stack([*corners, *_joint_points(case)]), axis=0).max()))
+        model.reset()
+        model.residual(0.0)
+        jacobian = model.jacobian()
+        singular = np.linalg.svd(jacobian, compute_uv=False)
+        self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
+        self.square = jacobian.shape == (self.rank, self.rank)
+        self.unknowns = jacobian.shape[1]
+
+    def linear(self, A: Array, b: Array) -> Array:
+        """Solve A x = b; never assumed square: point closures of a planar loop are redundant."""
+        if self.square:
+            return np.linalg.solve(A, b)
+        return np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0]
+
+    def newton(self, c: float) -> tuple[int, float] | None:
+        """Iterations and final residual at driver value c, or None."""
+        met = False
+        for iteration in range(1, MAX_ITERATIONS + 1):
+            r = self.model.residual(c)
+            worst = float(np.abs(r).max()) if np.isfinite(r).all() else math.inf
+            if not math.isfinite(worst):
+                return None
+            if met:  # one step after meeting the tolerance: quadratic convergence makes it exact to round-off
+                return (iteration - 1, worst) if worst <= self.tol else None
+            met = worst <= self.tol
+            try:
+                step = self.linear(self.model.jacobian(), -r)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(step).all():
+                return None
+            self.model.move(step)
+        return None
+
+    def solve(self, c: float) -> _Sample | None:
+        """Position, velocity and acceleration at driver value c from the current configuration, or None."""
+        done = self.newton(c)
+        if done is None:
+            return None
+        jacobian = np.array(self.model.jacobian())
+        nu = self.case.sweep.rate * self.model.rate_rows()
+        try:
+            v = self.linear(jacobian, nu)
+            a = self.linear(jacobian, -self.model.bias(v))
+        except np.linalg.LinAlgError:
+            return None
+        # least squares would hide a velocity that no row set can meet (a driver pushed at a dead centre)
+        if not np.abs(jacobian @ v - nu).max() <= 1e-6 * (1.0 + np.abs(nu).max()):
+            return None
+        position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
+        return _Sample(c, self.model.save(), position.ravel(), v, (position, velocity, acceleration), *done)
+
+    def advance(self, start: _Sample, c: float, step: float) -> tuple[_Sample, bool]:
+        """Walk from start to c, halving steps that fail; (where it ended, whether that is c)."""
+        at, h = start, c - start.c
+        while at.c != c:
+            to = c if abs(c - at.c) <= abs(h) else at.c + h
+            dt = (to - at.c) / self.case.sweep.rate
+            self.model.restore(at.saved)
+            self.model.move(dt * at.v)
+            new = self.solve(to)
+            if new is not None and bool(
+                continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), np.float64(dt), self.size)
+            ):
+                at, h = new, 2.0 * h
+            else:
+                h = 0.5 * min(abs(h), abs(c - at.c)) * math.copysign(1.0, h)
+                if abs(h) < SMALLEST_STEP * step:
+                    return at, False
+        return at, True
+
+    def trajectory(self, details: Mapping[str, Any]) -> Trajectory:
+        values = self.case.sweep.change
+        n, points = len(values), self.case.points
+        motion = np.full((3, n, len(points), 3), np.nan)
+        iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)
+        solved, messages = np.zeros(n, dtype=np.bool_), list[str]()
+        self.model.reset()
+        design = self.solve(0.0)
+        if design is None:
+            messages.append("no assembly at the design position: the model does not close there")
+        else:
+            step = float(np.abs(np.diff(values)).max()) if n > 1 else abs(float(values[0])) or 1.0
+            outward = np.argsort(np.abs(values), kind="stable")
+            for side in (outward[values[outward] >= 0], outward[values[outward] < 0]):
+                at = design
+                for k in side:
+                    at, reached = self.advance(at, float(values[k]), step)
+                    if not reached:
+                        messages.append(_stopped(self.case, side, solved, at.c, float(values[k])))
+                        break
+                    motion[:, k] = at.rows
+                    iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
+        moves = {name: PointMotion(motion[0, :, k], motion[1, :, k], motion[2, :, k]) for k, name in enumerate(points)}
+        facts = {"rank": self.rank, "unknowns": self.unknowns, **details}
+        return Trajectory(moves, solved, iterations, float(residual.max(initial=0.0)), "; ".join(messages), facts)
+
+
+def _stopped(case: Case, side: Sequence[int] | Array, solved: Any, at: float, wanted: float) -> str:
+    reached = [float(case.sweep.change[k]) for k in side if solved[k]]
+    last = f"last reachable sample {reached[-1]:.9g}" if reached else "no sample reached on this side of the design"
+    return (
+        f"driver {case.sweep.driver!r} cannot be followed beyond {at:.9g} (wanted {wanted:.9g}): Newton does not converge "
+        f"or jumps to another assembly; {last}; shorten the sweep or drive another coordinate"
+    )
+
+
+def _joint_points(case: Case) -> list[Array]:
+    """All joint points at design: the mechanism's extent."""
+    found: list[Array] = []
+    for joint in case.mechanism.joints:
+        point, pair = getattr(joint, "point", None), getattr(joint, "points", ())
+        found += [np.asarray(each, dtype=float) for each in ([point] if point is not None else list(pair))]
+    return found

@@ -1,0 +1,123 @@
+"""Vectors, quaternions and rotations over any scalar: floats, arrays of lanes, traced scalars, balls.
+
+The operators are all an equation needs, so a primitive is written once and run by every executor. Nothing here compares
+or branches on a value: a traced scalar has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+Scalar: TypeAlias = Any
+"""A number of any kind that knows + - * / and unary minus."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vec3:
+    """A vector of three scalars, in whatever axes the context says."""
+
+    x: Scalar
+    y: Scalar
+    z: Scalar
+
+    def __iter__(self) -> Iterator[Scalar]:
+        return iter((self.x, self.y, self.z))
+
+    def __add__(self, b: Vec3) -> Vec3:
+        return Vec3(self.x + b.x, self.y + b.y, self.z + b.z)
+
+    def __sub__(self, b: Vec3) -> Vec3:
+        return Vec3(self.x - b.x, self.y - b.y, self.z - b.z)
+
+    def __neg__(self) -> Vec3:
+        return Vec3(-self.x, -self.y, -self.z)
+
+    def __rmul__(self, k: Scalar) -> Vec3:
+        return Vec3(k * self.x, k * self.y, k * self.z)
+
+    def __matmul__(self, b: Vec3) -> Scalar:
+        """Scalar product."""
+        return self.x * b.x + self.y * b.y + self.z * b.z
+
+
+ZERO = Vec3(0.0, 0.0, 0.0)
+X, Y, Z = Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0)
+
+
+def vec(values: Sequence[Scalar]) -> Vec3:
+    """Three scalars as a vector."""
+    x, y, z = values
+    return Vec3(x, y, z)
+
+
+def cross(a: Vec3, b: Vec3) -> Vec3:
+    """Vector product a x b."""
+    return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+
+
+@dataclass(frozen=True, slots=True)
+class Mat3:
+    """A 3 x 3 matrix, by rows."""
+
+    x: Vec3
+    y: Vec3
+    z: Vec3
+
+    def __matmul__(self, a: Vec3) -> Vec3:
+        return Vec3(self.x @ a, self.y @ a, self.z @ a)
+
+    def transposed_times(self, a: Vec3) -> Vec3:
+        """The product of the transpose with a."""
+        return a.x * self.x + a.y * self.y + a.z * self.z
+
+
+@dataclass(frozen=True, slots=True)
+class Quat:
+    """Euler parameters e0 + e of a rotation."""
+
+    e0: Scalar
+    e: Vec3
+
+    def __iter__(self) -> Iterator[Scalar]:
+        return iter((self.e0, self.e.x, self.e.y, self.e.z))
+
+    def __mul__(self, b: Quat) -> Quat:
+        """Quaternion product: the rotation b followed, in the same axes, by this one."""
+        return Quat(self.e0 * b.e0 - self.e @ b.e, self.e0 * b.e + b.e0 * self.e + cross(self.e, b.e))
+
+    def conjugate(self) -> Quat:
+        """The opposite rotation."""
+        return Quat(self.e0, -self.e)
+
+
+IDENTITY = Quat(1.0, ZERO)
+
+
+def turned_by(q: Quat, half: Vec3, sqrt: Any) -> Quat:
+    """The unit quaternion (1, half) q / |(1, half) q|: q turned by about 2 half, global axes.
+
+    The rotation applied is 2 atan|half|, which agrees with the exponential to second order; renormalising each time keeps
+    the length at one to round-off, whatever the number of steps.
+    """
+    p = Quat(1.0, half) * q
+    length = sqrt(p.e0 * p.e0 + p.e @ p.e)
+    k = 1.0 / length
+    return Quat(k * p.e0, k * p.e)
+
+
+def rotation_less_identity(q: Quat) -> Mat3:
+    """A(q) - I, eq. (1) of the paper with the identity taken off before rounding.
+
+    Near the design pose A - I is small; forming A first would round it at 1e-16 of one rather than of itself.
+    """
+    e0, (x, y, z) = q.e0, q.e
+    xx, yy, zz = 2.0 * (x * x), 2.0 * (y * y), 2.0 * (z * z)
+    xy, xz, yz = 2.0 * (x * y), 2.0 * (x * z), 2.0 * (y * z)
+    wx, wy, wz = 2.0 * (e0 * x), 2.0 * (e0 * y), 2.0 * (e0 * z)
+    return Mat3(
+        Vec3(-(yy + zz), xy - wz, xz + wy),
+        Vec3(xy + wz, -(xx + zz), yz - wx),
+        Vec3(xz - wy, yz + wx, -(xx + yy)),
+    )

@@ -1,0 +1,1 @@
+"""Analysis: equations of a mechanism, their rank, and the sweep."""

@@ -1,0 +1,54 @@
+"""The door every engine enters by, the native one included. The harness knows nothing else of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from ..trajectory import Trajectory
+from .case import Case
+
+
+class Engine(Protocol):
+    """A way to solve a case.
+
+    Attributes:
+        name: as on the command line.
+        mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or "simulate" (its own
+            solver or time stepping). Modes are different products and never share a ranking.
+        loop: where the loop over samples and iterations runs: "python", "simulator" or "compiled".
+        settings: what the report prints so that a reader can repeat the run.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def mode(self) -> str: ...
+    @property
+    def loop(self) -> str: ...
+    @property
+    def settings(self) -> Mapping[str, Any]: ...
+
+    def version(self) -> str | None:
+        """Version of the simulator, or None where it is not installed. Never raises."""
+        ...
+
+    def unsupported(self, case: Case) -> str | None:
+        """None, or the reason why this engine cannot express the case, naming the joint or driver."""
+        ...
+
+    def build(self, case: Case) -> Any:
+        """The engine's model of the case, at the design position. Not timed."""
+        ...
+
+    def solve(self, model: Any, case: Case, tol: float) -> Trajectory:
+        """Solve all samples, from the design position outwards. Timed after a warm-up.
+
+        Args:
+            model: what `build` gave; may be used for several solves.
+            tol: largest accepted constraint residual [m or -].
+
+        Returns:
+            A trajectory of case.points; samples that cannot be reached are NaN and explained, never numbers.
+        """
+        ...

@@ -1,0 +1,140 @@
+"""What a joint is: two bodies, some geometry at the design position, and a composition of primitives.
+
+A new joint type is one file: a frozen dataclass with its geometry as fields (declared with `position`, `direction`, ...) and the
+method `primitives`. Declaring the class registers it: case files can name it at once.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from enum import Enum
+from typing import Any, ClassVar
+
+from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, vec
+from ..errors import MechanismError
+from ..primitives.base import Primitive
+
+
+class Kind(Enum):
+    """What a geometry field of a joint holds; tells a reader its shape and which unit applies."""
+
+    POSITION = "a point [x, y, z]"
+    DIRECTION = "a direction [x, y, z]"
+    POSITIONS = "two points [[x, y, z] on the first body, [x, y, z] on the second]"
+    DIRECTIONS = "two directions [[x, y, z] on the first body, [x, y, z] on the second]"
+    LENGTH = "a length"
+
+
+def _geometry(kind: Kind, **options: Any) -> Any:
+    return field(metadata={"kind": kind}, **options)
+
+
+def position(**options: Any) -> Any:
+    """A point common to both bodies, global at design [m]."""
+    return _geometry(Kind.POSITION, **options)
+
+
+def direction() -> Any:
+    """A direction common to both bodies, global at design, any length but zero [-]."""
+    return _geometry(Kind.DIRECTION)
+
+
+def positions() -> Any:
+    """A point on each body, global at design [m]."""
+    return _geometry(Kind.POSITIONS)
+
+
+def directions() -> Any:
+    """A direction on each body, global at design, any length but zero [-]."""
+    return _geometry(Kind.DIRECTIONS)
+
+
+def length(**options: Any) -> Any:
+    """A length [m]."""
+    return _geometry(Kind.LENGTH, **options)
+
+
+@dataclass(frozen=True, slots=True)
+class Attachment:
+    """A body at the design position as a joint sees it: where its origin is, and arms from there."""
+
+    origin: Vec3
+
+    def arm(self, P: Vec3) -> Vec3:
+        """From the body's origin to P, at design."""
+        return P - self.origin
+
+
+@dataclass(frozen=True)
+class Joint(ABC):
+    """A joint between a first body i and a second body j.
+
+    Attributes:
+        type: the name in case files.
+        freedoms: the relative motions the joint leaves, as drivers name them.
+
+    Raises:
+        MechanismError: a number is not finite, a direction is zero, or a shape is wrong.
+    """
+
+    type: ClassVar[str]
+    freedoms: ClassVar[tuple[str, ...]]
+    registry: ClassVar[dict[str, type[Joint]]] = {}
+
+    name: str
+    i: str
+    j: str
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "type" in cls.__dict__:
+            Joint.registry[cls.type] = cls
+
+    def __post_init__(self) -> None:
+        if self.i == self.j:
+            raise MechanismError(f"{self}: joins {self.i!r} with itself; a joint needs two different bodies")
+        for each in fields(self):
+            kind, value = each.metadata.get("kind"), getattr(self, each.name)
+            if kind is None or value is None:
+                continue
+            pair = kind in (Kind.POSITIONS, Kind.DIRECTIONS)
+            for numbers in value if pair else [(value,)] if kind is Kind.LENGTH else [value]:
+                if not all(math.isfinite(number) for number in numbers):
+                    raise MechanismError(f"{self}: {each.name} = {value} is not finite; give {kind.value}")
+                if kind in (Kind.DIRECTION, Kind.DIRECTIONS) and not any(numbers):
+                    raise MechanismError(f"{self}: {each.name} is zero; give a direction of any other length")
+
+    def __str__(self) -> str:
+        return f"joint {self.name!r} ({self.type})"
+
+    @property
+    def bodies(self) -> tuple[str, str]:
+        """Names of the first and the second body."""
+        return self.i, self.j
+
+    @property
+    def rows(self) -> int:
+        """Number of constraint equations."""
+        here = Attachment(ZERO)
+        return sum(primitive.n for primitive in self.primitives(here, here))
+
+    @abstractmethod
+    def primitives(self, i: Attachment, j: Attachment) -> Sequence[Primitive]:
+        """The primitives this joint is composed of; each sees body i first."""
+
+
+def unit(a: Sequence[Scalar]) -> Vec3:
+    """The direction of a, length one."""
+    v = vec(a)
+    return (1.0 / math.sqrt(v @ v)) * v
+
+
+def triad(axis: Sequence[Scalar]) -> tuple[Vec3, Vec3, Vec3]:
+    """f, g, h: right-handed orthonormal, h along the axis (f x g = h)."""
+    h = unit(axis)
+    # the global axis most nearly perpendicular to h gives the best conditioned f
+    f = unit(tuple(cross(min((X, Y, Z), key=lambda e: abs(e @ h)), h)))
+    return f, cross(h, f), h

@@ -1,0 +1,145 @@
+"""Mechanism: bodies, points, joints and drivers as data. Validation of names and shapes, no numerics.
+
+All points and axes are global coordinates at the design position, SI units, as in a table of hardpoints.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias, TypeVar
+
+from .drivers import Driver, JointDriver, PointCoordinate
+from .errors import MechanismError
+from .joints.base import Joint
+
+GROUND = "ground"
+"""The name of the global frame; it can be used like a body and needs no declaration."""
+
+Vector: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A rigid body and its reference frame at the design position.
+
+    Attributes:
+        origin: reference point, global [m].
+        euler_parameters: e0..e3 of the rotation body -> global [-]; normalised to length one.
+        fixed: the body is part of the ground; it costs nothing and can carry joints.
+    """
+
+    name: str
+    origin: Vector = (0.0, 0.0, 0.0)
+    euler_parameters: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        p = self.euler_parameters
+        length = math.sqrt(sum(e * e for e in p))
+        # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
+        if len(p) != 4 or not abs(length - 1.0) < 1e-3:
+            raise MechanismError(
+                f"body {self.name!r}: euler_parameters {list(p)} have length {length:.6g}, expected four numbers of "
+                "length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
+            )
+        object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of a body whose motion is wanted: position global at design [m]."""
+
+    name: str
+    body: str
+    position: Vector
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A named set of bodies, joints, points and drivers.
+
+    Raises:
+        MechanismError: a name is used twice, or something refers to a name that does not exist.
+    """
+
+    name: str
+    bodies: Sequence[Body]
+    joints: Sequence[Joint]
+    points: Sequence[Point] = field(default=())
+    drivers: Sequence[Driver] = field(default=())
+
+    def __post_init__(self) -> None:
+        for what in ("bodies", "joints", "points", "drivers"):
+            object.__setattr__(self, what, tuple(getattr(self, what)))
+            _unique(what, [each.name for each in getattr(self, what)])
+        if any(body.name == GROUND for body in self.bodies):
+            raise MechanismError(f"body {GROUND!r} exists by itself; give the fixed body another name or leave it out")
+        known = [GROUND, *(body.name for body in self.bodies)]
+        for joint in self.joints:
+            for name in joint.bodies:
+                _known(f"joint {joint.name!r} ({joint.type})", "body", name, known)
+            if self.is_fixed(joint.bodies[0]) and self.is_fixed(joint.bodies[1]):
+                raise MechanismError(
+                    f"joint {joint.name!r} ({joint.type}): {joint.bodies[0]!r} and {joint.bodies[1]!r} are both fixed; "
+                    "join a moving body or remove the joint"
+                )
+        for point in self.points:
+            _known(f"point {point.name!r}", "body", point.body, known)
+        for driver in self.drivers:
+            if isinstance(driver, PointCoordinate):
+                _known(f"driver {driver.name!r}", "point", driver.point, [point.name for point in self.points])
+            elif isinstance(driver, JointDriver):
+                _known(f"driver {driver.name!r}", "joint", driver.joint, [joint.name for joint in self.joints])
+                driver.check(self.joint(driver.joint))
+
+    def is_fixed(self, name: str) -> bool:
+        """Whether the body of that name is the ground or fixed to it."""
+        return name == GROUND or self.body(name).fixed
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        return _find(self.bodies, name)
+
+    def joint(self, name: str) -> Joint:
+        """The joint of that name."""
+        return _find(self.joints, name)
+
+    def point(self, name: str) -> Point:
+        """The point of that name."""
+        return _find(self.points, name)
+
+    def driver(self, name: str) -> Driver:
+        """The driver of that name."""
+        return _find(self.drivers, name)
+
+    @property
+    def moving(self) -> tuple[Body, ...]:
+        """The bodies that are not fixed, in order."""
+        return tuple(body for body in self.bodies if not body.fixed)
+
+
+_Named = TypeVar("_Named", Body, Joint, Point, Driver)
+
+
+def _find(items: Iterable[_Named], name: str) -> _Named:
+    for item in items:
+        if item.name == name:
+            return item
+    raise KeyError(name)
+
+
+def _unique(what: str, names: Sequence[str]) -> None:
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise MechanismError(f"{what}: the name {min(twice)!r} is used more than once; names must be unique")
+
+
+def _known(who: str, what: str, name: str, known: Sequence[str]) -> None:
+    if name in known:
+        return
+    close = difflib.get_close_matches(name, known, n=1)
+    remedy = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(sorted(known)) or 'none'}"
+    raise MechanismError(f"{who}: there is no {what} {name!r}; {remedy}")

@@ -1,0 +1,31 @@
+"""Primitive constraints: one geometric condition a file, its derivation on top."""
+
+from .base import Drive, Motion, Pose, Primitive, Row
+from .distance import Distance
+from .dot10 import Dot10
+from .dot11 import Dot11
+from .dot12 import Dot12
+from .dot20 import Dot20
+from .dot21 import Dot21, LockedDisplacement
+from .driven import DrivenAngle, DrivenCoordinate
+from .ground import Ground
+from .spherical import Spherical
+
+__all__ = [
+    "Distance",
+    "Dot10",
+    "Dot11",
+    "Dot12",
+    "Dot20",
+    "Dot21",
+    "Drive",
+    "DrivenAngle",
+    "DrivenCoordinate",
+    "Ground",
+    "LockedDisplacement",
+    "Motion",
+    "Pose",
+    "Primitive",
+    "Row",
+    "Spherical",
+]

@@ -1,0 +1,112 @@
+"""What a primitive sees of its two bodies, and what it gives back.
+
+Conventions of every primitive (formulation section 1, in the native row style):
+
+- The state of a body is its displacement u from the design position and the rotation q since then. Body axes are parallel
+  to the global ones at design, so a body-fixed vector a is given by its global components at design; now it is A a.
+- Unknowns per body are (dr, dpi) with dpi the virtual rotation in global axes; velocities are (v, w), accelerations
+  (vdot, wdot), all global. The paper's body-axis rows are these times A.
+- Phi = 0;  rows . velocity = nu;  rows . acceleration = gamma.
+- The ground is a body that never moves: its u, D, v and w are literal zeros and vanish from every program.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from ..algebra import IDENTITY, ZERO, Mat3, Quat, Scalar, Vec3, cross, rotation_less_identity
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where a body is: displacement u of its origin, rotation q since design, D = A(q) - I."""
+
+    u: Vec3
+    q: Quat
+    D: Mat3
+
+    @staticmethod
+    def of(u: Vec3, q: Quat) -> Pose:
+        """The pose with displacement u and rotation q."""
+        return Pose(u, q, rotation_less_identity(q))
+
+    def swing(self, a: Vec3) -> Vec3:
+        """A a - a: how a body-fixed vector has changed since design."""
+        return self.D @ a
+
+    def turn(self, a: Vec3) -> Vec3:
+        """A a: a body-fixed vector now, global axes."""
+        return a + self.D @ a
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How a body moves: velocity v of its origin and angular velocity w, global axes."""
+
+    v: Vec3
+    w: Vec3
+
+    def of(self, arm: Vec3) -> Vec3:
+        """Velocity of the point at the end of the (turned) arm."""
+        return self.v + cross(self.w, arm)
+
+    def centripetal(self, arm: Vec3) -> Vec3:
+        """w x (w x arm): the acceleration of that point that does not come from vdot and wdot."""
+        return cross(self.w, cross(self.w, arm))
+
+
+GROUND_POSE = Pose.of(ZERO, IDENTITY)
+GROUND_MOTION = Motion(ZERO, ZERO)
+
+
+class Row(NamedTuple):
+    """One row of the Jacobian: coefficients of dr_i, dpi_i, dr_j, dpi_j, global axes."""
+
+    ri: Vec3
+    pi: Vec3
+    rj: Vec3
+    pj: Vec3
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The motion of a driver, as it enters an equation: value c and its derivatives by time.
+
+    half_cos and half_sin are those of c/2, for a driven angle; programs call no transcendental function themselves.
+    """
+
+    c: Scalar = 0.0
+    c_t: Scalar = 0.0
+    c_tt: Scalar = 0.0
+    half_cos: Scalar = 1.0
+    half_sin: Scalar = 0.0
+
+
+@dataclass(frozen=True)
+class Primitive(ABC):
+    """One geometric condition between bodies i and j. Fields are body-fixed vectors, given by their components at design."""
+
+    n: ClassVar[int]
+    """Number of equations."""
+
+    @abstractmethod
+    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        """Residuals; zero when the condition holds. Lengths [m] or plain numbers."""
+
+    @abstractmethod
+    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
+        """Rows of the Jacobian."""
+
+    @abstractmethod
+    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+        """Right-hand sides of the acceleration equations: what rows . acceleration must be."""
+
+    def nu(self) -> tuple[Scalar, ...]:
+        """Right-hand sides of the velocity equations; zero unless driven."""
+        return (0.0,) * self.n
+
+    def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        """Numbers that are positive on the intended branch of the zeros of phi; empty where no zero is spurious."""
+        return ()

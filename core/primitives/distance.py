@@ -1,0 +1,47 @@
+"""Distance: P_i and P_j keep the distance L, the tie rod (1 row).  Formulation section 2.
+
+With d from P_i to P_j, dd its change since design, S = A s:
+
+    phi   = (d . d - L^2) / (2 L) = ( dd . (2 d0 + dd) + (L0 - L)(L0 + L) ) / (2 L),      L0 = |d0|
+    rows  = [ -d | d x S_i | d | S_j x d ] / L
+    gamma = -( ddot . ddot + d . (w_j x (w_j x S_j) - w_i x (w_i x S_i)) ) / L
+
+This is the square form d . d - L^2 divided by 2 L: rows of unit scale and a residual in metres, as |d| - L has them, without a
+square root, and the difference of squares is never formed. The bare square form was rejected because its rows have the size
+of d; |d| - L because it is not smooth where the points meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import Scalar, Vec3, cross
+from .base import Motion, Pose, Primitive, Row
+
+
+@dataclass(frozen=True)
+class Distance(Primitive):
+    """Arms s_i, s_j [m]; d0 from P_i to P_j at design [m]; the length L and the design length L0 [m], both positive."""
+
+    n = 1
+    s_i: Vec3
+    s_j: Vec3
+    d0: Vec3
+    length: Scalar
+    design_length: Scalar
+
+    def _change(self, i: Pose, j: Pose) -> Vec3:
+        return (j.u - i.u) + (j.swing(self.s_j) - i.swing(self.s_i))
+
+    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        dd, L, L0 = self._change(i, j), self.length, self.design_length
+        return ((dd @ (2.0 * self.d0 + dd) + (L0 - L) * (L0 + L)) * (0.5 / L),)
+
+    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
+        u = (1.0 / self.length) * (self.d0 + self._change(i, j))
+        return (Row(-u, cross(u, i.turn(self.s_i)), u, cross(j.turn(self.s_j), u)),)
+
+    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+        d, S_i, S_j = self.d0 + self._change(i, j), i.turn(self.s_i), j.turn(self.s_j)
+        d_dot = vj.of(S_j) - vi.of(S_i)
+        return (-((d_dot @ d_dot + d @ (vj.centripetal(S_j) - vi.centripetal(S_i))) * (1.0 / self.length)),)

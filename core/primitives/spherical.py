@@ -1,0 +1,36 @@
+"""Spherical: the points P_i and P_j coincide (3 rows).  Formulation section 2.
+
+With d = d0 + u_j + A_j s_j - u_i - A_i s_i from P_i to P_j, written as the change since design so that nothing large cancels:
+
+    phi   = d0 + (u_j + (A_j - I) s_j) - (u_i + (A_i - I) s_i)
+    rows  = [ -I | skew(A_i s_i) | I | -skew(A_j s_j) ]        exact everywhere
+    gamma = w_i x (w_i x A_i s_i) - w_j x (w_j x A_j s_j)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross
+from .base import Motion, Pose, Primitive, Row
+
+
+@dataclass(frozen=True)
+class Spherical(Primitive):
+    """s_i, s_j: arms from the body origins to P_i and P_j [m]; d0: from P_i to P_j at design."""
+
+    n = 3
+    s_i: Vec3
+    s_j: Vec3
+    d0: Vec3 = ZERO
+
+    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        return tuple(self.d0 + ((j.u - i.u) + (j.swing(self.s_j) - i.swing(self.s_i))))
+
+    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
+        S_i, S_j = i.turn(self.s_i), j.turn(self.s_j)
+        # e . (dpi x S) = dpi . (S x e)
+        return tuple(Row(-e, -cross(S_i, e), e, cross(S_j, e)) for e in (X, Y, Z))
+
+    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+        return tuple(vi.centripetal(i.turn(self.s_i)) - vj.centripetal(j.turn(self.s_j)))

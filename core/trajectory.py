@@ -1,0 +1,48 @@
+"""What solving a case gives, from any engine: the motion of points over the samples of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PointMotion:
+    """Motion of one point over n samples, global axes.
+
+    Attributes:
+        position: [m], shape (n, 3); NaN at samples that were not reached.
+        velocity: [m/s], shape (n, 3), or None where the engine has none.
+        acceleration: [m/s^2], shape (n, 3), or None where the engine has none.
+    """
+
+    position: Array
+    velocity: Array | None
+    acceleration: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The motion of all wanted points over the samples of a sweep, in the order of the sweep.
+
+    Attributes:
+        points: motion by point name.
+        solved: whether each sample was reached, shape (n,).
+        iterations: Newton iterations of each sample, shape (n,).
+        residual: the engine's own largest constraint residual over the solved samples [m or -].
+        message: empty, or why samples are missing: what was found, where, and what to do.
+        details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
+    """
+
+    points: Mapping[str, PointMotion]
+    solved: NDArray[np.bool_]
+    iterations: NDArray[np.int64]
+    residual: float
+    message: str
+    details: Mapping[str, Any]
