@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.analysis.continuity import continuous
 from ..core.harness.case import Case
@@ -101,8 +102,8 @@ class _Walk:
     def linear(self, A: Array, b: Array) -> Array:
         """Solve A x = b; never assumed square: point closures of a planar loop are redundant."""
         if self.square:
-            return np.linalg.solve(A, b)
-        return np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0]
+            return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
+        return np.asarray(np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0], dtype=np.float64)
 
     def newton(self, c: float) -> tuple[int, float] | None:
         """Iterations and final residual at driver value c, or None."""
@@ -188,7 +189,7 @@ class _Walk:
         return Trajectory(moves, solved, iterations, float(residual.max(initial=0.0)), "; ".join(messages), facts)
 
 
-def _stopped(case: Case, side: Sequence[int] | Array, solved: Any, at: float, wanted: float) -> str:
+def _stopped(case: Case, side: NDArray[np.intp], solved: NDArray[np.bool_], at: float, wanted: float) -> str:
     reached = [float(case.sweep.change[k]) for k in side if solved[k]]
     last = f"last reachable sample {reached[-1]:.9g}" if reached else "no sample reached on this side of the design"
     return (

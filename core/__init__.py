@@ -1,5 +1,6 @@
 """kincheck.core: describe a mechanism, solve it, compare engines."""
 
+from .analysis.solve import solve
 from .drivers import JointAngle, JointDisplacement, PointCoordinate
 from .errors import CaseError, KincheckError, MechanismError, SolveError
 from .joints import Distance, Fixed, Joint, Revolute, Spherical, Translational, Universal
@@ -24,4 +25,5 @@ __all__ = [
     "Spherical",
     "Translational",
     "Universal",
+    "solve",
 ]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 Scalar: TypeAlias = Any
 """A number of any kind that knows + - * / and unary minus."""
@@ -18,6 +18,7 @@ Scalar: TypeAlias = Any
 class Vec3:
     """A vector of three scalars, in whatever axes the context says."""
 
+    __array_ufunc__: ClassVar[None] = None  # an array of lanes times a vector is a vector of arrays
     x: Scalar
     y: Scalar
     z: Scalar

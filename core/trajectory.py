@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,6 +28,23 @@ class PointMotion:
 
 
 @dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """Motion of one body over n samples, in the paper's variables; NaN at samples that were not reached.
+
+    Attributes:
+        r: origin, global [m], shape (n, 3).
+        p: Euler parameters e0..e3, body -> global [-], shape (n, 4).
+        v: [rdot global [m/s], omega' body frame [rad/s]], shape (n, 6), or None where it was not asked for.
+        a: [rddot global [m/s^2], omega'dot body frame [rad/s^2]], shape (n, 6), or None where it was not asked for.
+    """
+
+    r: Array
+    p: Array
+    v: Array | None
+    a: Array | None
+
+
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """The motion of all wanted points over the samples of a sweep, in the order of the sweep.
 
@@ -38,6 +55,7 @@ class Trajectory:
         residual: the engine's own largest constraint residual over the solved samples [m or -].
         message: empty, or why samples are missing: what was found, where, and what to do.
         details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
+        bodies: motion by body name, for engines and requests that give it.
     """
 
     points: Mapping[str, PointMotion]
@@ -46,3 +64,4 @@ class Trajectory:
     residual: float
     message: str
     details: Mapping[str, Any]
+    bodies: Mapping[str, BodyMotion] = field(default_factory=dict[str, BodyMotion])

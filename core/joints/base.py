@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, vec
 from ..errors import MechanismError
@@ -115,6 +115,22 @@ class Joint(ABC):
         """Names of the first and the second body."""
         return self.i, self.j
 
+    def reversed(self) -> Self:
+        """The same joint seen from its second body: i and j exchanged, and so every pair."""
+        pairs = (Kind.POSITIONS, Kind.DIRECTIONS)
+        swapped = {f.name: getattr(self, f.name)[::-1] for f in fields(self) if f.metadata.get("kind") in pairs}
+        return replace(self, i=self.j, j=self.i, **swapped)
+
+    def scaled(self, factor: float) -> Self:
+        """The same joint with all lengths multiplied by the factor."""
+        changed = dict[str, Any]()
+        for each in fields(self):
+            kind, value = each.metadata.get("kind"), getattr(self, each.name)
+            if value is None or kind not in (Kind.POSITION, Kind.POSITIONS, Kind.LENGTH):
+                continue
+            changed[each.name] = _times(factor, value)
+        return replace(self, **changed)
+
     @property
     def rows(self) -> int:
         """Number of constraint equations."""
@@ -124,6 +140,18 @@ class Joint(ABC):
     @abstractmethod
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[Primitive]:
         """The primitives this joint is composed of; each sees body i first."""
+
+
+@dataclass(frozen=True)
+class AxialJoint(Joint):
+    """A joint about or along an axis through a point, both common to the two bodies; its freedom can be driven."""
+
+    point: tuple[float, float, float] = position()
+    axis: tuple[float, float, float] = direction()
+
+
+def _times(factor: float, value: float | Sequence[Any]) -> Any:
+    return tuple(_times(factor, each) for each in value) if isinstance(value, Sequence) else factor * value
 
 
 def unit(a: Sequence[Scalar]) -> Vec3:

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 
 from .. import primitives as p
 from ..algebra import vec
-from .base import Attachment, Joint, direction, position, triad
+from .base import Attachment, AxialJoint, triad
 
 
 @dataclass(frozen=True)
-class Revolute(Joint):
+class Revolute(AxialJoint):
     """Both bodies share the point and the axis and turn about it."""
 
     type = "revolute"
     freedoms = ("rotation",)
-    point: tuple[float, float, float] = position()
-    axis: tuple[float, float, float] = direction()
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P = vec(self.point)

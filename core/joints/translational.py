@@ -7,17 +7,15 @@ from dataclasses import dataclass
 
 from .. import primitives as p
 from ..algebra import vec
-from .base import Attachment, Joint, direction, position, triad
+from .base import Attachment, AxialJoint, triad
 
 
 @dataclass(frozen=True)
-class Translational(Joint):
+class Translational(AxialJoint):
     """Both bodies turn alike, and slide along the axis through the point."""
 
     type = "translational"
     freedoms = ("translation",)
-    point: tuple[float, float, float] = position()
-    axis: tuple[float, float, float] = direction()
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P, (f, g, _) = vec(self.point), triad(self.axis)

@@ -1,0 +1,37 @@
+# Two commands:  make run   the McPherson strut in every engine, compared and reported
+#                make test  style, types and tests
+# Plain Python with venv is enough; uv is used when it is there.
+PYTHON ?= python3
+BIN := .venv/bin
+UV := $(shell command -v uv 2>/dev/null)
+
+.PHONY: run test lock clean
+
+run: .venv/ready
+	$(BIN)/kincheck run mcpherson_strut --out report
+
+test: .venv/ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/pytest
+
+.venv/ready: pyproject.toml requirements.lock
+ifdef UV
+	uv venv --quiet --allow-existing --python $(PYTHON) .venv
+	uv pip install --quiet --python $(BIN)/python --requirement requirements.lock
+	uv pip install --quiet --python $(BIN)/python --no-deps --editable .
+else
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --editable .
+endif
+	touch $@
+
+# Pin the newest versions that pyproject.toml allows.
+lock: .venv/ready
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade \
+		--extra dev pyproject.toml --output-file requirements.lock
+
+clean:
+	rm -rf .venv build report *.egg-info

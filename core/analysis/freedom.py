@@ -1,0 +1,171 @@
+"""Degrees of freedom: the paper's count, the numerical rank, and which rows are kept.
+
+Rows that say what others say already (four spatial revolutes of a planar loop) are found once, at the design pose, and left out of
+the solution; they stay as a diagnostic, evaluated at every sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..algebra import IDENTITY, ZERO
+from ..errors import SolveError
+from ..mechanism import Mechanism
+from ..primitives.base import Pose
+from ..trajectory import Array
+from .equations import COLUMNS, Assembly, Frames, constraints, frames
+
+# Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
+# sound linkages is near 1e-2. In between lies nearly singular geometry, which is to be solved, not reduced.
+RANK_TOLERANCE = 1e-9
+EULER_PARAMETERS = 7
+"""Coordinates of a body in the paper's count: r and p."""
+
+
+@dataclass(frozen=True)
+class FreedomAccount:
+    """The degrees of freedom of a mechanism without its drivers.
+
+    Attributes:
+        bodies: all bodies, fixed ones included (the ground itself is none).
+        coordinates: 7 per body: position and Euler parameters.
+        equations: joint rows, 6 ground rows per fixed body, 1 normalisation per body.
+        moving_coordinates: 6 per moving body: the unknowns of the native formulation.
+        rows: joint rows.
+        rank: numerical rank of the joint rows.
+        redundant_rows: joint rows that are left out, as "joint: primitive".
+    """
+
+    bodies: int
+    coordinates: int
+    equations: int
+    moving_coordinates: int
+    rows: int
+    rank: int
+    redundant_rows: tuple[str, ...]
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom by the numerical rank."""
+        return self.moving_coordinates - self.rank
+
+    @property
+    def counted(self) -> str:
+        """The paper's count (Table 5)."""
+        return f"{self.coordinates} - {self.equations} = {self.coordinates - self.equations}"
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The rows that are solved: as many as there are unknowns, drivers among them."""
+
+    account: FreedomAccount
+    kept: tuple[int, ...]
+    dropped: tuple[int, ...]
+
+
+def design_jacobian(assembly: Assembly) -> Array:
+    """The Jacobian of all rows at the design pose, shape (rows, unknowns), in the units of the frames."""
+    at_design = {name: Pose.of(ZERO, IDENTITY) for name in assembly.columns}
+    rows = assembly.rows(at_design)
+    matrix = np.zeros((len(rows), COLUMNS * len(assembly.columns)))
+    for k, row in enumerate(rows):
+        matrix[k, list(row)] = list(row.values())
+    return matrix
+
+
+def independent_rows(matrix: Array, first: int) -> list[int]:
+    """Indices of a largest independent set of rows, the given number of last rows taken first.
+
+    Gram-Schmidt with row pivoting and reorthogonalisation; what is left of a row after the ones taken decides.
+    """
+    left = np.array(matrix)
+    count, size = left.shape
+    taken: list[int] = []
+    scale = float(np.abs(left).max(initial=0.0)) or 1.0
+    basis = np.zeros((0, size))
+    waiting = list(range(count))
+    while waiting and len(taken) < size:
+        norms = np.linalg.norm(left[waiting], axis=1)
+        drivers = [k for k, row in enumerate(waiting) if row >= count - first]
+        pick = drivers[0] if drivers else int(norms.argmax())
+        if norms[pick] <= RANK_TOLERANCE * scale:
+            if not drivers:
+                break
+            waiting.pop(pick)
+            continue
+        row = waiting.pop(pick)
+        taken.append(row)
+        q = left[row] / norms[pick]
+        q -= basis.T @ (basis @ q)
+        basis = np.vstack([basis, q / np.linalg.norm(q)])
+        for _ in range(2):
+            left[waiting] -= np.outer(left[waiting] @ basis[-1], basis[-1])
+    return sorted(taken)
+
+
+def account(mechanism: Mechanism, frame: Frames | None = None) -> FreedomAccount:
+    """Count and measure the degrees of freedom at the design pose."""
+    assembly, matrix, drivers = _matrix(mechanism, frame or frames(mechanism))
+    joint_rows = len(matrix) - drivers
+    kept = set(independent_rows(matrix[:joint_rows], 0))
+    fixed = len(mechanism.bodies) - len(mechanism.moving)
+    names = [f"{owner}: {primitive}" for owner, primitive in assembly.owners[:joint_rows]]
+    return FreedomAccount(
+        bodies=len(mechanism.bodies),
+        coordinates=EULER_PARAMETERS * len(mechanism.bodies),
+        equations=joint_rows + COLUMNS * fixed + len(mechanism.bodies),
+        moving_coordinates=COLUMNS * len(mechanism.moving),
+        rows=joint_rows,
+        rank=len(kept),
+        redundant_rows=tuple(names[k] for k in range(joint_rows) if k not in kept),
+    )
+
+
+def select_rows(mechanism: Mechanism, frame: Frames | None = None) -> Selection:
+    """The rows to solve for, drivers first.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
+    """
+    frame = frame or frames(mechanism)
+    found = account(mechanism, frame)
+    _, matrix, drivers = _matrix(mechanism, frame)
+    unknowns = found.moving_coordinates
+    if not unknowns:
+        raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
+    if found.dof != drivers:
+        raise SolveError(_mismatch(mechanism, matrix[: found.rows], found, drivers))
+    kept = independent_rows(matrix, drivers)
+    if len(kept) < unknowns:
+        raise SolveError(
+            f"mechanism {mechanism.name!r}: driven by {', '.join(repr(d.name) for d in mechanism.drivers)} it can still move "
+            f"at the design position (rank {len(kept)} of {unknowns}): a driver does not move it there (lock-up or dead "
+            "centre), or repeats what a joint or another driver prescribes; drive another coordinate or shift the design"
+        )
+    return Selection(found, tuple(kept), tuple(k for k in range(len(matrix)) if k not in set(kept)))
+
+
+def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Assembly, Array, int]:
+    assembly = Assembly.of(constraints(mechanism, frame, {}), [body.name for body in mechanism.moving])
+    return assembly, design_jacobian(assembly), len(mechanism.drivers)
+
+
+def _mismatch(mechanism: Mechanism, joint_rows: Array, found: FreedomAccount, drivers: int) -> str:
+    """Says what is free, by name: the bodies that move in the null space of the joint rows."""
+    head = (
+        f"mechanism {mechanism.name!r}: {found.dof} degree{'s' * (found.dof != 1)} of freedom "
+        f"({found.moving_coordinates} coordinates - rank {found.rank}) but {drivers} driver{'s' * (drivers != 1)}"
+    )
+    if found.dof < drivers:
+        return f"{head}; remove {drivers - found.dof} or free the mechanism"
+    motions = np.linalg.svd(joint_rows, full_matrices=True)[2][found.rank :] if found.rows else np.eye(found.moving_coordinates)
+    free: list[str] = []
+    for k, body in enumerate(mechanism.moving):
+        block = np.linalg.norm(motions[:, COLUMNS * k : COLUMNS * (k + 1)], axis=0)
+        if block.max() > 1e-6:  # far above round-off of an orthonormal basis
+            how = "move" if block[:3].max() > 1e-6 else "turn"
+            free.append(f"{body.name!r} can {how}")
+    return f"{head}; {', '.join(free)}; add a driver, or join what spins freely (a rod between two balls: use distance)"

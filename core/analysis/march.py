@@ -1,0 +1,201 @@
+"""March the lanes of a model outwards from the design position.
+
+Many samples are solved at once as lanes, predicted from the last accepted pose; those are accepted that connect to it without a
+gap, and the march goes on from the last of them. A step that fails is divided, so a coarse grid costs steps; where no part of a
+step succeeds the motion ends, and a message says where and why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..trajectory import Array
+from .continuity import LARGEST_DEVIATION, NEGLIGIBLE
+from .model import Model
+
+# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
+LAST_ITERATION = 1e-9
+MAX_ITERATIONS = 12
+# More lanes than this leave the processor's cache, fewer leave numpy idle.
+LANES = 256
+# A failing step is tried at its halves, quarters, ... down to this many halvings, all at once.
+HALVINGS = 16
+# A front that needs more rounds than this without reaching a sample makes no headway.
+MAX_ROUNDS = 200
+# Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.
+CONSISTENT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class March:
+    """What a march found, sample by sample in the order given.
+
+    Attributes:
+        lanes: the slots of every sample, shape (slots, n); NaN where it was not reached.
+        solved, iterations: shape (n,).
+        messages: one for each direction that ended before its last sample.
+    """
+
+    lanes: Array
+    solved: NDArray[np.bool_]
+    iterations: NDArray[np.int64]
+    messages: tuple[str, ...]
+
+
+@dataclass
+class _Front:
+    """One direction of the march: the samples still ahead, and the pose it stands at."""
+
+    ahead: NDArray[np.intp]
+    anchor: Array
+    at: float = 0.0
+    reach: int = LANES
+    dividing: bool = False
+    rounds: int = 0
+    message: str = ""
+    lanes: slice = field(default_factory=lambda: slice(0))
+    aims: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def samples(self) -> int:
+        """How many of its lanes are samples; the others are parts of the step to the first of them."""
+        return len(self.aims) - HALVINGS * self.dividing
+
+
+def march(model: Model, values: Array, rate: float, tol: float) -> March:
+    """Solve a model at driver values measured from the design position; see `solve` for the arguments."""
+    return _Marcher(model, values, rate, tol).run()
+
+
+class _Marcher:
+    def __init__(self, model: Model, values: Array, rate: float, tol: float) -> None:
+        self.model, self.values, self.rate = model, values, rate
+        self.tol = tol
+        self.slots = model.slots
+        self.executor = model.executor(min(LANES, len(values)) + 2 * HALVINGS)
+        self.block = self.executor.block
+        n = len(values)
+        self.lanes = np.full((len(self.block), n), np.nan)
+        self.solved, self.iterations = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
+
+    def run(self) -> March:
+        anchor = self.model.design(self.rate)
+        outward = np.argsort(np.abs(self.values), kind="stable")
+        sides = (outward[self.values[outward] >= 0.0], outward[self.values[outward] < 0.0])
+        fronts = [_Front(side, anchor) for side in sides if len(side)]
+        while active := [front for front in fronts if len(front.ahead) and not front.message]:
+            self._round(active)
+        return March(self.lanes, self.solved, self.iterations, tuple(front.message for front in fronts if front.message))
+
+    def _round(self, active: Sequence[_Front]) -> None:
+        """Try the next samples of every front as lanes of one block, and move each front as far as it holds."""
+        share = (self.block.shape[1] - HALVINGS * len(active)) // len(active)
+        used = 0
+        for front in active:
+            front.aims = self.values[front.ahead[: min(front.reach, share)]]
+            if front.dividing:
+                parts = front.at + (front.aims[0] - front.at) * 0.5 ** np.arange(1, HALVINGS + 1)
+                front.aims = np.concatenate([front.aims, parts])
+            front.lanes = slice(used, used + len(front.aims))
+            used = front.lanes.stop
+            self.block[:, front.lanes] = front.anchor[:, None]
+            self.block[self.slots["h"], front.lanes] = (front.aims - front.at) / self.rate
+        self.executor.run("predict")
+        predicted = self.block[self.model.state, :used]
+        for front in active:
+            self.model.drive(self.block[:, front.lanes], front.aims, self.rate)
+        iterations, done = self._newton(used)
+        if self.model.request.order:
+            self.executor.run("motion")
+        self.executor.run("outputs")
+        done &= self._closed()[:used]
+        drift = self.block[self.model.state, :used] - predicted
+        moves = [self._accept(front, done, drift, iterations) for front in active]
+        if self.model.request.order < 2 and any(len(front.ahead) for front in active):
+            self.executor.run("tangent")
+        for front, lane in zip(active, moves, strict=True):
+            if lane is not None:
+                front.anchor = self.block[:, lane].copy()
+
+    def _newton(self, used: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Iterate until the used lanes are done; (iterations, converged) of each."""
+        residual = self.block[self.slots["residual"], :used]
+        iterations, done = np.zeros(used, dtype=np.int64), np.zeros(used, dtype=np.bool_)
+        for _ in range(MAX_ITERATIONS):
+            self.executor.run("newton")
+            iterations += ~done
+            done |= residual < LAST_ITERATION
+            if (done | ~np.isfinite(residual)).all():
+                break
+        return iterations, done
+
+    def _closed(self) -> NDArray[np.bool_]:
+        """Lanes that close within the tolerance, on the intended branch, and agree with the redundant rows."""
+        closure, branch, leftover = (self.block[self.slots[name]] for name in ("closure", "branch", "leftover"))
+        return (closure <= self.tol) & (branch > 0.0) & (leftover <= max(CONSISTENT, self.tol))
+
+    def _accept(self, front: _Front, done: NDArray[np.bool_], drift: Array, iterations: NDArray[np.int64]) -> int | None:
+        """Keep the samples that connect to the front; the lane to go on from, or None where the front stays or ends."""
+        first, count = front.lanes.start, front.samples
+        good = done[front.lanes] & self._connected(front, drift[:, front.lanes])
+        accepted = count if good[:count].all() else int(good[:count].argmin())
+        if accepted:
+            taken = front.ahead[:accepted]
+            self.lanes[:, taken] = self.block[:, first : first + accepted]
+            self.solved[taken], self.iterations[taken] = True, iterations[first : first + accepted]
+            front.ahead, front.reach, front.dividing, front.rounds = front.ahead[accepted:], 2 * accepted, False, 0
+            return self._go_to(front, accepted - 1)
+        front.rounds += 1
+        parts = np.flatnonzero(good[count:])
+        if front.dividing and len(parts) and front.rounds < MAX_ROUNDS:
+            return self._go_to(front, count + int(parts[0]))
+        if front.dividing:
+            front.message = self._end(front)
+        # few samples while the way to the first of them is sought
+        front.dividing, front.reach = True, 4
+        return None
+
+    def _connected(self, front: _Front, drift: Array) -> NDArray[np.bool_]:
+        """Whether each lane continues its neighbour: the correction changes by much less than the pose does.
+
+        The neighbour of a sample is the one before it, that of the first one and of the parts of its step is the front itself.
+        """
+        x, here = self.block[self.model.state, front.lanes], front.anchor[self.model.state][:, None]
+        before = np.repeat(here, x.shape[1], axis=1)
+        drift_before = np.zeros_like(drift)
+        before[:, 1 : front.samples], drift_before[:, 1 : front.samples] = (a[:, : front.samples - 1] for a in (x, drift))
+        gap, moved = np.abs(drift - drift_before).max(axis=0), np.abs(x - before).max(axis=0)
+        return gap <= LARGEST_DEVIATION * moved + NEGLIGIBLE
+
+    def _go_to(self, front: _Front, k: int) -> int:
+        front.at = float(front.aims[k])
+        return front.lanes.start + k
+
+    def _end(self, front: _Front) -> str:
+        wanted = float(front.aims[0])
+        side = self.solved & ((self.values >= 0.0) == (wanted >= 0.0))
+        last = f"last reachable sample {self.values[side][np.abs(self.values[side]).argmax()]:.9g}" if side.any() else ""
+        return (
+            f"driver {self.model.request.driver!r} cannot be followed beyond {front.at:.9g} (wanted {wanted:.9g}): "
+            f"{self._reason(front.lanes.stop - 1)}; smallest pivot there {front.anchor[self.slots['pivot']]:.3g} (zero at a "
+            f"lock-up or dead centre); {last or 'no sample reached on this side of the design'}; shorten the sweep or drive "
+            "another coordinate"
+        )
+
+    def _reason(self, lane: int) -> str:
+        """Why a lane was not accepted, with the number found."""
+        closure, branch, leftover = (self.block[self.slots[name], lane] for name in ("closure", "branch", "leftover"))
+        if not np.isfinite(closure):
+            return "Newton diverges to numbers that are not finite"
+        if not branch > 0.0:
+            return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
+        if closure <= self.tol and leftover > max(CONSISTENT, self.tol):
+            names = ", ".join(self.model.selection.account.redundant_rows)
+            return f"the redundant rows ({names}) contradict the others by {leftover:.3g}"
+        if closure > self.tol:
+            return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
+        return "Newton jumps to another assembly"

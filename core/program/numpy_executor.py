@@ -1,0 +1,92 @@
+"""Run programs with numpy: one ufunc call per operation, over all lanes at once. No start-up cost; the oracle of the tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from ..trajectory import Array
+from .trace import Program, operands
+
+_UFUNCS: dict[str, Callable[..., Any]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "neg": np.negative,
+    "sqrt": np.sqrt,
+    "abs": np.absolute,
+    "min": np.minimum,
+    "max": np.maximum,
+}
+
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+
+
+def _larger(a: Array, b: Array, size_a: Array, size_b: Array, out: Array) -> None:
+    np.greater(np.absolute(a, size_a), np.absolute(b, size_b), out=out)
+
+
+def _where(m: Array, p: Array, q: Array, out: Array) -> None:
+    np.copyto(out, q)
+    np.copyto(out, p, where=m)
+
+
+class NumpyExecutor:
+    """The programs bound to one block of lanes.
+
+    Args:
+        programs: programs that read and write the same slots.
+        block: shape (slots, lanes); the programs read and write it in place.
+    """
+
+    def __init__(self, programs: Iterable[Program], block: Array) -> None:
+        self.block = block
+        self._scratch = np.empty((2, block.shape[1]))
+        self._programs = {program.name: program for program in programs}
+        self._calls: dict[str, list[Call]] = {}
+
+    def run(self, name: str) -> None:
+        """Run one program over all lanes. Lanes that divide by zero hold inf or nan afterwards; nothing is raised."""
+        if name not in self._calls:
+            self._calls[name] = self._bind(self._programs[name])
+        with np.errstate(all="ignore"):
+            for call, arguments in self._calls[name]:
+                call(*arguments)
+
+    def _bind(self, program: Program) -> list[Call]:
+        """Give every operation a register; a register is free again after its last reader."""
+        lanes = self.block.shape[1]
+        last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
+        kept = set(program.outputs.values())
+        place: list[Any] = []
+        free: dict[type, list[Array]] = {np.float64: [], np.bool_: []}
+        calls: list[Call] = []
+        for k, (op, *rest) in enumerate(program.nodes):
+            if op == "input":
+                place.append(self.block[int(rest[0])])
+                continue
+            if op == "const":
+                place.append(np.float64(rest[0]))
+                continue
+            arguments = [int(x) for x in rest]
+            kind = np.bool_ if op == "larger" else np.float64
+            out = free[kind].pop() if free[kind] else np.empty(lanes, kind)
+            place.append(out)
+            read = [place[x] for x in arguments]
+            if op == "larger":
+                calls.append((_larger, (*read, *self._scratch, out)))
+            else:
+                calls.append((_where if op == "where" else _UFUNCS[op], (*read, out)))
+            for x in set(arguments):
+                if last[x] == k and x not in kept and program.nodes[x][0] not in ("input", "const"):
+                    free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
+        for node in kept:  # an input that is put out elsewhere must survive the output that overwrites its slot
+            if program.nodes[node][0] == "input":
+                copy = np.empty(lanes)
+                calls.append((np.copyto, (copy, place[node])))
+                place[node] = copy
+        calls += [(np.copyto, (self.block[slot], place[node])) for slot, node in program.outputs.items()]
+        return calls
