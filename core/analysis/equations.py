@@ -11,17 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from .. import primitives as p
-from ..algebra import ZERO, Scalar, Vec3, vec
+from ..algebra import ZERO, Vec3, vec
 from ..drivers import Driver, JointAngle, JointDriver, PointCoordinate
 from ..errors import SolveError
 from ..joints import Attachment, AxialJoint, Joint
 from ..joints.base import unit
 from ..mechanism import GROUND, Mechanism
-from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose, Row
+from ..primitives.base import Drive
 from ..topology import spanning_tree
-
-COLUMNS = 6
-"""Unknowns of a moving body: dr and dpi."""
 
 
 @dataclass(frozen=True)
@@ -101,60 +98,3 @@ def _driven(mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive) -
     h, e0 = unit(joint.axis), frame.origins[joint.j] - frame.origins[joint.i]
     primitive = p.DrivenAngle(h, drive) if isinstance(driver, JointAngle) else p.LockedDisplacement(h, e0, drive)
     return Constraint(driver.name, primitive, joint.i, joint.j)
-
-
-@dataclass(frozen=True, eq=False)
-class Assembly:
-    """The constraints over the poses of the moving bodies, whose columns they fill in order."""
-
-    constraints: Sequence[Constraint]
-    columns: Mapping[str, int]
-
-    @staticmethod
-    def of(found: Sequence[Constraint], moving: Sequence[str]) -> Assembly:
-        """The constraints over the named moving bodies."""
-        return Assembly(found, {name: COLUMNS * k for k, name in enumerate(moving)})
-
-    @property
-    def owners(self) -> list[tuple[str, str]]:
-        """For every row: the joint or driver, and the primitive it belongs to."""
-        return [(c.owner, type(c.primitive).__name__) for c in self.constraints for _ in range(c.primitive.n)]
-
-    def phi(self, poses: Mapping[str, Pose]) -> list[Scalar]:
-        """All residuals."""
-        return [value for c in self.constraints for value in c.primitive.phi(*self._pair(c, poses))]
-
-    def branch(self, poses: Mapping[str, Pose]) -> list[Scalar]:
-        """All branch tests: positive on the intended branch."""
-        return [value for c in self.constraints for value in c.primitive.branch(*self._pair(c, poses))]
-
-    def rows(self, poses: Mapping[str, Pose]) -> list[dict[int, Scalar]]:
-        """All rows, each a mapping column -> entry without literal zeros."""
-        return [self._sparse(row, c) for c in self.constraints for row in c.primitive.rows(*self._pair(c, poses))]
-
-    def nu(self) -> list[Scalar]:
-        """Right-hand sides of the velocity equations."""
-        return [value for c in self.constraints for value in c.primitive.nu()]
-
-    def gamma(self, poses: Mapping[str, Pose], motions: Mapping[str, Motion]) -> list[Scalar]:
-        """Right-hand sides of the acceleration equations."""
-        found: list[Scalar] = []
-        for c in self.constraints:
-            vi, vj = motions.get(c.i, GROUND_MOTION), motions.get(c.j, GROUND_MOTION)
-            found += c.primitive.gamma(*self._pair(c, poses), vi, vj)
-        return found
-
-    def _pair(self, c: Constraint, poses: Mapping[str, Pose]) -> tuple[Pose, Pose]:
-        return poses.get(c.i, GROUND_POSE), poses.get(c.j, GROUND_POSE)
-
-    def _sparse(self, row: Row, c: Constraint) -> dict[int, Scalar]:
-        entries: dict[int, Scalar] = {}
-        for body, blocks in ((c.i, (row.ri, row.pi)), (c.j, (row.rj, row.pj))):
-            if body in self.columns:
-                values = (value for block in blocks for value in block)
-                entries |= {
-                    self.columns[body] + k: value
-                    for k, value in enumerate(values)
-                    if not (isinstance(value, int | float) and value == 0)
-                }
-        return entries

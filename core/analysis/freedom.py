@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import IDENTITY, ZERO
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..primitives.base import Pose
 from ..trajectory import Array
-from .equations import COLUMNS, Assembly, Frames, constraints, frames
+from .cartesian import COLUMNS, Cartesian
+from .equations import Frames, constraints, frames
+from .formulation import Formulation
 
 # Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
 # sound linkages is near 1e-2. In between lies nearly singular geometry, which is to be solved, not reduced.
@@ -66,11 +66,10 @@ class Selection:
     dropped: tuple[int, ...]
 
 
-def design_jacobian(assembly: Assembly) -> Array:
-    """The Jacobian of all rows at the design pose, shape (rows, unknowns), in the units of the frames."""
-    at_design = {name: Pose.of(ZERO, IDENTITY) for name in assembly.columns}
-    rows = assembly.rows(at_design)
-    matrix = np.zeros((len(rows), COLUMNS * len(assembly.columns)))
+def design_jacobian(formulation: Formulation) -> Array:
+    """The Jacobian of all rows at the design position, shape (rows, unknowns), in the units of the frames."""
+    rows = formulation.rows(formulation.configuration(formulation.design))
+    matrix = np.zeros((len(rows), formulation.unknowns))
     for k, row in enumerate(rows):
         matrix[k, list(row)] = list(row.values())
     return matrix
@@ -108,11 +107,11 @@ def independent_rows(matrix: Array, first: int) -> list[int]:
 
 def account(mechanism: Mechanism, frame: Frames | None = None) -> FreedomAccount:
     """Count and measure the degrees of freedom at the design pose."""
-    assembly, matrix, drivers = _matrix(mechanism, frame or frames(mechanism))
-    joint_rows = len(matrix) - drivers
+    formulation, matrix = _matrix(mechanism, frame or frames(mechanism))
+    joint_rows = len(matrix) - len(mechanism.drivers)
     kept = set(independent_rows(matrix[:joint_rows], 0))
     fixed = len(mechanism.bodies) - len(mechanism.moving)
-    names = [f"{owner}: {primitive}" for owner, primitive in assembly.owners[:joint_rows]]
+    names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners[:joint_rows]]
     return FreedomAccount(
         bodies=len(mechanism.bodies),
         coordinates=EULER_PARAMETERS * len(mechanism.bodies),
@@ -132,8 +131,8 @@ def select_rows(mechanism: Mechanism, frame: Frames | None = None) -> Selection:
     """
     frame = frame or frames(mechanism)
     found = account(mechanism, frame)
-    _, matrix, drivers = _matrix(mechanism, frame)
-    unknowns = found.moving_coordinates
+    _, matrix = _matrix(mechanism, frame)
+    unknowns, drivers = found.moving_coordinates, len(mechanism.drivers)
     if not unknowns:
         raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
     if found.dof != drivers:
@@ -148,9 +147,9 @@ def select_rows(mechanism: Mechanism, frame: Frames | None = None) -> Selection:
     return Selection(found, tuple(kept), tuple(k for k in range(len(matrix)) if k not in set(kept)))
 
 
-def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Assembly, Array, int]:
-    assembly = Assembly.of(constraints(mechanism, frame, {}), [body.name for body in mechanism.moving])
-    return assembly, design_jacobian(assembly), len(mechanism.drivers)
+def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
+    formulation = Cartesian(constraints(mechanism, frame, {}), [body.name for body in mechanism.moving])
+    return formulation, design_jacobian(formulation)
 
 
 def _mismatch(mechanism: Mechanism, joint_rows: Array, found: FreedomAccount, drivers: int) -> str:

@@ -10,9 +10,9 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..program import NumpyExecutor, Program
 from ..trajectory import Array
-from .equations import Frames, frames
-from .freedom import Selection, select_rows
-from .programs import STATE, Layout, Request, Tracer
+from .equations import frames
+from .freedom import select_rows
+from .programs import RATE, RATE_T, Request, Tracer
 
 
 def compile_model(mechanism: Mechanism, request: Request) -> Model:
@@ -28,7 +28,7 @@ def compile_model(mechanism: Mechanism, request: Request) -> Model:
     programs = [tracer.newton(), tracer.predict(), tracer.motion("tangent", 2)]
     if request.order:
         programs.append(tracer.motion("motion", request.order))
-    return Model(mechanism, request, selection, frame, tracer.layout, [*programs, tracer.outputs()])
+    return Model(tracer, [*programs, tracer.outputs()])
 
 
 class Model:
@@ -36,26 +36,24 @@ class Model:
 
     Attributes:
         slots: name of a scalar -> its place in a lane.
-        vectors: name of a vector or of Euler parameters -> the places of its components.
-        state: the places of all poses.
+        vectors: name of a vector -> the places of its components.
+        state: the places of everything that fixes the configuration.
     """
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        request: Request,
-        selection: Selection,
-        frame: Frames,
-        layout: Layout,
-        programs: Sequence[Program],
-    ) -> None:
-        self.mechanism, self.request, self.selection, self.frame = mechanism, request, selection, frame
+    def __init__(self, tracer: Tracer, programs: Sequence[Program]) -> None:
+        self.mechanism, self.request, self.selection, self.frame = (
+            tracer.mechanism,
+            tracer.request,
+            tracer.selection,
+            tracer.frame,
+        )
         self.programs: Mapping[str, Program] = {program.name: program for program in programs}
-        self.slots, self.vectors = layout.slots, layout.vectors
-        self.state = np.array([slot for name, places in self.vectors.items() if name.split()[0] in STATE for slot in places])
+        self.slots, self.vectors = tracer.layout.slots, tracer.layout.vectors
+        self._at_design = tracer.formulation.design
+        self.state = np.array([slot for name in self._at_design for slot in self.vectors[name]])
         self._executors: dict[int, NumpyExecutor] = {}
-        angle = mechanism.driver(request.driver).type == "joint_angle"
-        self._drive_scale = 1.0 if angle else 1.0 / frame.unit
+        angle = self.mechanism.driver(self.request.driver).type == "joint_angle"
+        self._drive_scale = 1.0 if angle else 1.0 / self.frame.unit
         self._design = self._solve_design()
 
     @property
@@ -79,18 +77,17 @@ class Model:
     def design(self, rate: float) -> Array:
         """The lane of the design position moving at the given rate, shape (slots,)."""
         lane = self._design.copy()
-        for name, places in self.vectors.items():
-            power = {"v": 1, "w": 1, "v_t": 2, "w_t": 2}.get(name.split()[0], 0)
-            lane[places] *= rate**power  # at constant rate, velocities are linear in it and accelerations quadratic
+        # at constant rate, velocities are linear in it and accelerations quadratic
+        lane[self.vectors[RATE]] *= rate
+        lane[self.vectors[RATE_T]] *= rate * rate
         return lane
 
     def _solve_design(self) -> Array:
         """The pose with all drivers at their design value, with v and a at unit rate; normally the design itself."""
         executor = NumpyExecutor(self.programs.values(), np.zeros((len(self.slots), 1)))
         block = executor.block
-        for name, places in self.vectors.items():
-            if name.startswith("q "):
-                block[places[0]] = 1.0
+        for name, value in self._at_design.items():
+            block[self.vectors[name], 0] = value
         self.drive(block, np.zeros(1), 1.0)
         residual = block[self.slots["residual"]]
         for _ in range(50):  # a rod given longer or shorter than its design distance is taken up here

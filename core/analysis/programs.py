@@ -10,15 +10,18 @@ Each is traced for what is asked: no acceleration, no gamma; no velocity, no fac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from typing import Any
 
-from ..algebra import Quat, Scalar, Vec3, cross, turned_by, vec
-from ..mechanism import GROUND, Mechanism
-from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose
-from ..program import Elimination, Program, Tape, absolute, maximum, minimum, program, sqrt
-from .equations import COLUMNS, Assembly, Frames, constraints
+from ..algebra import ZERO, Quat, Scalar, cross, rotation_less_identity, vec
+from ..mechanism import Mechanism, Vector
+from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion
+from ..program import Elimination, Program, Tape, absolute, maximum, minimum, program
+from .cartesian import Cartesian
+from .equations import Frames, constraints
+from .formulation import Acceleration, Formulation, State
 from .freedom import Selection
 
 
@@ -38,8 +41,8 @@ class Request:
     order: int = 2
 
 
-STATE = ("u", "q")
-"""The vectors that make up a pose: displacement and Euler parameters."""
+RATE, RATE_T = "rate", "rate_t"
+"""The vectors that hold the rates and accelerations of the unknowns."""
 
 
 class Layout:
@@ -64,125 +67,117 @@ class Tracer:
     def __init__(self, mechanism: Mechanism, request: Request, selection: Selection, frame: Frames) -> None:
         self.mechanism, self.request, self.selection, self.frame = mechanism, request, selection, frame
         self.tape, self.layout = Tape(), Layout()
-        self.names = [body.name for body in mechanism.moving]
-        self.poses = {name: self._pose(name) for name in self.names}
         drive = Drive(self._in("c"), self._in("c_t"), 0.0, self._in("half_cos"), self._in("half_sin"))
-        self.assembly = Assembly.of(constraints(mechanism, frame, {request.driver: drive}), self.names)
-        self.rows = self.assembly.rows(self.poses)
+        moving = [body.name for body in mechanism.moving]
+        self.formulation: Formulation = Cartesian(constraints(mechanism, frame, {request.driver: drive}), moving)
+        design = self.formulation.design
+        self.at = self.formulation.configuration({name: self._vector(name, len(value)) for name, value in design.items()})
+        self.unknowns = self.formulation.unknowns
 
     def _in(self, name: str) -> Scalar:
         return self.tape.input(self.layout.scalar(name))
 
-    def _vector(self, name: str) -> Vec3:
-        return vec([self.tape.input(slot) for slot in self.layout.vector(name)])
+    def _vector(self, name: str, count: int) -> list[Scalar]:
+        return [self.tape.input(slot) for slot in self.layout.vector(name, count)]
 
-    def _pose(self, name: str) -> Pose:
-        e0, *e = (self.tape.input(slot) for slot in self.layout.vector(f"q {name}", 4))
-        return Pose.of(self._vector(f"u {name}"), Quat(e0, vec(e)))
-
-    def _motion(self, name: str) -> Motion:
-        return Motion(self._vector(f"v {name}"), self._vector(f"w {name}"))
-
-    def _store(self, out: dict[int, Scalar], name: str, value: Vec3 | Quat) -> None:
+    def _store(self, out: dict[int, Scalar], name: str, value: Iterable[Scalar]) -> None:
         scalars = list(value)
         out.update(zip(self.layout.vector(name, len(scalars)), scalars, strict=True))
 
-    def _store_pose(self, out: dict[int, Scalar], name: str, u: Vec3, q: Quat) -> None:
-        self._store(out, f"u {name}", u)
-        self._store(out, f"q {name}", q)
+    def _store_state(self, out: dict[int, Scalar], state: State) -> None:
+        for name, value in state.items():
+            self._store(out, name, value)
 
-    def _kept(self, values: Sequence[Scalar]) -> list[Scalar]:
+    def _kept(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.kept]
 
     def newton(self) -> Program:
-        phi = self._kept(self.assembly.phi(self.poses))
-        factor = Elimination([self.rows[k] for k in self.selection.kept])
-        step = factor.solve(phi)
+        """One Newton-Raphson iteration."""
+        phi = self._kept(self.formulation.phi(self.at))
+        factor = Elimination(self._kept(self.formulation.rows(self.at)))
         out: dict[int, Scalar] = {
             self.layout.scalar("residual"): _largest(phi),
             self.layout.scalar("pivot"): reduce(minimum, (absolute(x) for x in factor.pivots), 1.0),
         }
-        for name, k in self.assembly.columns.items():
-            dr, dpi = vec(step[k : k + 3]), vec(step[k + 3 : k + COLUMNS])
-            pose = self.poses[name]
-            self._store_pose(out, name, pose.u - dr, turned_by(pose.q, -0.5 * dpi, sqrt))
+        self._store_state(out, self.formulation.retract(self.at, [-x for x in factor.solve(phi)]))
         return program("newton", self.tape, out)
 
     def motion(self, name: str, order: int) -> Program:
-        factor = Elimination([self.rows[k] for k in self.selection.kept])
+        """Rates of the unknowns, and with order 2 their accelerations: one factorisation for both."""
+        factor = Elimination(self._kept(self.formulation.rows(self.at)))
         out: dict[int, Scalar] = {}
-        v = factor.solve(self._kept(self.assembly.nu()))
-        motions = {body: Motion(vec(v[k : k + 3]), vec(v[k + 3 : k + 6])) for body, k in self.assembly.columns.items()}
-        for body, motion in motions.items():
-            self._store(out, f"v {body}", motion.v)
-            self._store(out, f"w {body}", motion.w)
+        v = factor.solve(self._kept(self.formulation.nu()))
+        self._store(out, RATE, v)
         if order == 2:
-            a = factor.solve(self._kept(self.assembly.gamma(self.poses, motions)))
-            for body, k in self.assembly.columns.items():
-                self._store(out, f"v_t {body}", vec(a[k : k + 3]))
-                self._store(out, f"w_t {body}", vec(a[k + 3 : k + COLUMNS]))
+            self._store(out, RATE_T, factor.solve(self._kept(self.formulation.gamma(self.at, v))))
         return program(name, self.tape, out)
 
     def predict(self) -> Program:
+        """The state after the time h by a Taylor step of second order."""
         h = self._in("h")
+        v, a = self._vector(RATE, self.unknowns), self._vector(RATE_T, self.unknowns)
+        step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
         out: dict[int, Scalar] = {}
-        for name, pose in self.poses.items():
-            motion, v_t, w_t = self._motion(name), self._vector(f"v_t {name}"), self._vector(f"w_t {name}")
-            half = (0.5 * h) * (motion.w + (0.5 * h) * w_t)
-            # tan x = x + x^3 / 3: turned_by takes the tangent of half the angle
-            tangent = (1.0 + (1.0 / 3.0) * (half @ half)) * half
-            u = pose.u + h * (motion.v + (0.5 * h) * v_t)
-            self._store_pose(out, name, u, turned_by(pose.q, tangent, sqrt))
+        self._store_state(out, self.formulation.retract(self.at, step))
         return program("predict", self.tape, out)
 
     def outputs(self) -> Program:
-        phi = self.assembly.phi(self.poses)
+        """The wanted motions, and the tests of a solution: closure, redundant rows, branch."""
+        phi = self.formulation.phi(self.at)
         out: dict[int, Scalar] = {
             self.layout.scalar("closure"): _largest(self._kept(phi)),
             self.layout.scalar("leftover"): _largest([phi[k] for k in self.selection.dropped]),
-            self.layout.scalar("branch"): reduce(minimum, self.assembly.branch(self.poses), 1.0),
+            self.layout.scalar("branch"): reduce(minimum, self.formulation.branch(self.at), 1.0),
         }
+        v, a = self._vector(RATE, self.unknowns), self._vector(RATE_T, self.unknowns)
+        motions = self.formulation.motions(self.at, v)
+        accelerations = self.formulation.accelerations(self.at, v, a)
         for name in self.request.points:
-            self._store_point(out, name)
+            point = self.mechanism.point(name)
+            self._store_point(
+                out, ("position", "velocity", "acceleration"), name, point.body, point.position, motions, accelerations
+            )
         for name in self.request.bodies:
-            self._store_body(out, name)
+            origin = self.mechanism.body(name).origin
+            self._store_point(out, ("r", "rdot", "rddot"), name, name, origin, motions, accelerations)
+            self._store_rotation(out, name, motions, accelerations)
         return program("outputs", self.tape, out)
 
-    def _store_point(self, out: dict[int, Scalar], name: str) -> None:
+    def _store_point(
+        self,
+        out: dict[int, Scalar],
+        labels: tuple[str, str, str],
+        name: str,
+        body: str,
+        position: Vector,
+        motions: Mapping[str, Motion],
+        accelerations: Mapping[str, Acceleration],
+    ) -> None:
         """Position, velocity and acceleration of a point in metres; its displacement is formed first, and added once."""
-        point = self.mechanism.point(name)
-        pose, motion, v_t, w_t = self._state(point.body)
-        arm, metres = self.frame.arm(point.body, point.position), self.frame.unit
-        self._store(out, f"position {name}", vec(point.position) + metres * (pose.u + pose.swing(arm)))
+        pose, motion = self.at.poses.get(body, GROUND_POSE), motions.get(body, GROUND_MOTION)
+        acceleration = accelerations.get(body, Acceleration(ZERO, ZERO))
+        arm, metres = self.frame.arm(body, position), self.frame.unit
         turned = pose.turn(arm)
-        if self.request.order >= 1:
-            self._store(out, f"velocity {name}", metres * motion.of(turned))
-        if self.request.order == 2:
-            acceleration = v_t + cross(w_t, turned) + motion.centripetal(turned)
-            self._store(out, f"acceleration {name}", metres * acceleration)
+        found = (
+            vec(position) + metres * (pose.u + pose.swing(arm)),
+            metres * motion.of(turned),
+            metres * (acceleration.v_t + cross(acceleration.w_t, turned) + motion.centripetal(turned)),
+        )
+        for label, value in zip(labels[: self.request.order + 1], found, strict=False):
+            self._store(out, f"{label} {name}", value)
 
-    def _store_body(self, out: dict[int, Scalar], name: str) -> None:
-        """r, p, [rdot, omega'] and [rddot, omega'dot]: the paper's variables of a body's own frame."""
-        body = self.mechanism.body(name)
-        pose, motion, v_t, w_t = self._state(name)
-        arm, metres = self.frame.arm(name, body.origin), self.frame.unit
-        e0, *e = body.euler_parameters
+    def _store_rotation(
+        self, out: dict[int, Scalar], name: str, motions: Mapping[str, Motion], accelerations: Mapping[str, Acceleration]
+    ) -> None:
+        """p, omega' and omega'dot of a body's own frame: the paper's variables."""
+        pose, motion = self.at.poses.get(name, GROUND_POSE), motions.get(name, GROUND_MOTION)
+        e0, *e = self.mechanism.body(name).euler_parameters
         p = pose.q * Quat(e0, vec(e))
-        turned, to_body = pose.turn(arm), Pose.of(arm, p).D
-        self._store(out, f"r {name}", vec(body.origin) + metres * (pose.u + pose.swing(arm)))
-        self._store(out, f"p {name}", p)
-        if self.request.order >= 1:
-            self._store(out, f"rdot {name}", metres * motion.of(turned))
-            self._store(out, f"omega {name}", motion.w + to_body.transposed_times(motion.w))
-        if self.request.order == 2:
-            acceleration = v_t + cross(w_t, turned) + motion.centripetal(turned)
-            self._store(out, f"rddot {name}", metres * acceleration)
-            self._store(out, f"omega_t {name}", w_t + to_body.transposed_times(w_t))
-
-    def _state(self, name: str) -> tuple[Pose, Motion, Vec3, Vec3]:
-        if name == GROUND or name not in self.poses:
-            return GROUND_POSE, GROUND_MOTION, GROUND_MOTION.v, GROUND_MOTION.w
-        return self.poses[name], self._motion(name), self._vector(f"v_t {name}"), self._vector(f"w_t {name}")
+        D = rotation_less_identity(p)
+        w_t = accelerations.get(name, Acceleration(ZERO, ZERO)).w_t
+        found = (p, motion.w + D.transposed_times(motion.w), w_t + D.transposed_times(w_t))
+        for label, value in zip(("p", "omega", "omega_t")[: self.request.order + 1], found, strict=False):
+            self._store(out, f"{label} {name}", value)
 
 
 def _largest(values: Sequence[Scalar]) -> Scalar:

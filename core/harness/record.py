@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
+
+from .case import Truth
 
 
 class Outcome(StrEnum):
@@ -19,6 +22,11 @@ class Outcome(StrEnum):
     TIMEOUT = "timeout"
     CRASHED = "crashed"
 
+    @property
+    def bad(self) -> bool:
+        """Whether something was run and went wrong; a missing engine or feature is no fault of a result."""
+        return self not in (Outcome.PASS, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
+
 
 class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
     """One output over the samples, in SI. A sample, or a whole series, that was not computed is null; `reason` says why."""
@@ -31,7 +39,12 @@ class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deviation(msgspec.Struct, frozen=True, kw_only=True):
-    """How far an output is from what it is compared with, over the samples both have."""
+    """How far an output is from what it is compared with, over the samples both have.
+
+    Attributes:
+        worst_step: index of the sample with the largest deviation.
+        against: kind of the reference, or the name of the engine compared with.
+    """
 
     max_abs: float
     rms: float
@@ -49,9 +62,14 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
     acceleration: Deviation | None
     reason: str | None = None
 
+    def items(self) -> list[tuple[str, Deviation]]:
+        """Quantity and deviation of what was compared."""
+        every = (("position", self.position), ("velocity", self.velocity), ("acceleration", self.acceleration))
+        return [(quantity, deviation) for quantity, deviation in every if deviation is not None]
+
 
 class Seconds(msgspec.Struct, frozen=True, kw_only=True):
-    """Wall-clock seconds: making the model, the first solve, and a solve after a warm-up."""
+    """Wall-clock seconds: making the model, the first solve, and a solve after it (median of several)."""
 
     build: float | None = None
     first: float | None = None
@@ -59,7 +77,17 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
-    """The result of one (case, engine) pair. What was not computed is null, never zero; `message` says why."""
+    """The result of one (case, engine) pair. What was not computed is null, never zero; `message` says why.
+
+    Attributes:
+        truth: kind of the case's reference; consensus_only where it has none, whatever the case claims.
+        driver: values of the swept driver [m or rad] by its name.
+        errors: one entry for every output of the case, whatever the outcome.
+        residual_max: the engine's own largest constraint residual over the solved samples [m or -].
+        iterations: Newton iterations, sum over the solved samples.
+        solved, samples: how many samples were reached, out of how many.
+        us_per_step: warm solve by sample [us]; null unless all samples were reached.
+    """
 
     case: str
     truth: str
@@ -83,10 +111,46 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     us_per_step: float | None = None
     details: dict[str, Any] = {}
 
+    @property
+    def validated(self) -> bool:
+        """Whether it passed, and every output was judged against a truth that nobody here made."""
+        judged = [deviations.position for deviations in self.errors.values()]
+        return (
+            self.outcome is Outcome.PASS
+            and bool(judged)
+            and Truth(self.truth).validates
+            and all(each is not None and each.against == self.truth for each in judged)
+        )
+
 
 class Results(msgspec.Struct, frozen=True, kw_only=True):
-    """A run: its circumstances and one record per pair."""
+    """A run.
 
+    Attributes:
+        run: its circumstances: versions, machine, settings, and what the cases are.
+        records: one per (case, engine) pair.
+        references: the true values of each case that has any, by case and output.
+    """
+
+    schema: Literal["kincheck-results/1"] = "kincheck-results/1"
     run: dict[str, Any]
     records: list[Record]
-    schema: str = "kincheck-results/1"
+    references: dict[str, dict[str, OutputSeries]] = {}
+
+
+def to_json(results: Results) -> bytes:
+    """Indented JSON; floats keep all their digits, a list of numbers stays on one line."""
+    text = msgspec.json.format(msgspec.json.encode(results), indent=2)
+    # a string cannot hold a bare line break, so only white space between numbers is touched
+    rows = re.compile(rb"\[[^][{}\"]*\]")
+    return rows.sub(lambda row: re.sub(rb"\n *", b"", row[0].replace(b",\n", b", \n")), text) + b"\n"
+
+
+def from_json(text: bytes) -> Results:
+    """The results that `to_json` wrote.
+
+    Raises:
+        msgspec.ValidationError: not the schema kincheck-results/1; the message names the key.
+        msgspec.DecodeError: not JSON.
+    """
+    return msgspec.json.decode(text, type=Results)

@@ -1,0 +1,235 @@
+"""The command line. The only place that knows adapters and cases; they, and all that is slow to import, are loaded on use."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import importlib.metadata
+import math
+import os
+import re
+import shlex
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from ..errors import KincheckError
+from .case import Case
+from .engine import Engine
+from .record import Outcome, Record, Results
+
+WITHIN, DEVIATES, FAILED = 0, 1, 2
+"""Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work."""
+
+# Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized coordinates, and a thousandth of
+# the 1e-9 m that outputs are held to, so that a residual amplified a hundredfold by the mechanism still cannot be seen.
+TOL = 1e-12
+
+MODES = ("projection", "simulate")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit status."""
+    argv = sys.argv[1:] if argv is None else list(argv)
+    try:
+        options = _parser().parse_args(argv, argparse.Namespace(command=shlex.join(["kincheck", *argv])))
+    except SystemExit as end:  # argparse has said why
+        return int(end.code or 0)
+    try:
+        return options.do(options)
+    except KincheckError as error:
+        _complain(str(error).splitlines())
+    except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except Exception:  # a defect of ours: shown in full, and never taken for a deviation (Python's own status would be 1)
+        traceback.print_exc()
+    return FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="kincheck", description="Cross-validation of the kinematics of multibody systems.")
+    parser.add_argument("--version", action="version", version=f"kincheck {importlib.metadata.version('kincheck')}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="solve cases with engines and judge the results", description=_run.__doc__)
+    run.set_defaults(do=_run)
+    run.add_argument("case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases")
+    run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: all engines")
+    run.add_argument("--mode", choices=MODES, help="only engines of this mode")
+    run.add_argument("--tol", type=_tol, default=TOL, metavar="X", help=f"largest constraint residual [m or -]; default {TOL:g}")
+    run.add_argument("--out", type=Path, metavar="DIR", help="write results.json and report.html there")
+    run.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
+    run.add_argument(
+        "--require",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="engines that must be there and able (else status 2)",
+    )
+
+    listing = commands.add_parser("list", help="list cases and engines", description=_list.__doc__)
+    listing.set_defaults(do=_list)
+    return parser
+
+
+def _tol(text: str) -> float:
+    try:
+        tol = float(text)
+    except ValueError:
+        tol = math.nan
+    if not (math.isfinite(tol) and tol > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number; give a residual such as {TOL:g}")
+    return tol
+
+
+def _complain(lines: Sequence[str]) -> None:
+    for line in lines:
+        print(f"kincheck: {line}", file=sys.stderr)
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Solve every case with every engine, judge each, print a table and write what was asked for."""
+    from . import deliver as delivery
+    from . import run as running
+
+    problems: list[str] = []
+    cases = _cases(options.case, problems)
+    engines, baseline = _engines([*options.engine, *options.require] if options.engine else [], options, problems)
+    files: dict[str, Any] = {"out": options.out, "json": options.json, "junit": options.junit}
+    delivery.check_destinations(problems, **files)
+    if problems:  # all of them, and before anything is computed
+        raise KincheckError("\n".join(problems))
+
+    records: list[Record] = []
+    started = datetime.now(UTC)
+    with delivery.json_only() if options.json == "-" else nullcontext():
+        try:
+            results = running.run(
+                cases,
+                engines,
+                tol=options.tol,
+                progress=_progress(records),
+                baseline=baseline,
+                command=options.command,
+            )
+        except KeyboardInterrupt:
+            problems.append(f"interrupted: {len(records)} of {len(cases) * len(engines)} records were made and are kept")
+            results = running.results(cases, records, started=started, tol=options.tol, command=options.command)
+    delivery.deliver(results, problems, **files)
+    problems += _lacking(results, options.require)
+    _complain(problems)
+    if problems:
+        return FAILED
+    return DEVIATES if any(record.outcome.bad for record in results.records) else WITHIN
+
+
+def _cases(names: Sequence[str], problems: list[str]) -> list[Case]:
+    """The cases asked for; what is wrong with any of them is added to the problems."""
+    from ... import cases as builtin
+    from .casefile import load_case
+
+    found: dict[str, Case] = {}
+    known = list(builtin.names())
+    for name in dict.fromkeys(names or known):
+        try:
+            if name in known:
+                case = builtin.load(name)
+            elif Path(name).suffix in (".toml", ".json") or os.sep in name or Path(name).exists():
+                case = load_case(Path(name))
+            else:
+                raise KincheckError(_unknown("case", name, known) + "; a case file ends in .toml or .json")
+        except KincheckError as error:
+            problems += str(error).splitlines()
+            continue
+        if case.name in found:
+            problems.append(f"{name}: there are two cases named {case.name!r}; results go by name: rename one")
+        found[case.name] = case
+    return list(found.values())
+
+
+def _engines(names: Sequence[str], options: argparse.Namespace, problems: list[str]) -> tuple[list[Engine], Engine | None]:
+    """The engines asked for, and the native one to compare with where it is not among them."""
+    from ... import adapters
+    from .run import NATIVE
+
+    known = list(adapters.ENGINES)
+    named = list(dict.fromkeys([*names, *options.require]))
+    problems += [_unknown("engine", name, known) for name in named if name not in known]
+    engines: list[Engine] = [adapters.engine(name) for name in dict.fromkeys(names or known) if name in known]
+    if options.mode:
+        others = {each.name: each.mode for each in engines if each.mode != options.mode}
+        engines = [each for each in engines if each.name not in others]
+        problems += [
+            f"engine {name!r} has the mode {mode!r}, not {options.mode!r}: leave out --mode or the engine"
+            for name, mode in others.items()
+            if name in named
+        ]
+        if not engines and not problems:
+            problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
+    return engines, None if NATIVE in (each.name for each in engines) else adapters.engine(NATIVE)
+
+
+def _unknown(what: str, name: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    return f"there is no {what} {name!r}; " + (f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}")
+
+
+def _progress(records: list[Record]) -> Callable[[Record, int, int], None]:
+    """Collects records, and tells of them on standard error: one line that changes on a terminal, plain lines elsewhere."""
+    terminal = sys.stderr.isatty()
+
+    def tell(record: Record, done: int, total: int) -> None:
+        records.append(record)
+        line = f"[{done}/{total}] {record.case} {record.engine}: {record.outcome}"
+        if terminal:
+            line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
+        print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def _lacking(results: Results, required: Sequence[str]) -> list[str]:
+    """What a required engine could not do."""
+    lines = [
+        f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
+        if record.outcome is Outcome.UNAVAILABLE
+        else f"required engine {record.engine!r}: case {record.case!r} is unsupported: {record.message}"
+        for record in results.records
+        if record.engine in required and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
+    ]
+    return list(dict.fromkeys(lines))
+
+
+def how_to_install(engine: str) -> str:
+    """The command that installs an engine's simulator, from kincheck's own metadata."""
+    wanted = [
+        requirement.split(";")[0].strip()
+        for requirement in importlib.metadata.requires("kincheck") or []
+        if re.search(rf"""extra == ['"]{engine}['"]""", requirement)
+    ]
+    return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"
+
+
+def _list(options: argparse.Namespace) -> int:
+    """List the built-in cases with their truth and source, and the engines with their versions."""
+    from ... import adapters, cases
+    from .circumstances import truth_of
+
+    print("cases:")
+    names = list(cases.names())
+    for name in names:
+        case = cases.load(name)
+        print(f"  {name:{max(map(len, names))}}  {str(truth_of(case)).replace('_', ' '):16}  {case.source}")
+    print("engines:")
+    for name in adapters.ENGINES:
+        engine = adapters.engine(name)
+        version = engine.version()
+        state = f"not installed: {how_to_install(name)}" if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
+        print(f"  {name:{max(map(len, adapters.ENGINES))}}  {state}")
+    return WITHIN

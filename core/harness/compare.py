@@ -1,0 +1,149 @@
+"""Comparing: the outputs of a trajectory, and how far they are from a reference or from another engine's.
+
+Same samples, no interpolation, and outputs only: generalized coordinates differ legally between engines. A deviation is
+accepted up to atol + rtol * range, the range being that of the reference over the samples compared.
+
+An output's atol is given for positions. A wrong pose passes its error on: the velocities of a mechanism are its driver's rate
+times functions of the pose, so moving the pose by d, small against the size D of the mechanism, changes a velocity by about
+d * rate / D and an acceleration by d * (rate / D)^2. Hence velocities are held to atol * pace, accelerations to atol * pace^2,
+with pace = rate / D [1/s]; D is a radian for a driver that turns and the mechanism's size for one that shifts. So the same
+relative accuracy is asked of all three, at any scale and any rate: with atol = 1e-9 m, a mechanism of 1 m and a drive of 1 m/s,
+an acceleration of 1 m/s^2 that is wrong by 1e-6 of itself is a thousand times out of tolerance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from ..drivers import JointDriver
+from ..errors import CaseError
+from ..joints.base import Joint, Kind
+from ..trajectory import Array, Trajectory
+from .case import Case, Output, Series
+from .record import Deviation, Deviations, OutputSeries
+
+# D of a mechanism whose points all coincide [m]: keeps the pace finite and is smaller than any mechanism driven in earnest.
+SMALLEST_SIZE = 1e-3
+
+
+def pace(case: Case) -> float:
+    """How fast the mechanism goes through itself [1/s]: see the head of this file."""
+    driver = case.mechanism.driver(case.sweep.driver)
+    turns = isinstance(driver, JointDriver) and driver.freedom == "rotation"
+    return abs(case.sweep.rate) / (1.0 if turns else max(SMALLEST_SIZE, _size(case)))
+
+
+def _size(case: Case) -> float:
+    """Largest extent along a global axis of the joints and the compared points at design, or of the sweep [m]."""
+    points = [case.mechanism.point(name).position for name in case.points]
+    points += [position for joint in case.mechanism.joints for position in _positions(joint)]
+    return max(float(np.ptp(np.array(points), axis=0).max()), float(np.ptp(case.sweep.change)))
+
+
+def _positions(joint: Joint) -> Iterator[tuple[float, float, float]]:
+    for each in fields(joint):
+        if each.metadata.get("kind") is Kind.POSITION:
+            yield getattr(joint, each.name)
+        elif each.metadata.get("kind") is Kind.POSITIONS:
+            yield from getattr(joint, each.name)
+
+
+def output_series(case: Case, output: Output, trajectory: Trajectory) -> Series:
+    """The output over the samples of a trajectory: NaN where the sample was not solved, None where the engine has none."""
+    motion = trajectory.points[output.point]
+    origin = np.array(case.mechanism.point(output.point).position) if output.relative else np.zeros(3)
+
+    def along(vectors: Array | None) -> Array | None:
+        if vectors is None:
+            return None
+        return np.where(trajectory.solved, np.asarray(vectors, dtype=np.float64) @ np.array(output.direction), np.nan)
+
+    position = along(np.asarray(motion.position, dtype=np.float64) - origin)
+    assert position is not None
+    return Series(position, along(motion.velocity), along(motion.acceleration))
+
+
+def as_numbers(series: Series, output: Output) -> OutputSeries:
+    """The series as plain numbers, null for NaN, with the reason for what is missing."""
+    reasons = [] if np.isfinite(series.position).all() else ["samples without a value are null"]
+    reasons += [f"there is no {name}" for name in ("velocity", "acceleration") if getattr(series, name) is None]
+    return OutputSeries(
+        position=_numbers(series.position),
+        velocity=None if series.velocity is None else _numbers(series.velocity),
+        acceleration=None if series.acceleration is None else _numbers(series.acceleration),
+        unit=output.unit,
+        reason="; ".join(reasons) or None,
+    )
+
+
+def _numbers(values: Array) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
+def deviations(case: Case, output: Output, found: Series, standards: Sequence[tuple[str, Series]]) -> Deviations:
+    """How far an output is off in position, velocity and acceleration.
+
+    Args:
+        found: the engine's output.
+        standards: what it may be compared with, (name, series), best first; each quantity takes the first that has it.
+    """
+    beat = pace(case)
+    compared: dict[str, Deviation | None] = {}
+    reasons: list[str] = []
+    for order, quantity in enumerate(("position", "velocity", "acceleration")):
+        values: Array | None = getattr(found, quantity)
+        known: list[tuple[str, Array]] = [
+            (name, getattr(series, quantity)) for name, series in standards if getattr(series, quantity) is not None
+        ]
+        compared[quantity] = None
+        if values is None:
+            reasons.append(f"{quantity}: the engine gives none")
+        elif not known:
+            names = " and ".join(name for name, _ in standards)
+            reasons.append(f"{quantity}: {names} gives none" if names else f"{quantity}: there is nothing to compare with")
+        else:
+            name, reference = known[0]
+            compared[quantity] = deviation(values, reference, output.atol * beat**order, output.rtol, name)
+            if compared[quantity] is None:
+                reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
+    return Deviations(**compared, reason="; ".join(reasons) or None)
+
+
+def deviation(values: Array, reference: Array, atol: float, rtol: float, against: str) -> Deviation | None:
+    """How far values are from a reference, over the samples both have; None where there is no such sample.
+
+    Args:
+        values, reference: shape (n,), NaN at samples that are not known.
+
+    Raises:
+        CaseError: the shapes differ.
+    """
+    if values.shape != reference.shape:
+        raise CaseError(f"{against} has shape {reference.shape}, expected {values.shape}: one number for each sample of the sweep")
+    both = np.isfinite(values) & np.isfinite(reference)
+    if not both.any():
+        return None
+    error = np.where(both, np.abs(values - reference), -1.0)
+    largest, tolerance = float(error.max()), atol + rtol * float(np.ptp(reference[both]))
+    return Deviation(
+        max_abs=largest,
+        # the largest is taken out so that no square can overflow or vanish
+        rms=largest * math.sqrt(float(np.mean((error[both] / largest) ** 2))) if largest else 0.0,
+        worst_step=int(np.argmax(error)),
+        tolerance=tolerance,
+        against=against,
+        within=largest <= tolerance,
+    )
+
+
+def describe(output: str, quantity: str, worst: Deviation, driver: str, values: Sequence[float]) -> str:
+    """One line that says how far off an output is, and where."""
+    unit = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}[quantity]
+    return (
+        f"{output}: {quantity} is off by {worst.max_abs:.3g} {unit} at sample {worst.worst_step} ({driver} = "
+        f"{values[worst.worst_step]:.9g}), tolerance {worst.tolerance:.3g} {unit}, against {worst.against}"
+    )

@@ -1,0 +1,288 @@
+"""The report of a run: one HTML file that opens offline, the worst engine and its worst sample first."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any, cast
+
+from jinja2 import Environment, StrictUndefined
+
+from .case import Truth
+from .caveats import COMPARED, caveats
+from .figures import (
+    Axis,
+    Figure,
+    Style,
+    Values,
+    band_is_thin,
+    driver_axis,
+    engine_name,
+    error_figure,
+    motion_unit,
+    output_figure,
+    output_label,
+)
+from .record import Deviation, Outcome, OutputSeries, Record, Results
+
+MOTIONS = ("position", "velocity", "acceleration")
+SYMBOLS = {
+    Outcome.PASS: "✓",
+    Outcome.FAIL: "✗",
+    Outcome.ERROR: "!",
+    Outcome.UNSUPPORTED: "–",
+    Outcome.UNAVAILABLE: "○",
+    Outcome.TIMEOUT: "…",
+    Outcome.CRASHED: "†",
+}
+TRUTHS = {
+    Truth.CLOSED_FORM: "closed form",
+    Truth.THIRD_PARTY_DATA: "third-party data",
+    Truth.IN_HOUSE_ORACLE: "in-house oracle",
+    Truth.CONSENSUS_ONLY: "consensus only",
+}
+NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
+BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One deviation and what it belongs to."""
+
+    record: Record
+    output: str
+    motion: str
+    deviation: Deviation
+
+    @property
+    def ratio(self) -> float:
+        """The error in tolerances."""
+        d = self.deviation
+        return d.max_abs / d.tolerance if d.tolerance > 0 else float("inf") if d.max_abs > 0 else 0.0
+
+    @property
+    def unit(self) -> str:
+        """The error's unit."""
+        series = self.record.outputs.get(self.output)
+        return motion_unit(series.unit, self.motion) if series else ""
+
+
+@dataclass(frozen=True)
+class ErrorView:
+    """An error figure of an output: which motion, the key of the figure, and what is said under it."""
+
+    motion: str
+    figure: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class OutputView:
+    """One output of a case: the keys of its figures and what is said under them."""
+
+    name: str
+    label: str
+    figure: str
+    caption: str
+    errors: list[ErrorView]
+
+
+@dataclass(frozen=True)
+class CaseView:
+    """One case of the page.
+
+    Attributes:
+        worst: the deviation closest to its tolerance, or beyond it most.
+        account: the degrees of freedom, counted as in the paper and by rank.
+    """
+
+    name: str
+    anchor: str
+    truth: Truth
+    source: str
+    records: list[Record]
+    axis: Axis
+    outputs: list[OutputView]
+    worst: Judged | None
+    account: Mapping[str, Any] | None
+
+
+def write_report(results: Results, path: Path) -> None:
+    """Write the report as one HTML file with all scripts, styles and data inside.
+
+    Args:
+        results: a run. Of `results.run`, "cases" may give each case's "source" and "driver" (its name, type, point and direction)
+            by case name; everything else is printed as it is.
+        path: the file to write, in a folder that exists.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path.write_text(render(results), encoding="utf-8")
+
+
+def render(results: Results) -> str:
+    """The report as HTML text."""
+    from plotly.offline import get_plotlyjs  # a run that writes no report should not load it
+
+    records = results.records
+    names = dict.fromkeys(engine_name(record) for record in records)
+    styles = {name: Style.number(index, name) for index, name in enumerate(names)}
+    figures: dict[str, Figure] = {}
+    case_names = dict.fromkeys(record.case for record in records)
+    cases = [_case(results, name, f"case-{index}", styles, figures) for index, name in enumerate(case_names)]
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"number": number, "label": output_label, "engine": engine_name, "known": _known}
+    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
+    template = environment.from_string(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
+    return template.render(
+        headline=headline(records),
+        worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
+        counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
+        problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
+        not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
+        circumstances=list(_flat({key: value for key, value in results.run.items() if key != "cases"})),
+        settings=_settings(records),
+        styles=styles,
+        cases=cases,
+        references=results.references,
+        caveats=list(caveats(results)),
+        symbols=SYMBOLS,
+        truths=TRUTHS,
+        motions=MOTIONS,
+        compared=COMPARED,
+        worst_position=worst_position,
+        data={"drivers": {case.anchor: case.axis.shown for case in cases}, "figures": figures},
+        plotlyjs=get_plotlyjs(),
+    )
+
+
+def headline(records: Sequence[Record]) -> str:
+    """The run in one sentence."""
+    judged = [record for record in records if any(errors.items() for errors in record.errors.values())]
+    compared, failed, broken = len(judged), _count(judged, Outcome.FAIL), _count(records, *BROKEN)
+    if not compared:
+        said = "Nothing was compared"
+    elif failed:
+        said = f"{failed} of {compared} comparisons {'is' if failed == 1 else 'are'} outside tolerance"
+    else:
+        said = f"All {compared} comparisons are within tolerance" if compared > 1 else "The one comparison is within tolerance"
+    return said + (f", {broken} could not be completed" if broken else "")
+
+
+def worst_position(record: Record) -> Deviation | None:
+    """The largest position deviation over the outputs of a record."""
+    known = [errors.position for errors in record.errors.values() if errors.position is not None]
+    return max(known, key=lambda deviation: deviation.max_abs, default=None)
+
+
+def number(value: float | None) -> str:
+    """A number to three digits for a table; a dash where it was not computed."""
+    if value is None:
+        return "–"
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    mantissa, _, exponent = f"{value:.3g}".partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else mantissa
+
+
+def _case(results: Results, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]) -> CaseView:
+    records = [record for record in results.records if record.case == name]
+    facts: Mapping[str, Any] = results.run.get("cases", {}).get(name, {})
+    judged = [Judged(r, output, motion, d) for r in records for output, e in r.errors.items() for motion, d in e.items()]
+    axis = driver_axis(facts.get("driver", {}), records, (each.deviation.worst_step for each in judged))
+    references = results.references.get(name, {})
+    outputs: list[OutputView] = []
+    for index, output in enumerate(dict.fromkeys(output for record in records for output in record.outputs)):
+        curves = [(styles[engine_name(r)], r.outputs[output]) for r in records if output in r.outputs]
+        key = f"{anchor}-{index}"
+        errors: list[ErrorView] = []
+        for motion in MOTIONS:
+            here = [each for each in judged if (each.output, each.motion) == (output, motion)]
+            standard = _standard(here, records, references)
+            if standard is None:
+                continue
+            found = [(styles[engine_name(j.record)], getattr(j.record.outputs[output], motion), j.deviation) for j in here]
+            errors.append(ErrorView(motion, f"{key}-{motion}", _worst_caption(here, axis)))
+            figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, standard)
+        tolerance = next((j.deviation.tolerance for j in judged if (j.output, j.motion) == (output, "position")), None)
+        figures[key] = output_figure(output, axis, curves, references.get(output), tolerance)
+        outputs.append(OutputView(output, output_label(output), key, _band_caption(references.get(output), tolerance), errors))
+    return CaseView(
+        name=name,
+        anchor=anchor,
+        truth=Truth(records[0].truth),
+        source=facts.get("source", ""),
+        records=records,
+        axis=axis,
+        outputs=outputs,
+        worst=max(judged, key=lambda each: each.ratio, default=None),
+        account=next((r.details["dof_account"] for r in records if r.details.get("dof_account")), None),
+    )
+
+
+def _standard(judged: Sequence[Judged], records: Sequence[Record], references: Mapping[str, OutputSeries]) -> Values | None:
+    """The samples an output's motion was judged against: the reference's, or those of the engine named instead."""
+    if not judged:
+        return None
+    output, motion, against = judged[0].output, judged[0].motion, judged[0].deviation.against
+    engines = {record.engine: record.outputs[output] for record in records if output in record.outputs}
+    series = engines.get(against) or references.get(output)
+    return getattr(series, motion) if series else None
+
+
+def _band_caption(truth: OutputSeries | None, tolerance: float | None) -> str:
+    if truth is None or tolerance is None:
+        return "No reference." if truth is None else ""
+    band = "narrower than the line" if band_is_thin(truth, tolerance) else "the grey band"
+    return f"Tolerance ±{number(tolerance)} {truth.unit}: {band}."
+
+
+def _worst_caption(judged: Sequence[Judged], axis: Axis) -> str:
+    worst = max(judged, key=lambda each: each.deviation.max_abs)
+    d = worst.deviation
+    who = f"{engine_name(worst.record)}, sample {d.worst_step} ({axis.at(d.worst_step)})"
+    return f"Worst {number(d.max_abs)}: {who}. Tolerance {number(d.tolerance)}, against {_against(d)}."
+
+
+def _against(deviation: Deviation) -> str:
+    return TRUTHS.get(deviation.against, deviation.against)  # pyright: ignore
+
+
+def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[str]]]:
+    """Outcome, engine and message, with the cases they were the same for."""
+    groups: dict[tuple[Outcome, str, str], list[str]] = {}
+    for record in records:
+        groups.setdefault((record.outcome, engine_name(record), record.message), []).append(record.case)
+    return [(*key, cases) for key, cases in groups.items()]
+
+
+def _settings(records: Sequence[Record]) -> list[tuple[str, list[tuple[str, Any]], list[str]]]:
+    """Each engine's distinct settings, with the cases they were the same for."""
+    groups: dict[str, tuple[str, list[tuple[str, Any]], list[str]]] = {}
+    for record in records:
+        pairs = list(_flat({"version": record.version, "loop": record.loop, **record.settings}))
+        groups.setdefault(f"{engine_name(record)} {pairs}", (engine_name(record), pairs, []))[2].append(record.case)
+    return list(groups.values())
+
+
+def _flat(mapping: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in mapping.items():
+        if isinstance(value, Mapping):
+            yield from _flat(cast("Mapping[str, Any]", value), f"{prefix}{key} ")
+        else:
+            yield f"{prefix}{key}".replace("_", " "), value
+
+
+def _known(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, cast("Sequence[Any]", value))) or "–"
+    return "–" if value is None or value == "" else value
+
+
+def _count(records: Sequence[Record], *outcomes: Outcome) -> int:
+    counts = Counter(record.outcome for record in records)
+    return sum(counts[outcome] for outcome in outcomes)

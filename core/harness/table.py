@@ -1,0 +1,62 @@
+"""The records of a run as a table for people."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TextIO
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from .record import Deviation, Outcome, Record, Results
+
+COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
+QUANTITIES = {"position": "m", "velocity": "m/s", "acceleration": "m/s²"}
+# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
+LOG_WIDTH = 200
+
+
+def print_table(results: Results, file: TextIO) -> None:
+    """Print one line per record, then every message, then a count of outcomes."""
+    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("case", "engine", "outcome"):
+        table.add_column(name)
+    for quantity, unit in QUANTITIES.items():
+        table.add_column(f"{quantity} error\n{unit}", justify="right")
+    table.add_column("truth")
+    table.add_column("us/step", justify="right")
+    for record in results.records:
+        outcome = Text(record.outcome, style=COLOURS.get(record.outcome, "bold red"))
+        errors = [_error(record, quantity) for quantity in QUANTITIES]
+        time = "–" if record.us_per_step is None else f"{record.us_per_step:.3g}"
+        table.add_row(Text(record.case), f"{record.engine} · {record.mode}", outcome, *errors, truth(record), time)
+    console.print(table)
+    for (engine, outcome, message), cases in _messages(results).items():
+        console.print(Text(f"{outcome}: {', '.join(cases)} · {engine}: {message}"), soft_wrap=True)
+    counts = Counter(record.outcome for record in results.records)
+    console.print(", ".join(f"{count} {outcome}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
+
+
+def truth(record: Record) -> str:
+    """What a record was judged by; the word for more than agreement is kept for truths from elsewhere that were met."""
+    return record.truth.replace("_", " ") + (" (validated)" if record.validated else "")
+
+
+def _error(record: Record, quantity: str) -> Text:
+    """The largest error of a quantity over the outputs."""
+    found: list[Deviation] = [each for errors in record.errors.values() for name, each in errors.items() if name == quantity]
+    if not found:
+        return Text("–")
+    worst = max(found, key=lambda each: (not each.within, each.max_abs))
+    return Text(f"{worst.max_abs:.1e}", style="" if worst.within else "bold red")
+
+
+def _messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
+    """Messages, and the cases they are about; a missing engine says so once."""
+    said: dict[tuple[str, Outcome, str], list[str]] = {}
+    for record in results.records:
+        if record.message:
+            said.setdefault((record.engine, record.outcome, record.message), []).append(record.case)
+    return said
