@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.analysis.continuity import continuous
+from ..core.errors import SolveError
 from ..core.harness.case import Case
 from ..core.trajectory import Array, PointMotion, Trajectory
 
@@ -98,6 +99,11 @@ class _Walk:
         self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
         self.square = jacobian.shape == (self.rank, self.rank)
         self.unknowns = jacobian.shape[1]
+        if self.rank < self.unknowns:
+            raise SolveError(
+                f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns} coordinates of the simulator's model are "
+                "left free by joints and drivers at the design position; add a driver, or join what moves freely"
+            )
 
     def linear(self, A: Array, b: Array) -> Array:
         """Solve A x = b; never assumed square: point closures of a planar loop are redundant."""

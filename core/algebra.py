@@ -66,12 +66,26 @@ class Mat3:
     y: Vec3
     z: Vec3
 
+    @property
+    def T(self) -> Mat3:
+        """The transpose."""
+        x, y, z = self.x, self.y, self.z
+        return Mat3(Vec3(x.x, y.x, z.x), Vec3(x.y, y.y, z.y), Vec3(x.z, y.z, z.z))
+
+    def __add__(self, B: Mat3) -> Mat3:
+        return Mat3(self.x + B.x, self.y + B.y, self.z + B.z)
+
     def __matmul__(self, a: Vec3) -> Vec3:
+        """Product with a vector."""
         return Vec3(self.x @ a, self.y @ a, self.z @ a)
 
-    def transposed_times(self, a: Vec3) -> Vec3:
-        """The product of the transpose with a."""
-        return a.x * self.x + a.y * self.y + a.z * self.z
+    def times(self, B: Mat3) -> Mat3:
+        """Product with a matrix."""
+        columns = B.T
+        return Mat3(self @ columns.x, self @ columns.y, self @ columns.z).T
+
+
+UNIT = Mat3(X, Y, Z)
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,6 +91,11 @@ class Mechanism:
         for driver in self.drivers:
             if isinstance(driver, PointCoordinate):
                 _known(f"driver {driver.name!r}", "point", driver.point, [point.name for point in self.points])
+                if self.is_fixed(self.point(driver.point).body):
+                    raise MechanismError(
+                        f"driver {driver.name!r}: point {driver.point!r} is on {self.point(driver.point).body!r}, which is "
+                        "fixed; drive a point of a moving body"
+                    )
             elif isinstance(driver, JointDriver):
                 _known(f"driver {driver.name!r}", "joint", driver.joint, [joint.name for joint in self.joints])
                 driver.check(self.joint(driver.joint))

@@ -1,11 +1,14 @@
-"""The Cartesian formulation: six unknowns (dr, dpi) of every moving body, global axes, and all joints as rows."""
+"""The Cartesian formulation: six unknowns (dr, dpi) of every moving body, and all joints as rows.
+
+dpi is in global axes, or in body axes where the row style is; the poses are the same.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..algebra import Quat, Scalar, turned_by, vec
+from ..algebra import Quat, Scalar, Vec3, turned_by, vec
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Motion, Pose, Row
 from ..program import sqrt
 from .equations import Constraint
@@ -40,6 +43,10 @@ class Cartesian:
     def owners(self) -> Sequence[tuple[str, str]]:
         return [(c.owner, type(c.primitive).__name__) for c in self.constraints for _ in range(c.primitive.n)]
 
+    @property
+    def _body_axes(self) -> bool:
+        return any(c.primitive.body_axes for c in self.constraints)
+
     def configuration(self, state: State) -> Configuration:
         poses: dict[str, Pose] = {}
         for name in self.bodies:
@@ -50,7 +57,7 @@ class Cartesian:
     def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
         state: dict[str, Sequence[Scalar]] = {}
         for name, k in self.columns.items():
-            dr, dpi = vec(step[k : k + 3]), vec(step[k + 3 : k + COLUMNS])
+            dr, dpi = vec(step[k : k + 3]), self._global(at.poses[name], vec(step[k + 3 : k + COLUMNS]))
             state[f"u {name}"] = tuple(at.poses[name].u + dr)
             state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi, sqrt))
         return state
@@ -68,7 +75,7 @@ class Cartesian:
         return [value for c in self.constraints for value in c.primitive.nu()]
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        motions = self.motions(at, v)
+        motions = self._own(v)
         found: list[Scalar] = []
         for c in self.constraints:
             vi, vj = motions.get(c.i, GROUND_MOTION), motions.get(c.j, GROUND_MOTION)
@@ -76,10 +83,18 @@ class Cartesian:
         return found
 
     def motions(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Motion]:
-        return {name: Motion(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS])) for name, k in self.columns.items()}
+        return {name: Motion(motion.v, self._global(at.poses[name], motion.w)) for name, motion in self._own(v).items()}
 
     def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:
-        return {name: Acceleration(vec(a[k : k + 3]), vec(a[k + 3 : k + COLUMNS])) for name, k in self.columns.items()}
+        # A w' differentiated is A w'dot + w x w, and the last is zero
+        return {name: Acceleration(motion.v, self._global(at.poses[name], motion.w)) for name, motion in self._own(a).items()}
+
+    def _own(self, v: Sequence[Scalar]) -> dict[str, Motion]:
+        """The unknowns by body, in the axes of the rows."""
+        return {name: Motion(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS])) for name, k in self.columns.items()}
+
+    def _global(self, pose: Pose, w: Vec3) -> Vec3:
+        return pose.turn(w) if self._body_axes else w
 
     def _sparse(self, row: Row, c: Constraint) -> dict[int, Scalar]:
         entries: dict[int, Scalar] = {}

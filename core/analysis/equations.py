@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 from .. import primitives as p
 from ..algebra import ZERO, Vec3, vec
@@ -17,6 +18,7 @@ from ..errors import SolveError
 from ..joints import Attachment, AxialJoint, Joint
 from ..joints.base import unit
 from ..mechanism import GROUND, Mechanism
+from ..primitives import conventional, paper
 from ..primitives.base import Drive
 from ..topology import spanning_tree
 
@@ -65,6 +67,22 @@ def joint_points(joint: Joint, body: str | None = None) -> list[tuple[float, flo
     if point is not None:
         return [point]
     return [q for q, owner in zip(pair, joint.bodies, strict=False) if body in (None, owner)]
+
+
+class Style(StrEnum):
+    """How rows are written; the same solutions, the same machinery."""
+
+    NATIVE = "native"
+    PAPER = "paper"
+    CONVENTIONAL = "conventional"
+
+
+def restyled(found: Sequence[Constraint], style: Style) -> list[Constraint]:
+    """The constraints with every primitive replaced by its twins in the style."""
+    if style is Style.NATIVE:
+        return list(found)
+    twins = paper.TWINS if style is Style.PAPER else conventional.TWINS
+    return [replace(c, primitive=twin) for c in found for twin in twins[type(c.primitive)](c.primitive)]
 
 
 def constraints(mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], *, keep_fixed: bool = False) -> list[Constraint]:

@@ -14,7 +14,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
-from .equations import Frames, constraints, frames
+from .equations import Frames, constraints
 from .formulation import Formulation
 
 # Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
@@ -105,9 +105,9 @@ def independent_rows(matrix: Array, first: int) -> list[int]:
     return sorted(taken)
 
 
-def account(mechanism: Mechanism, frame: Frames | None = None) -> FreedomAccount:
+def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     """Count and measure the degrees of freedom at the design pose."""
-    formulation, matrix = _matrix(mechanism, frame or frames(mechanism))
+    formulation, matrix = _matrix(mechanism, frame)
     joint_rows = len(matrix) - len(mechanism.drivers)
     kept = set(independent_rows(matrix[:joint_rows], 0))
     fixed = len(mechanism.bodies) - len(mechanism.moving)
@@ -123,26 +123,24 @@ def account(mechanism: Mechanism, frame: Frames | None = None) -> FreedomAccount
     )
 
 
-def select_rows(mechanism: Mechanism, frame: Frames | None = None) -> Selection:
-    """The rows to solve for, drivers first.
+def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:
+    """The rows of a formulation to solve for, drivers first.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
     """
-    frame = frame or frames(mechanism)
-    found = account(mechanism, frame)
-    _, matrix = _matrix(mechanism, frame)
-    unknowns, drivers = found.moving_coordinates, len(mechanism.drivers)
-    if not unknowns:
+    found, drivers = account(mechanism, frame), len(mechanism.drivers)
+    if not mechanism.moving:
         raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
     if found.dof != drivers:
-        raise SolveError(_mismatch(mechanism, matrix[: found.rows], found, drivers))
+        raise SolveError(_mismatch(mechanism, frame, found))
+    matrix = design_jacobian(formulation)
     kept = independent_rows(matrix, drivers)
-    if len(kept) < unknowns:
+    if len(kept) < formulation.unknowns:
         raise SolveError(
             f"mechanism {mechanism.name!r}: driven by {', '.join(repr(d.name) for d in mechanism.drivers)} it can still move "
-            f"at the design position (rank {len(kept)} of {unknowns}): a driver does not move it there (lock-up or dead "
-            "centre), or repeats what a joint or another driver prescribes; drive another coordinate or shift the design"
+            f"at the design position (rank {len(kept)} of {formulation.unknowns}): a driver does not move it there (lock-up or "
+            "dead centre), or repeats what a joint or another driver prescribes; drive another coordinate or shift the design"
         )
     return Selection(found, tuple(kept), tuple(k for k in range(len(matrix)) if k not in set(kept)))
 
@@ -152,8 +150,9 @@ def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
     return formulation, design_jacobian(formulation)
 
 
-def _mismatch(mechanism: Mechanism, joint_rows: Array, found: FreedomAccount, drivers: int) -> str:
+def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:
     """Says what is free, by name: the bodies that move in the null space of the joint rows."""
+    joint_rows, drivers = _matrix(mechanism, frame)[1][: found.rows], len(mechanism.drivers)
     head = (
         f"mechanism {mechanism.name!r}: {found.dof} degree{'s' * (found.dof != 1)} of freedom "
         f"({found.moving_coordinates} coordinates - rank {found.rank}) but {drivers} driver{'s' * (drivers != 1)}"

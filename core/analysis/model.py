@@ -10,8 +10,6 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..program import NumpyExecutor, Program
 from ..trajectory import Array
-from .equations import frames
-from .freedom import select_rows
 from .programs import RATE, RATE_T, Request, Tracer
 
 
@@ -21,9 +19,7 @@ def compile_model(mechanism: Mechanism, request: Request) -> Model:
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
-    frame = frames(mechanism)
-    selection = select_rows(mechanism, frame)
-    tracer = Tracer(mechanism, request, selection, frame)
+    tracer = Tracer(mechanism, request)
     # a march needs v and a where it goes on; the outputs need them only up to the order asked for
     programs = [tracer.newton(), tracer.predict(), tracer.motion("tangent", 2)]
     if request.order:

@@ -20,9 +20,9 @@ from ..mechanism import Mechanism, Vector
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion
 from ..program import Elimination, Program, Tape, absolute, maximum, minimum, program
 from .cartesian import Cartesian
-from .equations import Frames, constraints
+from .equations import Style, constraints, frames, restyled
 from .formulation import Acceleration, Formulation, State
-from .freedom import Selection
+from .freedom import select_rows
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,14 @@ class Request:
         driver: the swept driver; the others hold their design value.
         points, bodies: names whose motion is wanted.
         order: 0 positions, 1 and velocities, 2 and accelerations.
+        style: how the rows are written.
     """
 
     driver: str
     points: tuple[str, ...]
     bodies: tuple[str, ...] = ()
     order: int = 2
+    style: Style = Style.NATIVE
 
 
 RATE, RATE_T = "rate", "rate_t"
@@ -62,17 +64,25 @@ class Layout:
 
 
 class Tracer:
-    """One tape for all programs: what they share is written down once."""
+    """One tape for all programs: what they share is written down once.
 
-    def __init__(self, mechanism: Mechanism, request: Request, selection: Selection, frame: Frames) -> None:
-        self.mechanism, self.request, self.selection, self.frame = mechanism, request, selection, frame
+    Raises:
+        SolveError: the mechanism cannot be solved as described (see `select_rows`).
+    """
+
+    def __init__(self, mechanism: Mechanism, request: Request) -> None:
+        self.mechanism, self.request, self.frame = mechanism, request, frames(mechanism)
+        self.selection = select_rows(mechanism, self.frame, self._formulate({}))
         self.tape, self.layout = Tape(), Layout()
         drive = Drive(self._in("c"), self._in("c_t"), 0.0, self._in("half_cos"), self._in("half_sin"))
-        moving = [body.name for body in mechanism.moving]
-        self.formulation: Formulation = Cartesian(constraints(mechanism, frame, {request.driver: drive}), moving)
+        self.formulation = self._formulate({request.driver: drive})
         design = self.formulation.design
         self.at = self.formulation.configuration({name: self._vector(name, len(value)) for name, value in design.items()})
         self.unknowns = self.formulation.unknowns
+
+    def _formulate(self, drives: Mapping[str, Drive]) -> Formulation:
+        found = constraints(self.mechanism, self.frame, drives)
+        return Cartesian(restyled(found, self.request.style), [body.name for body in self.mechanism.moving])
 
     def _in(self, name: str) -> Scalar:
         return self.tape.input(self.layout.scalar(name))
@@ -173,9 +183,9 @@ class Tracer:
         pose, motion = self.at.poses.get(name, GROUND_POSE), motions.get(name, GROUND_MOTION)
         e0, *e = self.mechanism.body(name).euler_parameters
         p = pose.q * Quat(e0, vec(e))
-        D = rotation_less_identity(p)
+        to_body = rotation_less_identity(p).T
         w_t = accelerations.get(name, Acceleration(ZERO, ZERO)).w_t
-        found = (p, motion.w + D.transposed_times(motion.w), w_t + D.transposed_times(w_t))
+        found = (p, motion.w + to_body @ motion.w, w_t + to_body @ w_t)
         for label, value in zip(("p", "omega", "omega_t")[: self.request.order + 1], found, strict=False):
             self._store(out, f"{label} {name}", value)
 

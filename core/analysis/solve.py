@@ -9,6 +9,7 @@ import numpy as np
 
 from ..mechanism import Mechanism
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
+from .equations import Style
 from .march import March, march
 from .model import Model, compile_model
 from .programs import Request
@@ -24,6 +25,7 @@ def solve(
     bodies: Sequence[str] = (),
     order: int = 2,
     tol: float = 1e-12,
+    style: str = "native",
 ) -> Trajectory:
     """Sweep one driver over values, measured from the design position.
 
@@ -36,6 +38,8 @@ def solve(
         bodies: bodies whose motion is wanted, in the paper's variables.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for is not computed.
         tol: largest accepted constraint residual, relative to the mechanism's size.
+        style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes) or "conventional" (full
+            products); the solutions are the same.
 
     Returns:
         The motion; NaN where a sample cannot be reached, and the reason in its message.
@@ -44,7 +48,7 @@ def solve(
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
-    model = compile_model(mechanism, Request(driver, wanted, tuple(bodies), order))
+    model = compile_model(mechanism, Request(driver, wanted, tuple(bodies), order, Style(style)))
     return sweep(model, np.asarray(values, dtype=np.float64), rate, tol)
 
 

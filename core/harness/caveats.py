@@ -21,8 +21,8 @@ def caveats(results: Results) -> Iterator[tuple[str, str]]:
     yield (
         "One description for all",
         (
-            "Every engine was given the same case files. A wrong hardpoint, axis or driver in a file is wrong in all of them and shows "
-            "in no comparison."
+            "Every engine was given the same case files. A wrong hardpoint, axis or driver in a file is wrong in all of them "
+            "and shows in no comparison."
         ),
     )
     if names := cases(lambda record: record.truth == Truth.IN_HOUSE_ORACLE):

@@ -73,7 +73,7 @@ class Axis:
         if step >= len(self.values):
             return ""
         value = f"{self.scale * self.values[step]:+.4g}".replace("-", "\N{MINUS SIGN}")
-        return f"{self.name} {value} {self.unit}".rstrip()
+        return f"{self.name} {value}{self.unit}" if self.unit == "°" else f"{self.name} {value} {self.unit}".rstrip()
 
     @property
     def shown(self) -> list[float]:
@@ -145,7 +145,7 @@ def output_figure(
         values = _taken(series.position, axis.kept, scale)
         line = {"width": 2, "color": style.colour, "dash": style.dash}
         traces.append(curve(values, mode="lines", line=line, name=style.name, uid=style.key, meta=style.name))
-        stride = max(1, len(values) // MARKERS)
+        stride = max(len(curves), len(values) // MARKERS)
         some = range(index * stride // len(curves), len(values), stride)
         marker = {"size": 9, "symbol": style.symbol, "color": style.colour, "line": {"width": 1.8}}
         look = {"mode": "markers", "marker": marker, "hoverinfo": "skip", "uid": style.key, "meta": style.name}
@@ -194,7 +194,8 @@ def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Styl
     stride = max(1, math.ceil((high - low) / 6))
     decades = range(low + 1, math.floor(high) + 1, stride)
     layout: Figure = {
-        "xaxis": {"title": {"text": axis.label}, "hoverformat": ".6g", "zeroline": False} | _ticks(axis),
+        "xaxis": {"title": {"text": axis.name + (f" [{axis.unit}]" if axis.unit else "")}, "hoverformat": ".6g", "zeroline": False}
+        | _ticks(axis),
         "yaxis": {
             "type": "log",
             "title": {"text": f"{motion} error [{unit}]"},

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
@@ -29,15 +29,6 @@ from .figures import (
 from .record import Deviation, Outcome, OutputSeries, Record, Results
 
 MOTIONS = ("position", "velocity", "acceleration")
-SYMBOLS = {
-    Outcome.PASS: "✓",
-    Outcome.FAIL: "✗",
-    Outcome.ERROR: "!",
-    Outcome.UNSUPPORTED: "–",
-    Outcome.UNAVAILABLE: "○",
-    Outcome.TIMEOUT: "…",
-    Outcome.CRASHED: "†",
-}
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
     Truth.THIRD_PARTY_DATA: "third-party data",
@@ -126,8 +117,8 @@ def write_report(results: Results, path: Path) -> None:
 
 def render(results: Results) -> str:
     """The report as HTML text."""
-    from plotly.offline import get_plotlyjs  # a run that writes no report should not load it
-
+    # Loaded here, for runs that write no report; the package has no types.
+    plotly: Any = importlib.import_module("plotly.offline")
     records = results.records
     names = dict.fromkeys(engine_name(record) for record in records)
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}
@@ -135,28 +126,30 @@ def render(results: Results) -> str:
     case_names = dict.fromkeys(record.case for record in records)
     cases = [_case(results, name, f"case-{index}", styles, figures) for index, name in enumerate(case_names)]
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "label": output_label, "engine": engine_name, "known": _known}
+    cast("dict[str, Any]", environment.filters).update(
+        number=number, label=output_label, engine=engine_name, against=_against, model=_model, known=_known
+    )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
-    template = environment.from_string(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
+    template = environment.from_string(Path(__file__).with_name("report.html").read_text("utf-8"))
     return template.render(
         headline=headline(records),
         worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
         counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
         problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
         not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
-        circumstances=list(_flat({key: value for key, value in results.run.items() if key != "cases"})),
+        circumstances={key: value for key, value in results.run.items() if key != "cases"},
         settings=_settings(records),
         styles=styles,
         cases=cases,
         references=results.references,
         caveats=list(caveats(results)),
-        symbols=SYMBOLS,
         truths=TRUTHS,
         motions=MOTIONS,
         compared=COMPARED,
         worst_position=worst_position,
+        validation=validation,
         data={"drivers": {case.anchor: case.axis.shown for case in cases}, "figures": figures},
-        plotlyjs=get_plotlyjs(),
+        plotlyjs=plotly.get_plotlyjs(),
     )
 
 
@@ -170,6 +163,8 @@ def headline(records: Sequence[Record]) -> str:
         said = f"{failed} of {compared} comparisons {'is' if failed == 1 else 'are'} outside tolerance"
     else:
         said = f"All {compared} comparisons are within tolerance" if compared > 1 else "The one comparison is within tolerance"
+    alone = _count(records, *COMPARED) - compared
+    said += f", {alone} had nothing to be compared with" if alone else ""
     return said + (f", {broken} could not be completed" if broken else "")
 
 
@@ -179,14 +174,23 @@ def worst_position(record: Record) -> Deviation | None:
     return max(known, key=lambda deviation: deviation.max_abs, default=None)
 
 
+def validation(record: Record) -> str:
+    """What may be called validated, if anything."""
+    if not record.validated:
+        return ""
+    against = {deviation.against for errors in record.errors.values() for _, deviation in errors.items()}
+    whole = against == {record.truth} and all(len(errors.items()) == len(MOTIONS) for errors in record.errors.values())
+    return "validated" if whole else "validated, positions only"
+
+
 def number(value: float | None) -> str:
     """A number to three digits for a table; a dash where it was not computed."""
     if value is None:
         return "–"
     if value == 0 or 1e-3 <= abs(value) < 1e5:
         return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
-    mantissa, _, exponent = f"{value:.3g}".partition("e")
-    return f"{mantissa}e{int(exponent)}" if exponent else mantissa
+    mantissa, _, exponent = f"{value:.2e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}" if exponent else mantissa
 
 
 def _case(results: Results, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]) -> CaseView:
@@ -249,7 +253,13 @@ def _worst_caption(judged: Sequence[Judged], axis: Axis) -> str:
 
 
 def _against(deviation: Deviation) -> str:
-    return TRUTHS.get(deviation.against, deviation.against)  # pyright: ignore
+    kinds = {kind.value: words for kind, words in TRUTHS.items()}
+    return kinds.get(deviation.against, deviation.against)
+
+
+def _model(record: Record) -> dict[str, Any]:
+    """What an engine tells of the model it made, beyond what has a table of its own."""
+    return {key: value for key, value in record.details.items() if key not in ("dof_account", "program")}
 
 
 def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[str]]]:
@@ -260,26 +270,23 @@ def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[st
     return [(*key, cases) for key, cases in groups.items()]
 
 
-def _settings(records: Sequence[Record]) -> list[tuple[str, list[tuple[str, Any]], list[str]]]:
+def _settings(records: Sequence[Record]) -> list[tuple[str, dict[str, Any], list[str]]]:
     """Each engine's distinct settings, with the cases they were the same for."""
-    groups: dict[str, tuple[str, list[tuple[str, Any]], list[str]]] = {}
+    groups: dict[str, tuple[str, dict[str, Any], list[str]]] = {}
     for record in records:
-        pairs = list(_flat({"version": record.version, "loop": record.loop, **record.settings}))
-        groups.setdefault(f"{engine_name(record)} {pairs}", (engine_name(record), pairs, []))[2].append(record.case)
+        group = groups.setdefault(f"{engine_name(record)} {record.settings}", (engine_name(record), record.settings, []))
+        group[2].append(record.case)
     return list(groups.values())
 
 
-def _flat(mapping: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in mapping.items():
-        if isinstance(value, Mapping):
-            yield from _flat(cast("Mapping[str, Any]", value), f"{prefix}{key} ")
-        else:
-            yield f"{prefix}{key}".replace("_", " "), value
-
-
 def _known(value: Any) -> Any:
+    """A value of any kind from a results file, in words."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key} {_known(each)}" for key, each in cast("Mapping[str, Any]", value).items()) or "–"
     if isinstance(value, list | tuple):
-        return ", ".join(map(str, cast("Sequence[Any]", value))) or "–"
+        return ", ".join(str(_known(each)) for each in cast("Sequence[Any]", value)) or "–"
+    if isinstance(value, float):
+        return number(value)
     return "–" if value is None or value == "" else value
 
 

@@ -16,7 +16,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
-from ..algebra import IDENTITY, ZERO, Mat3, Quat, Scalar, Vec3, cross, rotation_less_identity
+from ..algebra import IDENTITY, UNIT, ZERO, Mat3, Quat, Scalar, Vec3, cross, rotation_less_identity
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +39,11 @@ class Pose:
     def turn(self, a: Vec3) -> Vec3:
         """A a: a body-fixed vector now, global axes."""
         return a + self.D @ a
+
+    @property
+    def A(self) -> Mat3:
+        """The rotation since design, body -> global."""
+        return UNIT + self.D
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +95,8 @@ class Primitive(ABC):
 
     n: ClassVar[int]
     """Number of equations."""
+    body_axes: ClassVar[bool] = False
+    """Whether dpi, w and wdot of rows, gamma and motions are in body axes (the paper's) rather than global ones."""
 
     @abstractmethod
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

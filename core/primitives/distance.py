@@ -30,18 +30,19 @@ class Distance(Primitive):
     length: Scalar
     design_length: Scalar
 
-    def _change(self, i: Pose, j: Pose) -> Vec3:
+    def change(self, i: Pose, j: Pose) -> Vec3:
+        """How d has changed since design."""
         return (j.u - i.u) + (j.swing(self.s_j) - i.swing(self.s_i))
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        dd, L, L0 = self._change(i, j), self.length, self.design_length
+        dd, L, L0 = self.change(i, j), self.length, self.design_length
         return ((dd @ (2.0 * self.d0 + dd) + (L0 - L) * (L0 + L)) * (0.5 / L),)
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        u = (1.0 / self.length) * (self.d0 + self._change(i, j))
+        u = (1.0 / self.length) * (self.d0 + self.change(i, j))
         return (Row(-u, cross(u, i.turn(self.s_i)), u, cross(j.turn(self.s_j), u)),)
 
     def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
-        d, S_i, S_j = self.d0 + self._change(i, j), i.turn(self.s_i), j.turn(self.s_j)
+        d, S_i, S_j = self.d0 + self.change(i, j), i.turn(self.s_i), j.turn(self.s_j)
         d_dot = vj.of(S_j) - vi.of(S_i)
         return (-((d_dot @ d_dot + d @ (vj.centripetal(S_j) - vi.centripetal(S_i))) * (1.0 / self.length)),)

@@ -29,19 +29,20 @@ class Dot20(Primitive):
     d0: Vec3
     drive: Drive = field(default_factory=Drive)
 
-    def _change(self, i: Pose, j: Pose) -> Vec3:
+    def change(self, i: Pose, j: Pose) -> Vec3:
+        """How d has changed since design."""
         return (j.u - i.u) + (j.swing(self.s_j) - i.swing(self.s_i))
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        dd = self._change(i, j)
+        dd = self.change(i, j)
         return (i.swing(self.a) @ (self.d0 + dd) + self.a @ dd - self.drive.c,)
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        a, d = i.turn(self.a), self.d0 + self._change(i, j)
+        a, d = i.turn(self.a), self.d0 + self.change(i, j)
         return (Row(-a, cross(a, d + i.turn(self.s_i)), a, cross(j.turn(self.s_j), a)),)
 
     def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
-        a, d, S_i, S_j = i.turn(self.a), self.d0 + self._change(i, j), i.turn(self.s_i), j.turn(self.s_j)
+        a, d, S_i, S_j = i.turn(self.a), self.d0 + self.change(i, j), i.turn(self.s_i), j.turn(self.s_j)
         a_dot, d_dot = cross(vi.w, a), vj.of(S_j) - vi.of(S_i)
         turning = cross(vi.w, a_dot) @ d + 2.0 * (a_dot @ d_dot)
         return (self.drive.c_tt - (turning + a @ (vj.centripetal(S_j) - vi.centripetal(S_i))),)

@@ -10,6 +10,15 @@ import numpy as np
 from ..trajectory import Array
 from .trace import Program, operands
 
+
+def _min(a: Array, b: Array, out: Array) -> None:
+    np.minimum(a, b, out=out)  # the output of these two by keyword: numpy wants no third position
+
+
+def _max(a: Array, b: Array, out: Array) -> None:
+    np.maximum(a, b, out=out)
+
+
 _UFUNCS: dict[str, Callable[..., Any]] = {
     "+": np.add,
     "-": np.subtract,
@@ -18,8 +27,8 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "neg": np.negative,
     "sqrt": np.sqrt,
     "abs": np.absolute,
-    "min": np.minimum,
-    "max": np.maximum,
+    "min": _min,
+    "max": _max,
 }
 
 Call = tuple[Callable[..., Any], tuple[Any, ...]]

@@ -174,7 +174,7 @@ def absolute(a: Scalar) -> Scalar:
 def _extreme(op: str, a: Scalar, b: Scalar, value: Callable[[float, float], float]) -> Scalar:
     if isinstance(a, Traced) or isinstance(b, Traced):
         return a if _same(a, b) else _operation(op, a, b)
-    return value(a, b)
+    return value(a, b) if b == b else b  # Python's own keep a where b is NaN
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:
