@@ -18,12 +18,12 @@ class Native:
 
     name = "native"
     mode = "projection"
-    loop = "compiled"
+    loop = "python"
 
     @property
     def settings(self) -> Mapping[str, Any]:
         """Formulation, executor and how the loop ends."""
-        return {"row_style": "native (global axes)", "executor": "numpy", "last_iteration_below": 1e-9}
+        return {"row_style": "native (global axes)", "executor": "numpy, lanes of samples", "last_iteration_below": 1e-9}
 
     def version(self) -> str | None:
         """Version of kincheck."""

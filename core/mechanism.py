@@ -13,7 +13,7 @@ from typing import TypeAlias, TypeVar
 
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
-from .joints.base import Joint
+from .joints.base import Coupler, Joint
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -70,9 +70,10 @@ class Mechanism:
     joints: Sequence[Joint]
     points: Sequence[Point] = field(default=())
     drivers: Sequence[Driver] = field(default=())
+    couplers: Sequence[Coupler] = field(default=())
 
     def __post_init__(self) -> None:
-        for what in ("bodies", "joints", "points", "drivers"):
+        for what in ("bodies", "joints", "points", "drivers", "couplers"):
             object.__setattr__(self, what, tuple(getattr(self, what)))
             _unique(what, [each.name for each in getattr(self, what)])
         if any(body.name == GROUND for body in self.bodies):
@@ -88,6 +89,16 @@ class Mechanism:
                 )
         for point in self.points:
             _known(f"point {point.name!r}", "body", point.body, known)
+        for coupler in self.couplers:
+            for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
+                who = f"joint {coupler.name!r} ({coupler.type})"
+                _known(who, "joint", name, [joint.name for joint in self.joints])
+                joint = self.joint(name)
+                if freedom not in joint.freedoms:
+                    raise MechanismError(
+                        f"{who}: joint {name!r} is {joint.type} and has no {freedom} to couple; "
+                        f"its freedoms: {', '.join(joint.freedoms) or 'none'}"
+                    )
         for driver in self.drivers:
             if isinstance(driver, PointCoordinate):
                 _known(f"driver {driver.name!r}", "point", driver.point, [point.name for point in self.points])

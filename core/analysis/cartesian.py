@@ -1,17 +1,20 @@
 """The Cartesian formulation: six unknowns (dr, dpi) of every moving body, and all joints as rows.
 
+A joint's own coordinate, its turn or displacement, is a further unknown where it is named: coupled to another, or by the style.
 dpi is in global axes, or in body axes where the row style is; the poses are the same.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 from ..algebra import Quat, Scalar, Vec3, turned_by, vec
-from ..primitives.base import GROUND_MOTION, GROUND_POSE, Motion, Pose, Row
-from ..program import sqrt
-from .equations import Constraint
+from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose, Primitive, Row
+from ..program import cos, sin, sqrt
+from .equations import Constraint, Relation
 from .formulation import Acceleration, Configuration, Rows, State
 
 COLUMNS = 6
@@ -22,30 +25,40 @@ COLUMNS = 6
 class Cartesian:
     """The constraints over the named moving bodies; implements `Formulation`."""
 
-    constraints: Sequence[Constraint]
+    constraints: Sequence[Constraint | Relation]
     bodies: Sequence[str]
 
-    @property
+    @cached_property
     def columns(self) -> Mapping[str, int]:
         """First column of every moving body."""
         return {name: COLUMNS * k for k, name in enumerate(self.bodies)}
 
+    @cached_property
+    def coordinates(self) -> Mapping[str, int]:
+        """Column of every named coordinate; they come after the bodies."""
+        names = dict.fromkeys(c.coordinate for c in self.constraints if isinstance(c, Constraint) and c.coordinate)
+        return {name: COLUMNS * len(self.bodies) + k for k, name in enumerate(names)}
+
     @property
     def unknowns(self) -> int:
-        return COLUMNS * len(self.bodies)
+        return COLUMNS * len(self.bodies) + len(self.coordinates)
 
     @property
     def design(self) -> Mapping[str, Sequence[float]]:
-        still = {f"u {name}": (0.0, 0.0, 0.0) for name in self.bodies}
-        return still | {f"q {name}": (1.0, 0.0, 0.0, 0.0) for name in self.bodies}
+        still: dict[str, Sequence[float]] = {f"u {name}": (0.0, 0.0, 0.0) for name in self.bodies}
+        still |= {f"q {name}": (1.0, 0.0, 0.0, 0.0) for name in self.bodies}
+        return still | {f"x {name}": (0.0,) for name in self.coordinates}
 
     @property
     def owners(self) -> Sequence[tuple[str, str]]:
-        return [(c.owner, type(c.primitive).__name__) for c in self.constraints for _ in range(c.primitive.n)]
+        found: list[tuple[str, str]] = []
+        for c in self.constraints:
+            found += [(c.owner, "Relation")] if isinstance(c, Relation) else [(c.owner, type(c.primitive).__name__)] * c.primitive.n
+        return found
 
     @property
     def _body_axes(self) -> bool:
-        return any(c.primitive.body_axes for c in self.constraints)
+        return any(c.primitive.body_axes for c in self.constraints if isinstance(c, Constraint))
 
     def configuration(self, state: State) -> Configuration:
         poses: dict[str, Pose] = {}
@@ -60,27 +73,64 @@ class Cartesian:
             dr, dpi = vec(step[k : k + 3]), self._global(at.poses[name], vec(step[k + 3 : k + COLUMNS]))
             state[f"u {name}"] = tuple(at.poses[name].u + dr)
             state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi, sqrt))
+        for name, k in self.coordinates.items():
+            state[f"x {name}"] = (at.state[f"x {name}"][0] + step[k],)
         return state
 
     def phi(self, at: Configuration) -> list[Scalar]:
-        return [value for c in self.constraints for value in c.primitive.phi(*_pair(c, at))]
+        found: list[Scalar] = []
+        for c in self.constraints:
+            if isinstance(c, Relation):
+                found.append(sum((k * at.state[f"x {name}"][0] for name, k in c.weights.items()), 0.0) - c.drive.c)
+            else:
+                found += self._bound(c, at).phi(*_pair(c, at))
+        return found
 
     def branch(self, at: Configuration) -> list[Scalar]:
-        return [value for c in self.constraints for value in c.primitive.branch(*_pair(c, at))]
+        bodily = (c for c in self.constraints if isinstance(c, Constraint))
+        return [value for c in bodily for value in c.primitive.branch(*_pair(c, at))]
 
     def rows(self, at: Configuration) -> Rows:
-        return [self._sparse(row, c) for c in self.constraints for row in c.primitive.rows(*_pair(c, at))]
+        found: Rows = []
+        for c in self.constraints:
+            if isinstance(c, Relation):
+                found.append({self.coordinates[name]: k for name, k in c.weights.items()})
+                continue
+            pair, bound = _pair(c, at), self._bound(c, at, rate=1.0)
+            rows = [self._sparse(row, c) for row in bound.rows(*pair)]
+            if c.coordinate:  # nu is linear in the drive's rate: what it is at rate one is minus the coordinate's column
+                for row, value in zip(rows, bound.nu(*pair), strict=True):
+                    if not _is_zero(value):
+                        row[self.coordinates[c.coordinate]] = -value
+            found += rows
+        return found
 
-    def nu(self) -> list[Scalar]:
-        return [value for c in self.constraints for value in c.primitive.nu()]
+    def nu(self, at: Configuration) -> list[Scalar]:
+        found: list[Scalar] = []
+        for c in self.constraints:
+            found += [c.drive.c_t] if isinstance(c, Relation) else self._bound(c, at).nu(*_pair(c, at))
+        return found
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
         motions = self._own(v)
         found: list[Scalar] = []
         for c in self.constraints:
+            if isinstance(c, Relation):
+                found.append(c.drive.c_tt)
+                continue
+            rate = v[self.coordinates[c.coordinate]] if c.coordinate else 0.0
             vi, vj = motions.get(c.i, GROUND_MOTION), motions.get(c.j, GROUND_MOTION)
-            found += c.primitive.gamma(*_pair(c, at), vi, vj)
+            found += self._bound(c, at, rate).gamma(*_pair(c, at), vi, vj)
         return found
+
+    def _bound(self, c: Constraint, at: Configuration, rate: Scalar = 0.0) -> Primitive:
+        """The primitive, driven by its coordinate where it has one; the coordinate's acceleration is an unknown's, not here."""
+        if not c.coordinate:
+            return c.primitive
+        (x,) = at.state[f"x {c.coordinate}"]
+        drive = Drive(x, rate, 0.0, cos(0.5 * x), sin(0.5 * x))
+        driven: Any = c.primitive
+        return replace(driven, drive=drive)
 
     def motions(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Motion]:
         return {name: Motion(motion.v, self._global(at.poses[name], motion.w)) for name, motion in self._own(v).items()}
@@ -102,8 +152,12 @@ class Cartesian:
             if body in self.columns:
                 first = self.columns[body]
                 values = [value for block in blocks for value in block]
-                entries |= {first + k: x for k, x in enumerate(values) if not (isinstance(x, int | float) and x == 0)}
+                entries |= {first + k: x for k, x in enumerate(values) if not _is_zero(x)}
         return entries
+
+
+def _is_zero(x: Scalar) -> bool:
+    return isinstance(x, int | float) and x == 0
 
 
 def _pair(c: Constraint, at: Configuration) -> tuple[Pose, Pose]:

@@ -7,13 +7,14 @@ alike in size. Every moving body gets an internal origin at one of its joints, s
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Any
 
 from .. import primitives as p
 from ..algebra import ZERO, Vec3, vec
-from ..drivers import Driver, JointAngle, JointDriver, PointCoordinate
+from ..drivers import Driver, JointDriver, PointCoordinate
 from ..errors import SolveError
 from ..joints import Attachment, AxialJoint, Joint
 from ..joints.base import unit
@@ -25,20 +26,35 @@ from ..topology import spanning_tree
 
 @dataclass(frozen=True)
 class Constraint:
-    """A primitive between two bodies, and the joint or driver it belongs to."""
+    """A primitive between two bodies, and the joint or driver it belongs to.
+
+    Attributes:
+        coordinate: the unknown that drives the primitive, as JOINT.rotation or JOINT.translation; empty where none does.
+    """
 
     owner: str
     primitive: p.Primitive
     i: str
     j: str
+    coordinate: str = ""
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A linear row between coordinates: the weighted sum is the drive's value (zero unless driven)."""
+
+    owner: str
+    weights: Mapping[str, float]
+    drive: Drive = field(default_factory=Drive)
 
 
 @dataclass(frozen=True)
 class Frames:
-    """How the mechanism is measured: the length unit [m] and the internal origin of every body [units]."""
+    """How the mechanism is measured: the length unit [m], the internal origin of every body [units], and which bodies move."""
 
     unit: float
     origins: Mapping[str, Vec3]
+    moving: tuple[str, ...]
 
     def arm(self, body: str, position: Sequence[float]) -> Vec3:
         """From the internal origin of the body to a point, at design [units]."""
@@ -58,7 +74,7 @@ def frames(mechanism: Mechanism) -> Frames:
             at = [q for joint in touching for q in joint_points(joint, branch.child)]
         position = at[0] if at else mechanism.body(branch.child).origin
         origins[branch.child] = (1.0 / length_unit) * vec(position)
-    return Frames(length_unit, origins)
+    return Frames(length_unit, origins, tuple(body.name for body in mechanism.moving))
 
 
 def joint_points(joint: Joint, body: str | None = None) -> list[tuple[float, float, float]]:
@@ -75,44 +91,93 @@ class Style(StrEnum):
     NATIVE = "native"
     PAPER = "paper"
     CONVENTIONAL = "conventional"
+    MIXED = "mixed"
 
 
-def restyled(found: Sequence[Constraint], style: Style) -> list[Constraint]:
-    """The constraints with every primitive replaced by its twins in the style."""
-    if style is Style.NATIVE:
-        return list(found)
-    twins = paper.TWINS if style is Style.PAPER else conventional.TWINS
-    return [replace(c, primitive=twin) for c in found for twin in twins[type(c.primitive)](c.primitive)]
-
-
-def constraints(mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], *, keep_fixed: bool = False) -> list[Constraint]:
-    """All constraints: joints in order, then drivers in order.
+def constraints(
+    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE, *, keep_fixed: bool = False
+) -> list[Constraint | Relation]:
+    """All constraints: joints in order, then couplers, then drivers in order.
 
     Args:
         drives: the motion of each driver by name; drivers not named hold their design value.
+        style: how rows are written. MIXED names the coordinates of all axial joints; the others only those that couplers need.
         keep_fixed: fixed bodies move in principle and are held by ground rows, as in the paper's count; else they are ground.
     """
-    found: list[Constraint] = []
+    mixed = style is Style.MIXED
+    coupled = {f"{joint}.{freedom}" for c in mechanism.couplers for joint, freedom in zip(c.joints, c.freedoms, strict=True)}
+    found: list[Constraint | Relation] = []
     if keep_fixed:
         found += [Constraint(body.name, p.Ground(), GROUND, body.name) for body in mechanism.bodies if body.fixed]
     for original in mechanism.joints:
+        if isinstance(original, AxialJoint):
+            found += _axial(original, frame, coupled, mixed)
+            continue
         # the ground as body i: its rows are constant and the simplified ones need nothing of body j
         joint = original.reversed() if mechanism.is_fixed(original.j) else original
-        scaled = joint.scaled(1.0 / frame.unit)
         i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
-        found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in scaled.primitives(i, j)]
-    return found + [_driven(mechanism, frame, driver, drives.get(driver.name, Drive())) for driver in mechanism.drivers]
+        composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
+        found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
+    for coupler in mechanism.couplers:
+        terms = zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)
+        found.append(_relation(coupler.name, {f"{joint}.{freedom}": k for joint, freedom, k in terms}, frame))
+    found += [_driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed) for each in mechanism.drivers]
+    return _restyled(found, style)
 
 
-def _driven(mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive) -> Constraint:
+def _axial(original: AxialJoint, frame: Frames, coupled: Collection[str], mixed: bool) -> list[Constraint | Relation]:
+    """An axial joint; its coordinates are named where they are coupled, related to each other, or the style names all."""
+    related = {f"{original.name}.{freedom}" for relation in original.relations for freedom in relation}
+    named = [f for f in original.freedoms if mixed or f"{original.name}.{f}" in {*coupled, *related}]
+    fixed_last = original.j not in frame.moving
+    # the ground as body i: its rows are constant; but a named coordinate is that of body j relative to body i, in this order
+    joint = original.reversed() if fixed_last and not named else original
+    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
+    scaled = joint.scaled(1.0 / frame.unit)
+    composed = [(primitive, "") for primitive in scaled.primitives(i, j)]
+    if mixed:
+        composed = [(primitive, freedom * (freedom in joint.freedoms)) for primitive, freedom in scaled.mixed(i, j)]
+    else:
+        composed += [(scaled.measured(freedom, i, j), freedom) for freedom in named]
+    found: list[Constraint | Relation] = [
+        Constraint(joint.name, primitive, joint.i, joint.j, f"{joint.name}.{freedom}" if freedom else "")
+        for primitive, freedom in composed
+    ]
+    weights = ({f"{joint.name}.{freedom}": k for freedom, k in relation.items()} for relation in original.relations)
+    return found + [_relation(joint.name, each, frame) for each in weights]
+
+
+def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relation:
+    """Weights in metres and radians to weights in units and radians, the largest made one."""
+    scaled = {name: k * (frame.unit if name.endswith(".translation") else 1.0) for name, k in weights.items()}
+    largest = max(map(abs, scaled.values()))
+    return Relation(owner, {name: k / largest for name, k in scaled.items()})
+
+
+def _driven(mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, mixed: bool) -> Constraint | Relation:
     """The constraint of a driver that moves as the drive says."""
     if isinstance(driver, PointCoordinate):
         point = mechanism.point(driver.point)
         arm = frame.arm(point.body, point.position)
         return Constraint(driver.name, p.DrivenCoordinate(unit(driver.direction), arm, drive), GROUND, point.body)
     joint = mechanism.joint(driver.joint) if isinstance(driver, JointDriver) else None
-    if not isinstance(joint, AxialJoint):
+    if not isinstance(joint, AxialJoint) or not isinstance(driver, JointDriver):
         raise SolveError(f"driver {driver.name!r} ({driver.type}) is of a kind the native formulation cannot drive")
-    h, e0 = unit(joint.axis), frame.origins[joint.j] - frame.origins[joint.i]
-    primitive = p.DrivenAngle(h, drive) if isinstance(driver, JointAngle) else p.LockedDisplacement(h, e0, drive)
-    return Constraint(driver.name, primitive, joint.i, joint.j)
+    if mixed:
+        return Relation(driver.name, {f"{joint.name}.{driver.freedom}": 1.0}, drive)
+    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
+    primitive: Any = joint.scaled(1.0 / frame.unit).measured(driver.freedom, i, j)
+    return Constraint(driver.name, replace(primitive, drive=drive), joint.i, joint.j)
+
+
+def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
+    """The constraints with every primitive replaced by its twins in the style."""
+    tables = {Style.PAPER: paper.TWINS, Style.CONVENTIONAL: conventional.TWINS}
+    if style not in tables:
+        return list(found)
+    styled: list[Constraint | Relation] = []
+    for c in found:
+        styled += (
+            [c] if isinstance(c, Relation) else [replace(c, primitive=t) for t in tables[style][type(c.primitive)](c.primitive)]
+        )
+    return styled

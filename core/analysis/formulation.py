@@ -72,7 +72,7 @@ class Formulation(Protocol):
         """The Jacobian by the unknowns."""
         ...
 
-    def nu(self) -> list[Scalar]:
+    def nu(self, at: Configuration) -> list[Scalar]:
         """Right-hand sides of the velocity equations."""
         ...
 

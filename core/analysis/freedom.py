@@ -146,20 +146,20 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -
 
 
 def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
-    formulation = Cartesian(constraints(mechanism, frame, {}), [body.name for body in mechanism.moving])
+    formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     return formulation, design_jacobian(formulation)
 
 
 def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:
-    """Says what is free, by name: the bodies that move in the null space of the joint rows."""
-    joint_rows, drivers = _matrix(mechanism, frame)[1][: found.rows], len(mechanism.drivers)
+    """Says what is still free with the drivers held, by name: the bodies that move in the null space of all rows."""
+    matrix, drivers = _matrix(mechanism, frame)[1], len(mechanism.drivers)
     head = (
         f"mechanism {mechanism.name!r}: {found.dof} degree{'s' * (found.dof != 1)} of freedom "
         f"({found.moving_coordinates} coordinates - rank {found.rank}) but {drivers} driver{'s' * (drivers != 1)}"
     )
     if found.dof < drivers:
         return f"{head}; remove {drivers - found.dof} or free the mechanism"
-    motions = np.linalg.svd(joint_rows, full_matrices=True)[2][found.rank :] if found.rows else np.eye(found.moving_coordinates)
+    motions = np.linalg.svd(matrix, full_matrices=True)[2][len(independent_rows(matrix, 0)) :]
     free: list[str] = []
     for k, body in enumerate(mechanism.moving):
         block = np.linalg.norm(motions[:, COLUMNS * k : COLUMNS * (k + 1)], axis=0)

@@ -20,7 +20,7 @@ from ..mechanism import Mechanism, Vector
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion
 from ..program import Elimination, Program, Tape, absolute, maximum, minimum, program
 from .cartesian import Cartesian
-from .equations import Style, constraints, frames, restyled
+from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
 
@@ -81,8 +81,7 @@ class Tracer:
         self.unknowns = self.formulation.unknowns
 
     def _formulate(self, drives: Mapping[str, Drive]) -> Formulation:
-        found = constraints(self.mechanism, self.frame, drives)
-        return Cartesian(restyled(found, self.request.style), [body.name for body in self.mechanism.moving])
+        return Cartesian(constraints(self.mechanism, self.frame, drives, self.request.style), self.frame.moving)
 
     def _in(self, name: str) -> Scalar:
         return self.tape.input(self.layout.scalar(name))
@@ -116,7 +115,7 @@ class Tracer:
         """Rates of the unknowns, and with order 2 their accelerations: one factorisation for both."""
         factor = Elimination(self._kept(self.formulation.rows(self.at)))
         out: dict[int, Scalar] = {}
-        v = factor.solve(self._kept(self.formulation.nu()))
+        v = factor.solve(self._kept(self.formulation.nu(self.at)))
         self._store(out, RATE, v)
         if order == 2:
             self._store(out, RATE_T, factor.solve(self._kept(self.formulation.gamma(self.at, v))))

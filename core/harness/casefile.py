@@ -37,7 +37,7 @@ LARGEST_FILE = 4_000_000
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized mechanisms at 1e-16 m.
 DEFAULT_ATOL = 1e-9
 DEFAULT_WHY = (
-    "the default of 1e-9 m: a thousandth of the micrometre that hardpoints are measured to, and a million times the round-off "
+    "the default of 1e-9 m: a thousandth of the micrometre that hardpoints are measured to, and millions of times the round-off "
     "of metre-sized coordinates in double precision"
 )
 

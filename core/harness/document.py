@@ -66,10 +66,8 @@ def read_text(file: Path, limit: int, why_limit: str) -> str:
             raise fault(file, "", "not a regular file; give the path of a file")
         with file.open("rb") as stream:
             data = stream.read(limit + 1)
-    except (OSError, ValueError) as error:
-        if isinstance(error, CaseError):
-            raise
-        raise fault(file, "", f"cannot be read ({getattr(error, 'strerror', None) or error}); check path and rights") from None
+    except OSError as error:
+        raise fault(file, "", f"cannot be read ({error.strerror}); check path and rights") from None
     if len(data) > limit:
         raise fault(file, "", f"larger than {limit} bytes, expected less; {why_limit}")
     try:

@@ -6,6 +6,7 @@ values refer to them by the word "driver"; the page puts the values in.
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -56,12 +57,13 @@ class Axis:
     """The driver's axis: what is moved, its kept samples and their values as displayed.
 
     Attributes:
+        title: as written beside the outputs' figures, with the sense of the motion.
         kept: indices of the samples drawn.
         vertical: drawn upwards against the outputs, as wheel travel is.
     """
 
     name: str
-    label: str
+    title: str
     unit: str
     scale: float
     values: list[float]
@@ -74,6 +76,11 @@ class Axis:
             return ""
         value = f"{self.scale * self.values[step]:+.4g}".replace("-", "\N{MINUS SIGN}")
         return f"{self.name} {value}{self.unit}" if self.unit == "°" else f"{self.name} {value} {self.unit}".rstrip()
+
+    @property
+    def label(self) -> str:
+        """Name and unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @property
     def shown(self) -> list[float]:
@@ -95,11 +102,10 @@ def driver_axis(driver: Mapping[str, Any], records: Sequence[Record], worst: Ite
     values = series.get(name, [])
     unit, scale = _DISPLAY.get(_DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
     vertical = driver.get("type") == "point_coordinate"
-    name = title = name.replace("_", " ")
+    name = name.replace("_", " ")
+    title = f"{name} [{unit}]" if unit else name
     if vertical and "wheel" in driver.get("point", "") and driver.get("direction", (0, 0, 0))[2] > 0.9:
         name, title = "wheel travel", f"rebound \N{LEFTWARDS ARROW}  wheel travel [{unit}]  \N{RIGHTWARDS ARROW} jounce"
-    elif unit:
-        title = f"{name} [{unit}]"
     return Axis(name, title, unit, scale, values, _kept(len(values), worst), vertical)
 
 
@@ -113,6 +119,11 @@ def _kept(count: int, worst: Iterable[int]) -> list[int]:
 def output_label(name: str) -> str:
     """An output's name as suspension engineers write it."""
     return _LABELS.get(name, name.replace("_", " "))
+
+
+def plain(text: str) -> str:
+    """Text that Plotly shows as it is; it would take tags in it, links too, for mark-up."""
+    return html.escape(text, quote=False)
 
 
 def motion_unit(unit: str, motion: str) -> str:
@@ -144,14 +155,14 @@ def output_figure(
     for index, (style, series) in enumerate(curves):
         values = _taken(series.position, axis.kept, scale)
         line = {"width": 2, "color": style.colour, "dash": style.dash}
-        traces.append(curve(values, mode="lines", line=line, name=style.name, uid=style.key, meta=style.name))
+        traces.append(curve(values, mode="lines", line=line, name=plain(style.name), uid=style.key, meta=style.name))
         stride = max(len(curves), len(values) // MARKERS)
         some = range(index * stride // len(curves), len(values), stride)
         marker = {"size": 9, "symbol": style.symbol, "color": style.colour, "line": {"width": 1.8}}
-        look = {"mode": "markers", "marker": marker, "hoverinfo": "skip", "uid": style.key, "meta": style.name}
+        look = {"mode": "markers", "marker": marker, "hoverinfo": "skip", "uid": f"{style.key}-markers", "meta": style.name}
         traces.append(curve([values[k] for k in some], [axis.shown[k] for k in some], **look))
-    value_axis: Figure = {"title": {"text": f"{output_label(output)} [{unit}]"}, "hoverformat": ".9g", "zeroline": True}
-    moved_axis: Figure = {"title": {"text": axis.label}, "hoverformat": ".6g", "zeroline": True} | _ticks(axis)
+    value_axis: Figure = {"title": {"text": plain(f"{output_label(output)} [{unit}]")}, "hoverformat": ".9g", "zeroline": True}
+    moved_axis: Figure = {"title": {"text": plain(axis.title)}, "hoverformat": ".6g", "zeroline": True} | _ticks(axis)
     sides = {"xaxis": value_axis, "yaxis": moved_axis} if axis.vertical else {"xaxis": moved_axis, "yaxis": value_axis}
     return {"data": traces, "layout": {**sides, "hovermode": "y unified" if axis.vertical else "x unified"}}
 
@@ -179,8 +190,8 @@ def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Styl
         rounded = [None if e is None else float(f"{e:.3e}") for e in errors]
         line = {"width": 1.2, "color": style.colour, "dash": style.dash}
         marker = {"size": 5, "symbol": style.symbol, "color": style.colour, "maxdisplayed": 3 * MARKERS}
-        look = {"mode": "lines+markers", "line": line, "marker": marker, "name": style.name, "uid": style.key, "meta": style.name}
-        traces.append({"type": "scatter", "x": "driver", "y": rounded, **look})
+        look = {"name": plain(style.name), "uid": style.key, "meta": style.name, "line": line, "marker": marker}
+        traces.append({"type": "scatter", "mode": "lines+markers", "x": "driver", "y": rounded, **look})
     worst = max((deviation for *_, deviation in curves), key=lambda deviation: deviation.max_abs)
     if worst.worst_step < len(axis.values) and 0 < worst.max_abs < math.inf:
         place = {"x": [axis.scale * axis.values[worst.worst_step]], "y": [worst.max_abs], "hoverinfo": "skip"}
@@ -194,11 +205,10 @@ def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Styl
     stride = max(1, math.ceil((high - low) / 6))
     decades = range(low + 1, math.floor(high) + 1, stride)
     layout: Figure = {
-        "xaxis": {"title": {"text": axis.name + (f" [{axis.unit}]" if axis.unit else "")}, "hoverformat": ".6g", "zeroline": False}
-        | _ticks(axis),
+        "xaxis": {"title": {"text": plain(axis.label)}, "hoverformat": ".6g", "zeroline": False} | _ticks(axis),
         "yaxis": {
             "type": "log",
-            "title": {"text": f"{motion} error [{unit}]"},
+            "title": {"text": plain(f"{motion} error [{unit}]")},
             "range": [low - 0.4, high],
             "tickvals": [10.0**low, *(10.0**d for d in decades)],
             "ticktext": ["exactly 0", *(f"10<sup>\N{MINUS SIGN}{-d}</sup>" if d < 0 else f"10<sup>{d}</sup>" for d in decades)],

@@ -135,6 +135,7 @@ def render(results: Results) -> str:
         headline=headline(records),
         worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
         counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
+        unjudged=sum(record.outcome in COMPARED and not _judged(record) for record in records),
         problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
         not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
         circumstances={key: value for key, value in results.run.items() if key != "cases"},
@@ -142,7 +143,7 @@ def render(results: Results) -> str:
         styles=styles,
         cases=cases,
         references=results.references,
-        caveats=list(caveats(results)),
+        caveats=caveats(results),
         truths=TRUTHS,
         motions=MOTIONS,
         compared=COMPARED,
@@ -155,7 +156,7 @@ def render(results: Results) -> str:
 
 def headline(records: Sequence[Record]) -> str:
     """The run in one sentence."""
-    judged = [record for record in records if any(errors.items() for errors in record.errors.values())]
+    judged = [record for record in records if _judged(record)]
     compared, failed, broken = len(judged), _count(judged, Outcome.FAIL), _count(records, *BROKEN)
     if not compared:
         said = "Nothing was compared"
@@ -163,9 +164,12 @@ def headline(records: Sequence[Record]) -> str:
         said = f"{failed} of {compared} comparisons {'is' if failed == 1 else 'are'} outside tolerance"
     else:
         said = f"All {compared} comparisons are within tolerance" if compared > 1 else "The one comparison is within tolerance"
-    alone = _count(records, *COMPARED) - compared
-    said += f", {alone} had nothing to be compared with" if alone else ""
     return said + (f", {broken} could not be completed" if broken else "")
+
+
+def _judged(record: Record) -> bool:
+    """Whether there was anything to compare with."""
+    return any(errors.items() for errors in record.errors.values())
 
 
 def worst_position(record: Record) -> Deviation | None:

@@ -21,17 +21,20 @@ def print_table(results: Results, file: TextIO) -> None:
     """Print one line per record, then every message, then a count of outcomes."""
     console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("case", "engine", "outcome"):
-        table.add_column(name)
-    for quantity, unit in QUANTITIES.items():
-        table.add_column(f"{quantity} error\n{unit}", justify="right")
-    table.add_column("truth")
-    table.add_column("us/step", justify="right")
+    table.add_column("case", overflow="fold")
+    for name in ("engine", "outcome"):
+        table.add_column(name, no_wrap=True)
+    for unit in QUANTITIES.values():
+        table.add_column(f"error\n{unit}", justify="right", no_wrap=True)
+    table.add_column("truth", overflow="fold")
+    table.add_column("us/step", justify="right", no_wrap=True)
+    several = len({record.mode for record in results.records}) > 1
     for record in results.records:
         outcome = Text(record.outcome, style=COLOURS.get(record.outcome, "bold red"))
         errors = [_error(record, quantity) for quantity in QUANTITIES]
         time = "–" if record.us_per_step is None else f"{record.us_per_step:.3g}"
-        table.add_row(Text(record.case), f"{record.engine} · {record.mode}", outcome, *errors, truth(record), time)
+        engine = f"{record.engine} · {record.mode}" if several else record.engine
+        table.add_row(Text(record.case), engine, outcome, *errors, truth(record), time)
     console.print(table)
     for (engine, outcome, message), cases in _messages(results).items():
         console.print(Text(f"{outcome}: {', '.join(cases)} · {engine}: {message}"), soft_wrap=True)

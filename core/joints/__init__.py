@@ -3,7 +3,7 @@
 import importlib
 import pkgutil
 
-from .base import Attachment, AxialJoint, Joint, Kind
+from .base import Attachment, AxialJoint, Coupler, Joint, Kind
 from .distance import Distance
 from .fixed import Fixed
 from .revolute import Revolute
@@ -17,6 +17,7 @@ for _module in pkgutil.iter_modules(__path__):
 __all__ = [
     "Attachment",
     "AxialJoint",
+    "Coupler",
     "Distance",
     "Fixed",
     "Joint",

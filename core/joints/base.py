@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from typing import Any, ClassVar, Self
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, vec
 from ..errors import MechanismError
-from ..primitives.base import Primitive
+from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
+from ..primitives import Spherical as SphericalCondition
 
 
 class Kind(Enum):
@@ -144,10 +145,61 @@ class Joint(ABC):
 
 @dataclass(frozen=True)
 class AxialJoint(Joint):
-    """A joint about or along an axis through a point, both common to the two bodies; its freedom can be driven."""
+    """A joint about or along an axis through a point, both common to the two bodies; its freedoms can be driven and coupled.
+
+    Its coordinates are the rotation about and the displacement along the axis of body j relative to body i, zero at design.
+    """
 
     point: tuple[float, float, float] = position()
     axis: tuple[float, float, float] = direction()
+
+    def measured(self, freedom: str, i: Attachment, j: Attachment) -> Primitive:
+        """The primitive that ties one of its coordinates, "rotation" or "translation", to a drive."""
+        P, h = vec(self.point), unit(self.axis)
+        if freedom == "rotation":
+            return DrivenAngle(h)
+        if "rotation" in self.freedoms:
+            return Dot20(h, i.arm(P), j.arm(P), ZERO)
+        return LockedDisplacement(h, i.arm(P) - j.arm(P))
+
+    def mixed(self, i: Attachment, j: Attachment) -> Sequence[tuple[Primitive, str]]:
+        """The joint with its coordinates named: TraX and RotX of formulation section 4, each with the coordinate it takes."""
+        P, h = vec(self.point), unit(self.axis)
+        slide = NamedSlide(i.arm(P), j.arm(P), h=h) if "translation" in self.freedoms else SphericalCondition(i.arm(P), j.arm(P))
+        turn = NamedTurn(h) if "rotation" in self.freedoms else Dot12()
+        return (slide, "translation"), (turn, "rotation")
+
+    @property
+    def relations(self) -> Sequence[Mapping[str, float]]:
+        """Linear relations between its own coordinates [m, rad]: coefficients by freedom, whose weighted sum stays zero."""
+        return ()
+
+
+@dataclass(frozen=True)
+class Coupler(ABC):
+    """A linear relation between one coordinate each of two axial joints, zero at design.
+
+    Attributes:
+        joints: names of the two joints.
+        freedoms: which coordinate of each: "rotation" or "translation".
+    """
+
+    type: ClassVar[str]
+    freedoms: ClassVar[tuple[str, str]]
+    registry: ClassVar[dict[str, type[Coupler]]] = {}
+
+    name: str
+    joints: tuple[str, str]
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "type" in cls.__dict__:
+            Coupler.registry[cls.type] = cls
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> tuple[float, float]:
+        """Weights of the two coordinates [m, rad]; their weighted sum stays zero."""
 
 
 def _times(factor: float, value: float | Sequence[Any]) -> Any:

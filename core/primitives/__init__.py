@@ -9,6 +9,7 @@ from .dot20 import Dot20
 from .dot21 import Dot21, LockedDisplacement
 from .driven import DrivenAngle, DrivenCoordinate
 from .ground import Ground
+from .named import NamedSlide, NamedTurn
 from .spherical import Spherical
 
 __all__ = [
@@ -24,6 +25,8 @@ __all__ = [
     "Ground",
     "LockedDisplacement",
     "Motion",
+    "NamedSlide",
+    "NamedTurn",
     "Pose",
     "Primitive",
     "Row",

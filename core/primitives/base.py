@@ -110,8 +110,8 @@ class Primitive(ABC):
     def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
         """Right-hand sides of the acceleration equations: what rows . acceleration must be."""
 
-    def nu(self) -> tuple[Scalar, ...]:
-        """Right-hand sides of the velocity equations; zero unless driven."""
+    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        """Right-hand sides of the velocity equations; zero unless driven, and linear in the drive's rate."""
         return (0.0,) * self.n
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

@@ -47,5 +47,5 @@ class Dot20(Primitive):
         turning = cross(vi.w, a_dot) @ d + 2.0 * (a_dot @ d_dot)
         return (self.drive.c_tt - (turning + a @ (vj.centripetal(S_j) - vi.centripetal(S_i))),)
 
-    def nu(self) -> tuple[Scalar, ...]:
+    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)

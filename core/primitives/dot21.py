@@ -57,7 +57,7 @@ class LockedDisplacement(Primitive):
     def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
         return (self.drive.c_tt + along_gamma(self.h, self.e0, i, j, vi, vj),)
 
-    def nu(self) -> tuple[Scalar, ...]:
+    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)
 
 

@@ -16,7 +16,7 @@ has none of these, because Euler parameters that are followed continuously know 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..algebra import ZERO, Scalar, Vec3, cross
 from .base import Drive, Motion, Pose, Primitive, Row
@@ -29,7 +29,7 @@ class DrivenCoordinate(Primitive):
     n = 1
     k: Vec3
     s: Vec3
-    drive: Drive
+    drive: Drive = field(default_factory=Drive)
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.k @ (j.u + j.swing(self.s)) - self.drive.c,)
@@ -40,7 +40,7 @@ class DrivenCoordinate(Primitive):
     def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
         return (self.drive.c_tt - self.k @ vj.centripetal(j.turn(self.s)),)
 
-    def nu(self) -> tuple[Scalar, ...]:
+    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)
 
 
@@ -50,7 +50,7 @@ class DrivenAngle(Primitive):
 
     n = 1
     h: Vec3
-    drive: Drive
+    drive: Drive = field(default_factory=Drive)
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         rho = i.q.conjugate() * j.q
@@ -63,5 +63,5 @@ class DrivenAngle(Primitive):
     def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
         return (self.drive.c_tt,)
 
-    def nu(self) -> tuple[Scalar, ...]:
+    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)

@@ -2,7 +2,7 @@
 
 from .elimination import Elimination
 from .numpy_executor import NumpyExecutor
-from .trace import Program, Tape, Traced, absolute, maximum, minimum, program, sqrt, where_larger
+from .trace import Program, Tape, Traced, absolute, cos, maximum, minimum, program, sin, sqrt, where_larger
 
 __all__ = [
     "Elimination",
@@ -11,9 +11,11 @@ __all__ = [
     "Tape",
     "Traced",
     "absolute",
+    "cos",
     "maximum",
     "minimum",
     "program",
+    "sin",
     "sqrt",
     "where_larger",
 ]

@@ -26,6 +26,8 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "/": np.divide,
     "neg": np.negative,
     "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
     "abs": np.absolute,
     "min": _min,
     "max": _max,

@@ -17,11 +17,11 @@ from ..algebra import Scalar
 Node: TypeAlias = tuple[str, *tuple[float, ...]]
 """An operation and its operands: node numbers, or for "input" a slot, or for "const" a value.
 
-"+", "-", "*", "/", "neg", "sqrt", "abs", "min", "max" act on numbers ("min" and "max" propagate NaN); "larger" a b is true where
-|a| > |b|; "where" m p q is p where m is true, else q.
+"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max" propagate NaN); "larger" a b is
+true where |a| > |b|; "where" m p q is p where m is true, else q.
 """
 
-FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "abs", "min", "max", "larger", "where"})
+FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"})
 
 
 class Tape:
@@ -164,6 +164,16 @@ def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
 def sqrt(a: Scalar) -> Scalar:
     """Square root of a float or traced scalar."""
     return _unary("sqrt", a, math.sqrt)
+
+
+def sin(a: Scalar) -> Scalar:
+    """Sine of a float or traced scalar [rad]."""
+    return _unary("sin", a, math.sin)
+
+
+def cos(a: Scalar) -> Scalar:
+    """Cosine of a float or traced scalar [rad]."""
+    return _unary("cos", a, math.cos)
 
 
 def absolute(a: Scalar) -> Scalar:

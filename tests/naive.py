@@ -1,0 +1,206 @@
+"""The paper's equations as they stand: slow, obvious, unsimplified, in the paper's own variables.
+
+A body is its position r and its Euler parameters p; vectors s, f, g, h are fixed in a body and given in its own axes (primes
+dropped). Nothing is expanded, shared or simplified, and nothing here comes from the code under test. Every function takes
+complex numbers too, so that derivatives can be taken along a path.
+
+Equation numbers are those of SAE 943745 as read in the formulation notes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Body:
+    """Position r, global [m], and Euler parameters p = [e0, e] of the rotation body -> global [-]."""
+
+    r: np.ndarray
+    p: np.ndarray
+
+    @property
+    def A(self):
+        return A(self.p)
+
+
+GROUND = Body(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+def tilde(a):
+    """The matrix of a x."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def A(p):
+    """(1)  A = (2 e0^2 - 1) I + 2 e e^T + 2 e0 e~."""
+    e0, e = p[0], p[1:]
+    return (2.0 * e0 * e0 - 1.0) * np.eye(3) + 2.0 * np.outer(e, e) + 2.0 * e0 * tilde(e)
+
+
+def G(p):
+    """G = [-e, -e~ + e0 I], shape (3, 4): omega' = 2 G pdot."""
+    return np.column_stack([-p[1:], -tilde(p[1:]) + p[0] * np.eye(3)])
+
+
+def p_rate(p, omega):
+    """pdot of the angular velocity omega' in body axes."""
+    return 0.5 * G(p).T @ omega
+
+
+def p_acceleration(p, omega, omega_t):
+    """pddot of omega' and its derivative, body axes (Gdot pdot = 0)."""
+    return 0.5 * G(p).T @ omega_t - 0.25 * (omega @ omega) * p
+
+
+# Primitives
+
+
+def line(i, j, s_i, s_j):
+    """d, from P_i to P_j, global."""
+    return (j.r + j.A @ s_j) - (i.r + i.A @ s_i)
+
+
+def dot10(i, j, a, b):
+    """(8)  a^T A_i^T A_j b."""
+    return a @ i.A.T @ j.A @ b
+
+
+def dot11(i, j, axes_i, axes_j):
+    """(13)  [g_i . h_j, f_i . h_j]."""
+    (f, g, _), (_, _, h) = axes_i, axes_j
+    return np.array([dot10(i, j, g, h), dot10(i, j, f, h)])
+
+
+def dot12(i, j, axes_i, axes_j):
+    """(17)  B_i [g_i . h_j, h_i . f_j, f_i . g_j]."""
+    (f_i, g_i, h_i), (f_j, g_j, h_j) = axes_i, axes_j
+    return np.column_stack(axes_i) @ [dot10(i, j, g_i, h_j), dot10(i, j, h_i, f_j), dot10(i, j, f_i, g_j)]
+
+
+def dot20(i, j, a, s_i, s_j):
+    """(22)  a^T A_i^T d."""
+    return a @ i.A.T @ line(i, j, s_i, s_j)
+
+
+def dot21(i, j, axes_i, s_i, s_j):
+    """(23)  [f_i . d, g_i . d]."""
+    return np.array([dot20(i, j, a, s_i, s_j) for a in axes_i[:2]])
+
+
+def spherical(i, j, s_i, s_j):
+    """d."""
+    return line(i, j, s_i, s_j)
+
+
+def distance(i, j, s_i, s_j, L):
+    """|d| - L."""
+    d = line(i, j, s_i, s_j)
+    return np.array([np.sqrt(d @ d) - L])
+
+
+# Joints: from points and axes, global at design, to residuals at any pose
+
+
+def triad(axis):
+    """f, g, h: any right-handed orthonormal axes with h along the axis."""
+    h = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    f = np.cross(h, np.eye(3)[np.abs(h).argmin()])
+    f /= np.linalg.norm(f)
+    return f, np.cross(h, f), h
+
+
+def to_body(body, *vectors):
+    """Global vectors at design in body axes."""
+    return [body.A.T @ np.asarray(a, dtype=float) for a in vectors]
+
+
+def arm(body, point):
+    """s: a point, global at design, in body axes from the body's origin."""
+    return body.A.T @ (np.asarray(point, dtype=float) - body.r)
+
+
+def _revolute(joint, i0, j0, i, j):
+    axes = triad(joint.axis)
+    return [spherical(i, j, arm(i0, joint.point), arm(j0, joint.point)), dot11(i, j, to_body(i0, *axes), to_body(j0, *axes))]
+
+
+def _spherical(joint, i0, j0, i, j):
+    return [spherical(i, j, arm(i0, joint.point), arm(j0, joint.point))]
+
+
+def _universal(joint, i0, j0, i, j):
+    a, b = (np.asarray(axis) / np.linalg.norm(axis) for axis in joint.axes)
+    cosine = dot10(i, j, to_body(i0, a)[0], to_body(j0, b)[0]) - a @ b
+    return [spherical(i, j, arm(i0, joint.point), arm(j0, joint.point)), [cosine]]
+
+
+def _translational(joint, i0, j0, i, j):
+    axes = triad(joint.axis)
+    axes_i, axes_j = to_body(i0, *axes), to_body(j0, *axes)
+    return [dot12(i, j, axes_i, axes_j), dot21(i, j, axes_i, arm(i0, joint.point), arm(j0, joint.point))]
+
+
+def _fixed(joint, i0, j0, i, j):
+    point = j0.r if joint.point is None else joint.point
+    axes = triad([0.0, 0.0, 1.0])
+    return [spherical(i, j, arm(i0, point), arm(j0, point)), dot12(i, j, to_body(i0, *axes), to_body(j0, *axes))]
+
+
+def _distance(joint, i0, j0, i, j):
+    P_i, P_j = joint.points
+    L = np.linalg.norm(np.subtract(P_j, P_i)) if joint.length is None else joint.length
+    return [distance(i, j, arm(i0, P_i), arm(j0, P_j), L)]
+
+
+JOINTS = {
+    "revolute": _revolute,
+    "spherical": _spherical,
+    "universal": _universal,
+    "translational": _translational,
+    "fixed": _fixed,
+    "distance": _distance,
+}
+"""Joint type -> its residuals (joint, bodies i and j at design, bodies i and j now)."""
+
+
+def design(mechanism):
+    """All bodies of a mechanism at the design position, by name."""
+    return {"ground": GROUND} | {b.name: Body(np.array(b.origin), np.array(b.euler_parameters)) for b in mechanism.bodies}
+
+
+def residuals(mechanism, now):
+    """The residuals of all joints with the bodies (by name; those not named are at design) where they are now."""
+    before = design(mechanism)
+    after = before | now
+    parts = []
+    for joint in mechanism.joints:
+        i, j = joint.bodies
+        parts += JOINTS[joint.type](joint, before[i], before[j], after[i], after[j])
+    return np.concatenate(parts)
+
+
+def taylor(function, radius=0.1, points=32):
+    """Value, first and second derivative at t = 0 of an analytic function of t, from its values on a circle (Cauchy).
+
+    No step size to trade: aliasing is (radius / radius of convergence)^points, round-off 1e-16 / radius^order.
+    """
+    circle = radius * np.exp(2j * np.pi * np.arange(points) / points)
+    values = np.array([function(t) for t in circle])
+    return [factorial * np.real((circle**-k) @ values) / points for k, factorial in enumerate((1.0, 1.0, 2.0))]
+
+
+def along(bodies):
+    """Bodies moving with their velocities and accelerations: t -> poses, exact to second order in t.
+
+    bodies: name -> (r, p, [rdot, omega'], [rddot, omega'dot]).
+    """
+
+    def at(t):
+        poses = {}
+        for name, (r, p, v, a) in bodies.items():
+            p_t, p_tt = p_rate(p, v[3:]), p_acceleration(p, v[3:], a[3:])
+            poses[name] = Body(r + t * v[:3] + 0.5 * t * t * a[:3], p + t * p_t + 0.5 * t * t * p_tt)
+        return poses
+
+    return at

@@ -1,0 +1,206 @@
+"""Broken case files: one clear message each, and never anything but a CaseError."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from kincheck.core.errors import CaseError
+from kincheck.core.harness import casefile
+from kincheck.core.harness.casefile import load_case
+
+from .case_texts import BASE, BY_FILE, INLINE, complains, edited, write
+
+BROKEN = {
+    "unknown key": (("axis = [1", "axes = [1"), ["joints.guide.axes", "unknown key", "did you mean 'axis'"]),
+    "unknown key at the top": (("[bodies.slider]", "[body.slider]"), ["body", "unknown key", "did you mean 'bodies'"]),
+    "unknown key far off": (("atol = 1e-9", "atol = 1e-9\nqqq = 1"), ["outputs.tip_x.qqq", "unknown key", "remove it"]),
+    "wrong schema": (("kincheck-case/1", "kincheck-case/9"), ["schema", "kincheck-case/9", 'expected "kincheck-case/1"']),
+    "no schema": (('schema = "kincheck-case/1"', ""), ["schema", "found none"]),
+    "no source": (('source = "made up for this test"', ""), ["source", "missing", "where the numbers come from"]),
+    "empty source": (('source = "made up for this test"', 'source = ""'), ["source", "found ''"]),
+    "unknown truth": (('"closed_form"', '"gospel"'), ["truth", "'gospel'", "third_party_data"]),
+    "unknown length unit": (
+        ("[bodies.slider]", '[units]\nlength = "inch"\n[bodies.slider]'),
+        ["units.length", "'inch'", '"m" or "mm"'],
+    ),
+    "unknown angle unit": (
+        ("[bodies.slider]", '[units]\nangle = "grad"\n[bodies.slider]'),
+        ["units.angle", "'grad'", '"rad" or "deg"'],
+    ),
+    "unknown joint": (('"translational"', '"translation"'), ["joints.guide.type", "'translation'", "did you mean 'translational'"]),
+    "unheard-of joint": (('"translational"', '"qqq"'), ["joints.guide.type", "known: distance, fixed, revolute"]),
+    "no joint type": (('type = "translational"', ""), ["joints.guide.type", "expected a joint type"]),
+    "joint type of another kind": (('type = "translational"', "type = [1]"), ["joints.guide.type", "[1]"]),
+    "unknown driver": (('"joint_displacement"', '"joint_shift"'), ["drivers.push.type", "'joint_shift'", "joint_displacement"]),
+    "missing body": (('["ground", "slider"]', '["ground", "slidr"]'), ["no body 'slidr'", "did you mean 'slider'"]),
+    "one body": (('["ground", "slider"]', '["slider"]'), ["joints.guide.bodies", "['slider']", "two names"]),
+    "same body twice": (('["ground", "slider"]', '["slider", "slider"]'), ["joints.guide", "with itself"]),
+    "both fixed": (("origin = [1.0, 2.0, 3.0]", "fixed = true"), ["joint 'guide'", "both fixed"]),
+    "body of a point": (('body = "slider"', 'body = "sldr"'), ["point 'tip'", "no body 'sldr'"]),
+    "zero axis": (("axis = [1.0, 0.0, 0.0]", "axis = [0, 0.0, 0]"), ["joints.guide", "axis is zero"]),
+    "missing axis": (("axis = [1.0, 0.0, 0.0]", ""), ["joints.guide.axis", "missing", "a direction [x, y, z]", "add the key"]),
+    "axis of two": (("axis = [1.0, 0.0, 0.0]", "axis = [1, 0]"), ["joints.guide.axis", "[1, 0]", "a direction [x, y, z]"]),
+    "axis of text": (("axis = [1.0, 0.0, 0.0]", 'axis = ["a", 0, 0]'), ["joints.guide.axis", "'a'"]),
+    "axis of truth": (("axis = [1.0, 0.0, 0.0]", "axis = [true, 0, 0]"), ["joints.guide.axis", "True"]),
+    "NaN": (("axis = [1.0, 0.0, 0.0]", "axis = [1, nan, 0]"), ["joints.guide.axis[1]", "nan", "finite"]),
+    "infinity": (("position = [1.5", "position = [-inf"), ["points.tip.position[0]", "-inf", "finite"]),
+    "overflowing": (("position = [1.5", "position = [1e200"), ["points.tip.position[0]", "1e+200"]),
+    "underflowing axis": (("axis = [1.0, 0.0, 0.0]", "axis = [1e-200, 0, 0]"), ["joints.guide.axis[0]", "1e-200"]),
+    "huge integer": (("steps = 3", f"steps = 0x1{'0' * 5000}"), ["sweep.steps", "huge integer"]),
+    "no driver": (('[drivers.push]\ntype = "joint_displacement"\njoint = "guide"', "[drivers]"), ["drivers", "no driver"]),
+    "driver of nothing": (('driver = "push"', 'driver = "pull"'), ["sweep.driver", "'pull'", "push"]),
+    "driven joint": (('joint = "guide"', 'joint = "guid"'), ["driver 'push'", "no joint 'guid'", "did you mean 'guide'"]),
+    "driven freedom": (('"joint_displacement"', '"joint_angle"'), ["driver 'push'", "no rotation"]),
+    "no steps": (("steps = 3", "steps = 0"), ["sweep.steps", "found 0", "1 to 1000000"]),
+    "half a step": (("steps = 3", "steps = 2.5"), ["sweep.steps", "2.5", "whole number"]),
+    "too many steps": (("steps = 3", "steps = 1_000_000_000_000"), ["sweep.steps", "1 to 1000000"]),
+    "endless start": (("start = -0.1", "start = inf"), ["sweep.start", "inf"]),
+    "no rate": (("rate = 2.0", "rate = 0"), ["sweep.rate", "found 0"]),
+    "NaN rate": (("rate = 2.0", "rate = nan"), ["sweep.rate", "nan"]),
+    "no motion": (("stop = 0.1", "stop = -0.1"), ["sweep.stop", "steps = 1"]),
+    "no stop": (("stop = 0.1\n", ""), ["sweep.stop", "missing"]),
+    "no sweep": ((BASE[BASE.index("[sweep]") : BASE.index("[outputs")], ""), ["sweep", "missing"]),
+    "no point": (('[points.tip]\nbody = "slider"\nposition = [1.5, 2.0, 3.0]', ""), ["points", "no point", "[points.NAME]"]),
+    "output of nothing": (('point = "tip"', 'point = "top"'), ["outputs.tip_x.point", "'top'", "did you mean 'tip'"]),
+    "component": (('component = "x"', 'component = "u"'), ["outputs.tip_x.component", "'u'", '"x", "y" or "z"']),
+    "neither": (('component = "x"', ""), ["outputs.tip_x", "neither component nor direction"]),
+    "both": (('component = "x"', 'component = "x"\ndirection = [1, 0, 0]'), ["outputs.tip_x", "both component and direction"]),
+    "zero direction": (('component = "x"', "direction = [0, 0, 0]"), ["outputs.tip_x.direction", "found zero"]),
+    "no reason": (('why = "made up for this test"', ""), ["outputs.tip_x.why", "missing", "reason"]),
+    "reason for nothing": (("atol = 1e-9", ""), ["outputs.tip_x.why", "without a tolerance"]),
+    "negative tolerance": (("atol = 1e-9", "atol = -1"), ["outputs.tip_x.atol", "-1", "not negative"]),
+    "name of a derivative": (("[outputs.tip_x]", '[outputs."tip.velocity"]'), ["outputs.tip.velocity", "another name"]),
+    "euler parameters": (("origin = [1.0", "euler_parameters = [1, 1, 0, 0]\norigin = [1.0"), ["bodies.slider", "length 1.41"]),
+    "ground": (("[bodies.slider]", "[bodies.ground]\n[bodies.slider]"), ["'ground' exists by itself"]),
+    "body is a number": (
+        ("[bodies.slider]\norigin = [1.0, 2.0, 3.0]", "[bodies]\nslider = 3"),
+        ["bodies.slider", "found 3", "table"],
+    ),
+    "bodies are a list": (("[bodies.slider]", "[[bodies]]"), ["bodies", "expected a table"]),
+    "unprintable name": (("[bodies.slider]", '[bodies."\\u001b[2J"]\n[bodies.slider]'), ["bodies", "printable"]),
+    "unprintable text": (('source = "made', 'source = "\\u001b[2J made'), ["source", "printable"]),
+    "too deep": (("[bodies.slider]", f"[bodies.{'a.' * 3000}a]\n[bodies.slider]"), ["nested more than 16 deep"]),
+    "TOML syntax": (("rate = 2.0", "rate = = 2.0"), ["not valid TOML", "line"]),
+    "key twice": (("rate = 2.0", "rate = 2.0\nrate = 2.0"), ["not valid TOML"]),
+    "no reference file": (("[outputs.tip_x]", BY_FILE + "[outputs.tip_x]"), ["tip.csv", "no such file"]),
+    "file and rows": (("[outputs.tip_x]", BY_FILE + "rows = [[1, 1]]\n[outputs.tip_x]"), ["reference", "one source"]),
+    "neither file nor rows": (("[outputs.tip_x]", "[reference]\n[outputs.tip_x]"), ["reference", "neither file nor rows"]),
+    "ragged rows": (
+        ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [0]]\n[outputs.tip_x]"),
+        ["reference.rows[1]", "found 1 numbers"],
+    ),
+    "rows off the grid": (
+        ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [0.02, 1], [0.1, 1]]\n[outputs.tip_x]"),
+        ["reference.rows[1]", "0.02", "sample 1", "expected 0.0"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("edit", "fragments"), BROKEN.values(), ids=BROKEN)
+def test_broken_files(tmp_path: Path, edit: tuple[str, str], fragments: list[str]):
+    complains(write(tmp_path, edited(edit)), fragments)
+
+
+@pytest.mark.parametrize("claim", ["", 'truth = "consensus_only"'])
+def test_a_reference_has_to_say_what_it_is(tmp_path: Path, claim: str):
+    complains(write(tmp_path, edited(('truth = "closed_form"', claim)) + INLINE), ["truth", "beside a [reference]", "closed_form"])
+
+
+def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    complains(tmp_path / "none.toml", ["none.toml", "no such file"])
+    (tmp_path / "folder.toml").mkdir()
+    complains(tmp_path / "folder.toml", ["folder.toml", "not a regular file"])
+    complains(write(tmp_path, b"\xff" + BASE.encode()), ["byte 0 is not UTF-8"])
+    complains(tmp_path / f"{'long' * 1000}.toml", ["cannot be read", "check path"])
+    monkeypatch.setattr(casefile, "LARGEST_FILE", 100)
+    complains(write(tmp_path, BASE), ["larger than 100 bytes", "reference file"])
+
+
+@pytest.mark.parametrize(
+    ("text", "fragments"),
+    [
+        ("[1, 2]", ["found [1, 2]", "expected the keys of a case"]),
+        ("{", ["not valid JSON"]),
+        ('{"name": "a", "name": "b"}', ["not valid JSON", "'name' is given twice"]),
+        ("[" * 100_000, ["not valid JSON", "nested too deeply"]),
+        ('{"schema": "kincheck-case/1", "name": "a", "source": "\\ud800"}', ["source", "printable"]),
+        ('{"schema": NaN}', ["schema", "nan"]),
+    ],
+)
+def test_broken_json(tmp_path: Path, text: str, fragments: list[str]):
+    complains(write(tmp_path, text, "case.json"), ["case.json", *fragments])
+
+
+# Whatever comes: a case or a CaseError
+
+ANYTHING = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.sampled_from(["ground", "revolute", "slider"]),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
+    max_leaves=8,
+)
+FUZZ = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def read_or_refuse(file: Path) -> None:
+    try:
+        case = load_case(file)
+    except CaseError as error:
+        assert str(error).startswith(str(file))  # noqa: PT017
+        str(error).encode()
+    else:
+        assert case.outputs
+        assert np.isfinite(case.sweep.values).all()
+
+
+@FUZZ
+@given(data=st.binary(max_size=60) | st.text(max_size=60).map(lambda text: text.encode(errors="surrogatepass")))
+def test_garbage(tmp_path: Path, data: bytes):
+    for name in ("case.toml", "case.json", "case"):
+        read_or_refuse(write(tmp_path, data, name))
+
+
+@FUZZ
+@given(cut=st.integers(0, len(BASE + INLINE)), length=st.integers(0, 12), instead=st.text(max_size=4))
+def test_damaged_text(tmp_path: Path, cut: int, length: int, instead: str):
+    text = BASE + INLINE
+    read_or_refuse(write(tmp_path, (text[:cut] + instead + text[cut + length :]).encode(errors="surrogatepass")))
+
+
+def places(value: object, path: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
+    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [path] * bool(path) + [place for key, each in inside for place in places(each, (*path, key))]
+
+
+PLACES = places(tomllib.loads(BASE + INLINE))
+
+
+@FUZZ
+@given(place=st.sampled_from(PLACES), value=ANYTHING)
+def test_wrong_values_anywhere(tmp_path: Path, place: tuple[object, ...], value: object):
+    document = tomllib.loads(BASE + INLINE)
+    *way, last = place
+    inside: object = document
+    for key in way:
+        inside = inside[key]  # type: ignore[index]
+    inside[last] = value  # type: ignore[index]
+    read_or_refuse(write(tmp_path, json.dumps(document), "case.json"))
+
+
+@FUZZ
+@given(rows=st.lists(st.lists(st.floats() | st.text(max_size=5), max_size=4), max_size=5))
+def test_wrong_reference_files(tmp_path: Path, rows: list[list[object]]):
+    lines = "\n".join(",".join(map(str, row)) for row in rows)
+    write(tmp_path, ("push,tip_x,tip_x.velocity\n" + lines).encode(errors="surrogatepass"), "tip.csv")
+    try:
+        load_case(write(tmp_path, BASE + BY_FILE))
+    except CaseError as error:
+        assert "tip.csv" in str(error)  # noqa: PT017

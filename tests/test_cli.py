@@ -1,0 +1,296 @@
+"""The command line: exit statuses, messages, and what goes to which stream."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+
+import kincheck.adapters
+import kincheck.cases
+import pytest
+from kincheck.core.errors import CaseError
+from kincheck.core.harness import cli
+from kincheck.core.harness.case import Truth
+from kincheck.core.harness.record import from_json
+
+from .fakes import Fake, crank, off, partial, raising
+
+RIGHT = Fake("native")
+WRONG = Fake("wrong", answer=off("acceleration", lambda a: a * (1.0 + 1e-6)))
+PARTIAL = Fake("partial", answer=partial)
+BROKEN = Fake("broken", answer=raising(ValueError("no [axis] there")))
+MISSING = Fake("missing", installed=None)
+UNABLE = Fake("unable", refusal="joint 'cv' (universal) has no counterpart")
+
+
+@pytest.fixture
+def kincheck_main(monkeypatch):
+    """main() with the cases and engines of the test."""
+
+    def main(*argv, engines=(RIGHT,), cases=None):
+        cases = {"crank": crank(), "crank_two": crank("crank_two")} if cases is None else cases
+        by_name = {engine.name: engine for engine in engines}
+        monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
+        monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, RIGHT))
+        monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
+        monkeypatch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
+        return cli.main([str(each) for each in argv])
+
+    return main
+
+
+@pytest.mark.parametrize(
+    ("engine", "status"),
+    [(RIGHT, 0), (WRONG, 1), (PARTIAL, 1), (BROKEN, 1), (MISSING, 0), (UNABLE, 0)],
+    ids=lambda each: getattr(each, "name", each),
+)
+def test_exit_status_of_a_run(kincheck_main, engine, status):
+    assert kincheck_main("run", engines=[RIGHT, engine]) == status
+
+
+def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
+    assert kincheck_main("run", "--json", "-", engines=[RIGHT, MISSING]) == 0
+    records = json.loads(capsys.readouterr().out)["records"]
+    assert [(each["case"], each["engine"]) for each in records] == [
+        ("crank", "native"),
+        ("crank", "missing"),
+        ("crank_two", "native"),
+        ("crank_two", "missing"),
+    ]
+
+
+def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
+    assert kincheck_main("run", "crank_two", "crank_two", "--engine", "native", "--json", "-", engines=[RIGHT, WRONG]) == 0
+    assert [each["case"] for each in json.loads(capsys.readouterr().out)["records"]] == ["crank_two"]
+
+
+def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_that_was_not_asked_for(kincheck_main, capsys):
+    cases = {"crank": crank(reference=False)}
+    assert kincheck_main("run", "--engine", "wrong", "--json", "-", engines=[RIGHT, WRONG], cases=cases) == 1
+    (record,) = json.loads(capsys.readouterr().out)["records"]
+    assert record["engine"] == "wrong"
+    assert "against native" in record["message"]
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (["crnk"], "there is no case 'crnk'; did you mean 'crank'?"),
+        (["crank", "--engine", "nativ"], "there is no engine 'nativ'; did you mean 'native'?"),
+        (["crank", "--require", "zzz"], "there is no engine 'zzz'; known: native"),
+        (["crank", "--tol", "nan"], "'nan' is not a positive number"),
+        (["crank", "--tol", "0"], "'0' is not a positive number"),
+        (["crank", "--tol", "inf"], "'inf' is not a positive number"),
+        (["crank", "--tol=-1e-9"], "'-1e-9' is not a positive number"),
+        (["crank", "--tol", "tight"], "'tight' is not a positive number"),
+        (["crank", "--mode", "dream"], "invalid choice: 'dream'"),
+        (["crank", "--mode", "simulate"], "no engine has the mode 'simulate'"),
+        (["crank", "--engine", "native", "--mode", "simulate"], "engine 'native' has the mode 'projection', not 'simulate'"),
+        (["--unknown"], "unrecognized arguments: --unknown"),
+    ],
+)
+def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, argv, said):
+    RIGHT.solves = 0
+    assert kincheck_main("run", *argv) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert "Traceback" not in captured.err
+    assert captured.out == ""
+    assert RIGHT.solves == 0
+
+
+def test_no_command_is_status_2_and_help_and_version_are_status_0(capsys):
+    assert cli.main([]) == 2
+    assert cli.main(["--help"]) == 0
+    assert cli.main(["run", "--help"]) == 0
+    capsys.readouterr()
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("kincheck 0.")
+
+
+def test_all_bad_case_files_are_named_before_anything_is_computed(kincheck_main, capsys, tmp_path):
+    first, second = tmp_path / "first.toml", tmp_path / "second.json"
+    first.write_text('schema = "kincheck-case/9"\n')
+    second.write_text("{")
+    RIGHT.solves = 0
+    assert kincheck_main("run", "crank", first, second, tmp_path / "third.toml") == 2
+    captured = capsys.readouterr()
+    said = captured.err.splitlines()
+    assert [sum(name in line for line in said) for name in ("first.toml", "second.json", "third.toml")] == [1, 1, 1]
+    assert "Traceback" not in captured.err
+    assert captured.out == ""
+    assert RIGHT.solves == 0
+
+
+def test_a_bad_built_in_case_is_a_message(kincheck_main, capsys, monkeypatch):
+    def load(name):
+        raise CaseError("crank.toml: sweep.steps = 0: expected at least 1")
+
+    status = kincheck_main("run", "crank", cases={"crank": crank()})
+    assert status == 0
+    monkeypatch.setattr(kincheck.cases, "load", load)
+    capsys.readouterr()
+    assert cli.main(["run", "crank"]) == 2
+    assert capsys.readouterr().err == "kincheck: crank.toml: sweep.steps = 0: expected at least 1\n"
+
+
+def test_two_cases_of_one_name_are_refused(kincheck_main, capsys):
+    assert kincheck_main("run", cases={"a": crank("same"), "b": crank("same")}) == 2
+    assert "two cases named 'same'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("engine", "said"),
+    [
+        (MISSING, "required engine 'missing': missing is not installed"),
+        (UNABLE, "required engine 'unable': case 'crank' is unsupported: joint 'cv' (universal) has no counterpart"),
+    ],
+    ids=["missing", "unable"],
+)
+def test_a_required_engine_that_cannot_is_status_2_and_the_results_are_kept(kincheck_main, capsys, engine, said):
+    assert kincheck_main("run", "crank", "--require", engine.name, "--json", "-", engines=[RIGHT, engine]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert json.loads(captured.out)["records"][0]["outcome"] == "pass"
+
+
+def test_a_required_engine_is_run_even_if_others_were_asked_for(kincheck_main, capsys):
+    argv = ["run", "crank", "--engine", "native", "--require", "wrong", "--json", "-"]
+    assert kincheck_main(*argv, engines=[RIGHT, WRONG]) == 1
+    assert [each["engine"] for each in json.loads(capsys.readouterr().out)["records"]] == ["native", "wrong"]
+
+
+def test_how_to_install_comes_from_the_metadata():
+    assert cli.how_to_install("pinocchio").startswith("pip install 'pin>=")
+    assert cli.how_to_install("mujoco").startswith("pip install 'mujoco>=")
+
+
+def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
+    def chatty(case):
+        print("from Python")
+        os.write(1, b"from the file descriptor\n")
+        return off("position", lambda p: p)(case)
+
+    assert kincheck_main("run", "crank", "--json", "-", engines=[Fake("native", answer=chatty)]) == 0
+    captured = capfd.readouterr()
+    assert len(from_json(captured.out.encode()).records) == 1
+    for said in ("from Python", "from the file descriptor", "[1/1] crank native: pass", "truth"):
+        assert said in captured.err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="finds the C library by its POSIX name")
+def test_what_c_keeps_in_its_buffer_does_not_come_after_the_json():
+    code = (
+        "import ctypes\n"
+        "from kincheck.core.harness.deliver import json_only\n"
+        "with json_only():\n"
+        "    ctypes.CDLL(None).puts(b'from C')\n"
+        "print('json')\n"
+    )
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
+    assert (done.stdout, done.stderr) == ("json\n", "from C\n")
+
+
+def test_the_table_says_what_happened_and_never_too_much(kincheck_main, capsys):
+    engines = [RIGHT, WRONG, PARTIAL, BROKEN, MISSING, UNABLE]
+    assert kincheck_main("run", "crank", engines=engines) == 1
+    captured = capsys.readouterr()
+    rows = {line.split()[1]: line for line in captured.out.splitlines() if line.startswith("crank")}
+    assert "pass" in rows["native"]
+    assert "closed form (validated)" in rows["native"]
+    for engine in engines[1:]:
+        assert "validated" not in rows[engine.name]
+    assert "2.0e-06" in rows["wrong"]
+    assert "fail: crank · wrong: x: acceleration is off by 2e-06 m/s^2" in captured.out
+    assert "error: crank · broken: ValueError: no [axis] there" in captured.out
+    assert "1 pass, 2 fail, 1 error, 1 unsupported, 1 unavailable" in captured.out
+    assert captured.err.splitlines() == [
+        f"[{k + 1}/6] crank {engine.name}: {outcome}"
+        for k, (engine, outcome) in enumerate(
+            zip(engines, ("pass", "fail", "fail", "error", "unavailable", "unsupported"), strict=True)
+        )
+    ]
+
+
+@pytest.mark.parametrize("truth", [Truth.IN_HOUSE_ORACLE, Truth.CONSENSUS_ONLY])
+def test_agreement_with_ourselves_is_never_called_validated(kincheck_main, capsys, tmp_path, truth):
+    case = crank(truth=truth, reference=truth is Truth.IN_HOUSE_ORACLE)
+    assert kincheck_main("run", "--json", tmp_path / "results.json", engines=[RIGHT, Fake()], cases={"crank": case}) == 0
+    captured = capsys.readouterr()
+    assert str(truth).replace("_", " ") in captured.out
+    assert "validated" not in captured.out + captured.err + (tmp_path / "results.json").read_text()
+
+
+def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
+    out = tmp_path / "made" / "here"
+    assert kincheck_main("run", "crank", "--out", out, "--json", tmp_path / "r.json", "--junit", tmp_path / "j.xml") == 0
+    results = from_json((out / "results.json").read_bytes())
+    assert results == from_json((tmp_path / "r.json").read_bytes())
+    assert results.run["command"].startswith("kincheck run crank --out ")
+    assert "crank" in (out / "report.html").read_text()
+    assert len(ET.parse(tmp_path / "j.xml").findall(".//testcase")) == 2
+    assert "[1/1]" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("option", "name"), [("--out", "file/sub"), ("--out", "file"), ("--json", "no/r.json"), ("--junit", ".")])
+def test_a_destination_that_cannot_be_written_is_found_before_the_work(kincheck_main, capsys, tmp_path, option, name):
+    (tmp_path / "file").write_text("here already")
+    RIGHT.solves = 0
+    assert kincheck_main("run", "crank", option, tmp_path / name) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f"kincheck: {option} ")
+    assert len(captured.err.splitlines()) == 1
+    assert RIGHT.solves == 0
+
+
+def test_a_file_that_fails_in_the_end_does_not_keep_back_the_others(kincheck_main, capsys, tmp_path):
+    def hostile(case):
+        (tmp_path / "j.xml").mkdir(exist_ok=True)  # in the way, since the destinations were checked
+        return off("position", lambda p: p)(case)
+
+    argv = ["run", "crank", "--junit", tmp_path / "j.xml", "--json", tmp_path / "r.json"]
+    assert kincheck_main(*argv, engines=[Fake("native", answer=hostile)]) == 2
+    assert "j.xml: cannot be written (Is a directory)" in capsys.readouterr().err
+    assert len(from_json((tmp_path / "r.json").read_bytes()).records) == 1
+
+
+def test_an_interrupt_keeps_what_was_made(kincheck_main, capsys):
+    stopped = Fake("stopped", answer=raising(KeyboardInterrupt()))
+    assert kincheck_main("run", "--json", "-", engines=[RIGHT, stopped]) == 2
+    captured = capsys.readouterr()
+    assert [each["engine"] for each in json.loads(captured.out)["records"]] == ["native"]
+    assert "interrupted: 1 of 4 records" in captured.err
+
+
+def test_a_defect_of_ours_is_shown_and_is_no_deviation(kincheck_main, capsys, monkeypatch):
+    monkeypatch.setattr("kincheck.core.harness.run.run", lambda *_, **__: 1 / 0)
+    assert kincheck_main("run") == 2
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys):
+    pinocchio = Fake("pinocchio", installed=None)
+    cases = {"crank": crank(), "free": crank("free", reference=False)}
+    assert kincheck_main("list", engines=[RIGHT, pinocchio], cases=cases) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split() for line in lines if "made up" in line] == [
+        ["crank", "closed", "form", "made", "up"],
+        ["free", "consensus", "only", "made", "up"],
+    ]
+    assert any(line.startswith("  native     1.2  projection, loop: python") for line in lines)
+    assert any(line.startswith("  pinocchio  not installed: pip install 'pin>=") for line in lines)
+
+
+def test_the_start_is_quick_and_loads_nothing_that_is_not_needed():
+    code = (
+        "import sys; from kincheck.core.harness import cli; status = cli.main(['--version']);"
+        "print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio', 'exudyn', 'scipy'} & set(sys.modules)))"
+    )
+    begin = time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[1] == "[]"
+    # a tenth of it is usual; the rest is for a busy machine
+    assert time.perf_counter() - begin < 3.0

@@ -1,0 +1,279 @@
+"""The report holds the numbers of its records, escapes what comes from files, needs no network, and draws its figures."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from kincheck.core.harness.figures import SAMPLES
+from kincheck.core.harness.record import Deviation, Deviations, Results
+from kincheck.core.harness.report import headline, number, write_report
+
+from .made_up import CRANK, GRID, distances, judged, record, results, series
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"
+
+
+class Page(HTMLParser):
+    """What the tests read off a page: its text outside scripts and styles, its scripts, its tags."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self.text += " "
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.cdata_elem == "script":
+            self.scripts[-1] += data
+        elif self.cdata_elem is None:
+            self.text += data
+
+    @property
+    def data(self) -> Any:
+        island = [dict(attrs).get("type") == "application/json" for tag, attrs in self.tags if tag == "script"].index(True)
+        return json.loads(self.scripts[island], parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+def report(run: Results, folder: Path) -> Page:
+    path = folder / "report.html"
+    write_report(run, path)
+    assert path.stat().st_size < 8_000_000
+    return Page(path.read_text(encoding="utf-8"))
+
+
+def traces(page: Page, figure: str, name: str, mode: str) -> list[Any]:
+    return [trace for trace in page.data["figures"][figure]["data"] if trace["meta"] == name and trace["mode"] == mode]
+
+
+def test_figures_hold_the_outputs_in_millimetres_with_the_travel_upwards(tmp_path: Path) -> None:
+    run = results()
+    page = report(run, tmp_path)
+    assert page.data["drivers"]["case-0"] == [1000 * d for d in GRID]
+    for each in run.records[:2]:
+        [curve] = traces(page, "case-0-0", each.engine, "lines")
+        assert curve["y"] == "driver"
+        assert curve["x"] == [1000 * v for v in each.outputs["half_track_change"].position if v is not None]
+    [reference] = traces(page, "case-0-0", "reference", "lines")
+    assert reference["x"] == [1000 * v for v in series(GRID).position if v is not None]
+    layout = page.data["figures"]["case-0-0"]["layout"]
+    assert layout["xaxis"]["title"]["text"] == "half-track change [mm]"
+    assert "wheel travel [mm]" in layout["yaxis"]["title"]["text"]
+
+
+def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path: Path) -> None:
+    page = report(results(driver=CRANK | {"name": "stroke"}), tmp_path)
+    [curve] = traces(page, "case-0-0", "one", "lines")
+    assert curve["x"] == "driver"
+    assert page.data["drivers"]["case-0"] == pytest.approx([math.degrees(d) for d in GRID], rel=1e-15)
+
+
+@pytest.mark.parametrize("motion", ["position", "velocity"])
+def test_error_figures_hold_the_distances_from_the_reference(tmp_path: Path, motion: str) -> None:
+    run = results()
+    page = report(run, tmp_path)
+    for each in run.records[:2]:
+        [curve] = traces(page, f"case-0-0-{motion}", each.engine, "lines+markers")
+        deviation: Deviation = getattr(each.errors["half_track_change"], motion)
+        expected = distances(getattr(each.outputs["half_track_change"], motion), getattr(series(GRID), motion))
+        assert curve["y"] == pytest.approx(expected, rel=1e-3)  # four digits are kept
+        assert curve["y"][deviation.worst_step] == pytest.approx(deviation.max_abs, rel=1e-3)
+        assert max(curve["y"]) == pytest.approx(deviation.max_abs, rel=1e-3)
+    [ring] = traces(page, f"case-0-0-{motion}", "worst", "markers")
+    top = getattr(run.records[1].errors["half_track_change"], motion)
+    assert (ring["x"], ring["y"]) == ([1000 * GRID[top.worst_step]], [top.max_abs])
+    assert "case-0-0-acceleration" not in page.data["figures"]
+
+
+def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_with(tmp_path: Path) -> None:
+    run = results("consensus_only")
+    native, one, _ = run.records
+    nothing = Deviations(position=None, velocity=None, acceleration=None, reason="no reference: compared with nothing")
+    native = msgspec.structs.replace(native, errors=dict.fromkeys(native.errors, nothing))
+    output = {name: judged(one.outputs[name], native.outputs[name], 1e-9, "native") for name in one.outputs}
+    page = report(Results(run=run.run, records=[native, msgspec.structs.replace(one, errors=output)]), tmp_path)
+    assert traces(page, "case-0-0", "reference", "lines") == []
+    assert traces(page, "case-0-0-position", "native", "lines+markers") == []
+    [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
+    assert max(curve["y"]) == pytest.approx(output["half_track_change"].position.max_abs, rel=1e-3)  # type: ignore[union-attr]
+    assert "1 with nothing to compare with" in page.text
+    assert "no reference: compared with nothing" in page.text
+
+
+def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path: Path) -> None:
+    run = results()
+    page = report(run, tmp_path)
+    words = re.sub(r"\s+", " ", page.text)
+    worst = run.records[1].errors["half_track_change"].position
+    assert worst is not None
+    head = words[: words.index("Overview")]
+    assert "1 of 2 comparisons is outside tolerance" in head
+    assert f"Worst one on strut Error {number(worst.max_abs)} m" in head
+    assert f"At sample {worst.worst_step} of 0…20 wheel travel {1000 * GRID[worst.worst_step]:+.4g} mm".replace("-", "−") in head
+    assert "✗ fail one on strut: half_track_change: too far off" in head
+    assert "○ unavailable two on strut: two is not installed" in words
+    for told in (
+        "35 − 34 = 1",
+        "18 − 17 = 1",
+        "7231",
+        "6702",
+        "3.21e-14",
+        "321",
+        "21/21",
+        "12.5 µs/sample",
+        "iterations 20",
+        "a book",
+    ):
+        assert told in words, told
+
+
+def test_the_worst_case_leads(tmp_path: Path) -> None:
+    cases = [("good", 1e-11), ("bad", 5e-9), ("better", 1e-15)]
+    records = [record(case, "closed_form", "one", error, GRID) for case, error in cases]
+    page = report(Results(run={}, records=records), tmp_path)
+    assert "Worst one on bad" in re.sub(r"\s+", " ", page.text)
+
+
+@pytest.mark.parametrize(
+    ("truth", "said"), [("closed_form", 1), ("third_party_data", 1), ("in_house_oracle", 0), ("consensus_only", 0)]
+)
+def test_validated_is_said_of_a_pass_against_foreign_truth_only(tmp_path: Path, truth: str, said: int) -> None:
+    page = report(results(truth), tmp_path)
+    assert len(re.findall("validated", page.text)) == said
+    assert ("our own oracle is not validation" in page.text) == (truth == "in_house_oracle")
+
+
+def test_validated_names_what_was_not_judged_against_the_truth(tmp_path: Path) -> None:
+    assert "validated, positions only" in report(results("closed_form"), tmp_path).text
+
+
+def test_text_from_files_is_escaped(tmp_path: Path) -> None:
+    run = results(case=HOSTILE)
+    strange = msgspec.structs.replace(run.records[1], engine=HOSTILE, message=HOSTILE, settings={HOSTILE: HOSTILE}, version=HOSTILE)
+    named = msgspec.structs.replace(strange, outputs={HOSTILE: series(GRID)}, errors={})
+    page = report(
+        Results(run={**run.run, HOSTILE: HOSTILE}, records=[run.records[0], strange, named], references=run.references), tmp_path
+    )
+    assert len(page.scripts) == 3
+    assert not any("alert" in script for script in page.scripts[1:])
+    assert not [attrs for tag, attrs in page.tags if tag == "a" and not (attrs["href"] or "").startswith("#")]
+    assert page.text.count("<script>alert('x')</script>") > 5
+    shown = [trace.get("name", "") for figure in page.data["figures"].values() for trace in figure["data"]]
+    shown += [figure["layout"][axis]["title"]["text"] for figure in page.data["figures"].values() for axis in ("xaxis", "yaxis")]
+    assert not any("<" in text for text in shown)
+    assert any("&lt;script&gt;" in text for text in shown)
+
+
+def test_nothing_is_fetched(tmp_path: Path) -> None:
+    page = report(results(), tmp_path)
+    assert not [tag for tag, _ in page.tags if tag in ("link", "img", "iframe", "object", "embed", "base")]
+    assert not [attrs for tag, attrs in page.tags if tag == "script" and "src" in attrs]
+    policy = [attrs["content"] for tag, attrs in page.tags if attrs.get("http-equiv") == "Content-Security-Policy"]
+    assert policy
+    assert str(policy[0]).startswith("default-src 'none'")
+    assert "http" not in str(policy[0])
+
+
+def test_what_was_not_computed_leaves_a_gap_and_no_number(tmp_path: Path) -> None:
+    run = results()
+    whole = run.records[1]
+    holed = [None if k == 4 else math.nan if k == 5 else v for k, v in enumerate(series(GRID, 3e-9).position)]
+    output = msgspec.structs.replace(whole.outputs["half_track_change"], position=holed)
+    broken = msgspec.structs.replace(whole, outputs={"half_track_change": output}, solved=19, us_per_step=None, rank=None)
+    page = report(Results(run=run.run, records=[broken], references=run.references), tmp_path)
+    [curve] = traces(page, "case-0-0", "one", "lines")
+    assert [k for k, value in enumerate(curve["x"]) if value is None] == [4, 5]
+    [errors] = traces(page, "case-0-0-position", "one", "lines+markers")
+    assert [k for k, value in enumerate(errors["y"]) if value is None] == [4, 5]
+    assert "19 of 21 samples were solved" in page.text
+    assert "µs/sample" not in page.text[page.text.index("Overview") : page.text.index("Engines")].replace("time per", "")
+
+
+def test_zero_errors_stay_zero_and_the_floor_is_below_all_others(tmp_path: Path) -> None:
+    figure = report(results(), tmp_path).data["figures"]["case-0-0-position"]
+    errors = [e for trace in figure["data"] if trace["mode"] == "lines+markers" for e in trace["y"]]
+    assert 0 in errors
+    assert 0 < figure["layout"]["meta"]["floor"] < min(e for e in errors if e)
+    assert figure["layout"]["yaxis"]["ticktext"][0] == "exactly 0"
+
+
+def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
+    driver = [1e-4 * k for k in range(3 * SAMPLES)]
+    spike = 1234
+    found = series(driver)
+    position = [v + (1e-7 if k == spike else 0.0) for k, v in enumerate(found.position) if v is not None]
+    output = msgspec.structs.replace(found, position=position)
+    errors = {"half_track_change": judged(output, series(driver), 1e-9, "closed_form")}
+    long = record("strut", "closed_form", "one", 0, driver, outputs={"half_track_change": output}, errors=errors)
+    run = Results(run=results().run, records=[long], references={"strut": {"half_track_change": series(driver)}})
+    page = report(run, tmp_path)
+    [curve] = traces(page, "case-0-0", "one", "lines")
+    assert SAMPLES <= len(curve["x"]) <= SAMPLES + 2
+    assert len(page.data["drivers"]["case-0"]) == len(curve["x"])
+    [drawn] = traces(page, "case-0-0-position", "one", "lines+markers")
+    assert max(drawn["y"]) == pytest.approx(1e-7, rel=1e-3)
+    assert "Thinned figures: strut" in page.text
+
+
+def test_an_empty_run_says_so(tmp_path: Path) -> None:
+    assert headline([]) == "Nothing was compared"
+    assert "Nothing was compared" in report(Results(run={}, records=[]), tmp_path).text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "–"), (0.0, "0"), (1.25e-16, "1.25e-16"), (1e-9, "1e-9"), (12.345, "12.3"), (1543.2, "1543"), (2e7, "2e7")],
+)
+def test_numbers_are_short_and_a_dash_is_no_zero(value: float | None, text: str) -> None:
+    assert number(value) == text
+
+
+def in_chromium(path: Path, profile: Path) -> tuple[str, list[str]]:
+    """The document after its scripts have run, and what they wrote to the console."""
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"]
+    flags += ["--disable-component-update", "--disable-sync", "--enable-logging=stderr", "--v=0", "--virtual-time-budget=20000"]
+    command = [str(CHROMIUM), *flags, f"--user-data-dir={profile}", "--dump-dom", path.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+def test_a_browser_draws_every_figure_and_the_controls_work(tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    write_report(results(case=HOSTILE), path)
+    act = """<script>addEventListener("load", () => setTimeout(() => {
+      document.querySelector("button[data-series=one]").click();
+      const select = document.querySelector("select");
+      select.value = "case-0-1";
+      select.dispatchEvent(new Event("change"));
+      document.body.dataset.shown = [...document.querySelectorAll(".plot")].filter((plot) => plot.offsetHeight).length;
+    }, 2000));</script></body>"""
+    before, console = in_chromium(path, tmp_path / "profile")
+    assert console == []
+    assert before.count('data-drawn="yes"') == 4  # two outputs; position and velocity errors of one
+    assert before.count('class="main-svg"') >= 4
+    # An output: the reference, and lines and markers of native and one. An error: their curves and zeros, and the ring.
+    assert before.count('class="trace scatter trace') == 4 * 5
+    path.write_text(path.read_text(encoding="utf-8").replace("</body>", act), encoding="utf-8")
+    after, console = in_chromium(path, tmp_path / "profile")
+    assert console == []
+    assert after.count('data-drawn="yes"') == 6
+    assert 'data-shown="4"' in after
+    assert re.search(r'aria-pressed="false" data-series="one"', after)
+    assert after.count('class="trace scatter trace') == 6 * 3

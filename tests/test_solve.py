@@ -1,0 +1,285 @@
+"""The McPherson strut against its 40-digit reference and against the paper's unsimplified equations; what is asked is computed."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck.core import Body, Fixed, JointDisplacement, Mechanism, Point, Revolute, Translational, Universal
+from kincheck.core.analysis.equations import Style
+from kincheck.core.analysis.solve import solve
+from kincheck.core.joints import Joint
+
+from . import naive
+from .mechanisms import four_bar, mcpherson, slider_crank, swapped, without_fixed_bodies
+
+STROKES = np.linspace(-0.08, 0.08, 161)
+MOVING = ("lca", "knuckle", "strut")
+
+
+@cache
+def reference():
+    """Columns by name, shape (161,) each."""
+    table = np.genfromtxt(Path(__file__).parent / "data" / "mcpherson_reference.csv", delimiter=",", names=True, skip_header=2)
+    assert table.shape == (161,)
+    return {name: table[name] for name in table.dtype.names}
+
+
+@cache
+def solution(style="native"):
+    found = solve(mcpherson(), "stroke", STROKES, bodies=MOVING, style=style)
+    assert found.solved.all()
+    return found
+
+
+def deviation(found, *columns):
+    return np.abs(found - np.column_stack([reference()[name] for name in columns])).max()
+
+
+# Against the reference
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+def test_wheel_against_the_reference(style):
+    """Round-off of numbers near one, amplified by the condition (36) and the second derivatives (3 1/m)."""
+    wheel = solution(style).points["wheel"]
+    assert deviation(wheel.position, "x_W", "y_W", "z_W") <= 5e-16
+    assert deviation(wheel.velocity[:, :2], "vx", "vy") <= 1e-14
+    assert deviation(wheel.acceleration[:, :2], "ax", "ay") <= 1e-13
+    assert np.abs(wheel.velocity[:, 2] - 1.0).max() <= 1e-15
+    assert np.abs(wheel.acceleration[:, 2]).max() <= 1e-14
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+def test_knuckle_against_the_reference(style):
+    """The body's own frame, in the paper's variables: its origin is the wheel centre."""
+    knuckle = solution(style).bodies["knuckle"]
+    assert deviation(knuckle.r, "x_W", "y_W", "z_W") <= 5e-16
+    assert deviation(knuckle.p, "e0", "e1", "e2", "e3") <= 1e-15
+    assert np.abs(np.linalg.norm(knuckle.p, axis=1) - 1.0).max() <= 5e-16
+
+
+def test_iterations_and_residual():
+    found = solution()
+    assert found.iterations.max() <= 4
+    assert found.iterations.min() >= 1
+    assert found.residual <= 1e-15
+    assert found.message == ""
+
+
+# Against the unsimplified equations
+
+
+def universal_chain():
+    """A crank that drives, through a universal joint, a shaft askew, with a plate welded on."""
+    return Mechanism(
+        "cardan",
+        [Body("crank", (0.1, 0.2, 0.3), (0.5, 0.5, -0.5, 0.5)), Body("shaft", (0.0, 0.3, 1.5)), Body("plate", (0.2, 0.0, 2.0))],
+        [
+            Revolute("in", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+            Universal("cross", "crank", "shaft", (0.0, 0.0, 1.0), ((1.0, 0.0, 0.0), (0.0, 0.8, -0.6))),
+            Revolute("out", "shaft", "ground", (0.0, 0.6, 1.8), (0.0, 0.6, 0.8)),
+            Fixed("weld", "shaft", "plate"),
+        ],
+        [Point("tip", "plate", (0.3, 0.5, 2.0))],
+        [replace(four_bar().driver("turn"), joint="in")],
+    )
+
+
+SWEEPS = {
+    "mcpherson": (mcpherson, "stroke", np.linspace(-0.08, 0.08, 5)),
+    "slider_crank": (slider_crank, "turn", np.linspace(-4.0, 9.0, 5)),
+    "four_bar": (four_bar, "turn", np.linspace(-4.0, 9.0, 5)),
+    "universal_chain": (universal_chain, "turn", np.linspace(-4.0, 9.0, 5)),
+}
+
+
+def test_the_sweeps_cover_every_joint_type():
+    """A joint type that is in no mechanism here has not been compared with its unsimplified equations."""
+    types = {joint.type for make, *_ in SWEEPS.values() for joint in make().joints}
+    covered = {name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck.")}
+    assert covered - types == set(), "add a mechanism with these joints to SWEEPS, and their equations to naive.JOINTS"
+    assert covered <= set(naive.JOINTS)
+
+
+def moving_bodies(mechanism, found, k):
+    """One sample: name -> r, p, v, a."""
+    return {body.name: tuple(x[k] for x in vars(found.bodies[body.name]).values()) for body in mechanism.moving}
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+@pytest.mark.parametrize("write", [lambda m: m, swapped], ids=["as given", "swapped"])
+@pytest.mark.parametrize("name", SWEEPS)
+def test_the_papers_equations_hold(name, write, style):
+    """Residuals of all joints at the solved poses, and their first two derivatives by time along r, p, v and a.
+
+    omega' and its derivative enter through pdot and pddot: another frame or sign of theirs would show. All joints hold
+    undriven, so every derivative is zero; redundant rows are among them.
+    """
+    make, driver, values = SWEEPS[name]
+    mechanism = write(make())
+    found = solve(mechanism, driver, values, rate=1.3, bodies=[body.name for body in mechanism.moving], style=style)
+    assert found.solved.all()
+    for k in range(len(values)):
+        path = naive.along(moving_bodies(mechanism, found, k))
+        phi, phi_t, phi_tt = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
+        assert np.abs(naive.residuals(mechanism, path(0.0))).max() <= 2e-15
+        assert np.abs(phi).max() <= 4e-15
+        # speeds reach 4 m/s, accelerations 10 m/s^2; the circle of 0.1 s costs one and two digits
+        assert np.abs(phi_t).max() <= 1e-13
+        assert np.abs(phi_tt).max() <= 1e-11
+
+
+def test_wrong_angular_velocities_would_show():
+    """The check above has teeth: omega' in the wrong frame or with the wrong sign breaks it by orders of magnitude."""
+    mechanism, found = mcpherson(), solution()
+    r, p, v, a = moving_bodies(mechanism, found, 0)["knuckle"]
+    A = naive.A(p)
+    for wrong in (A @ v[3:], -v[3:]):
+        bodies = moving_bodies(mechanism, found, 0) | {"knuckle": (r, p, np.r_[v[:3], wrong], a)}
+        assert np.abs(naive.taylor(lambda t, b=bodies: naive.residuals(mechanism, naive.along(b)(t)))[1]).max() > 1e-2
+    bodies = moving_bodies(mechanism, found, 0) | {"knuckle": (r, p, v, np.r_[a[:3], A @ a[3:]])}
+    assert np.abs(naive.taylor(lambda t: naive.residuals(mechanism, naive.along(bodies)(t)))[2]).max() > 1e-2
+
+
+def test_points_are_carried_by_their_bodies():
+    """Position, velocity and acceleration of a point by the bodies' r, p, omega' alone."""
+    mechanism, found = mcpherson(), solution()
+    arm = naive.arm(naive.design(mechanism)["knuckle"], mechanism.point("rod_end").position)
+    for k in range(0, 161, 20):
+        r, p, v, a = moving_bodies(mechanism, found, k)["knuckle"]
+        A, w, w_t = naive.A(p), naive.tilde(v[3:]), naive.tilde(a[3:])
+        rod_end = found.points["rod_end"]
+        assert rod_end.position[k] == pytest.approx(r + A @ arm, abs=5e-16)
+        assert rod_end.velocity[k] == pytest.approx(v[:3] + A @ w @ arm, abs=5e-15)
+        assert rod_end.acceleration[k] == pytest.approx(a[:3] + A @ (w_t + w @ w) @ arm, abs=5e-14)
+
+
+# What is asked for, and no more
+
+
+def flops(found):
+    return {name: size["flops"] for name, size in found.details["program"].items()}
+
+
+def test_lower_orders_give_the_same_and_cost_less():
+    by_order = [solve(mcpherson(), "stroke", STROKES, bodies=MOVING, order=order) for order in (0, 1, 2)]
+    position, velocity, acceleration = by_order
+    for found in by_order:
+        assert (found.points["wheel"].position == acceleration.points["wheel"].position).all()
+        assert (found.bodies["strut"].p == acceleration.bodies["strut"].p).all()
+    assert position.points["wheel"].velocity is None
+    assert position.bodies["strut"].v is None
+    assert velocity.points["wheel"].acceleration is None
+    assert velocity.bodies["strut"].a is None
+    assert (velocity.points["wheel"].velocity == acceleration.points["wheel"].velocity).all()
+    assert (velocity.bodies["strut"].v == acceleration.bodies["strut"].v).all()
+    cost = [sum(flops(found).get(name, 0) for name in ("newton", "motion", "outputs")) for found in by_order]
+    assert cost[0] < cost[1] < cost[2]
+    assert "motion" not in flops(position)
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+def test_fixed_bodies_cost_nothing(style):
+    """Chassis and rack as fixed bodies, or as the ground itself: the same programs, the same bits."""
+    free, fixed = (solve(each, "stroke", STROKES, style=style) for each in (without_fixed_bodies(mcpherson()), mcpherson()))
+    assert flops(free) == flops(fixed)
+    assert (free.points["wheel"].position == fixed.points["wheel"].position).all()
+    assert free.details["rank"] == fixed.details["rank"]
+
+
+def test_only_what_is_asked_for_is_there():
+    everything = solve(mcpherson(), "stroke", [0.0, 0.01], bodies=MOVING)
+    assert set(everything.points) == {"wheel", "rod_end"}
+    assert set(everything.bodies) == set(MOVING)
+    little = solve(mcpherson(), "stroke", [0.0, 0.01], points=["rod_end"])
+    assert set(little.points) == {"rod_end"}
+    assert little.bodies == {}
+    nothing = solve(mcpherson(), "stroke", [0.0, 0.01], points=[])
+    assert nothing.points == {}
+    assert flops(nothing)["outputs"] < flops(little)["outputs"] < flops(everything)["outputs"]
+    assert flops(nothing)["newton"] == flops(everything)["newton"]
+
+
+def test_fixed_bodies_and_their_points_stay():
+    mechanism = mcpherson()
+    mechanism = replace(mechanism, points=[*mechanism.points, Point("top", "chassis", (1.0, 0.55, 0.6))])
+    found = solve(mechanism, "stroke", [-0.05, 0.05], points=["top"], bodies=["rack"])
+    top, rack = found.points["top"], found.bodies["rack"]
+    assert (top.position == (1.0, 0.55, 0.6)).all()
+    assert not top.velocity.any()
+    assert not top.acceleration.any()
+    assert (rack.r == (1.14, 0.0, 0.1455)).all()
+    assert not rack.v.any()
+    assert not rack.a.any()
+
+
+# More than one driver
+
+
+def steered():
+    """The strut with a rack that can slide."""
+    base = mcpherson()
+    rack = Translational("rack_guide", "chassis", "rack", (1.14, 0.0, 0.1455), (0.0, 1.0, 0.0))
+    bodies = [replace(body, fixed=body.name == "chassis") for body in base.bodies]
+    return replace(
+        base, bodies=bodies, joints=[*base.joints, rack], drivers=[*base.drivers, JointDisplacement("steer", "rack_guide")]
+    )
+
+
+def test_a_held_driver_holds():
+    held = solve(steered(), "stroke", STROKES)
+    assert np.abs(held.points["wheel"].position - solution().points["wheel"].position).max() <= 5e-16
+    assert np.abs(held.points["wheel"].acceleration - solution().points["wheel"].acceleration).max() <= 1e-13
+
+
+def test_a_driven_displacement():
+    """Steering with the stroke held: the rack moves as driven, all joints hold, the wheel keeps its height."""
+    mechanism, values = steered(), np.linspace(-0.03, 0.05, 9)
+    found = solve(mechanism, "steer", values, rate=0.2, bodies=[*MOVING, "rack"])
+    assert found.solved.all()
+    rack = found.bodies["rack"]
+    assert rack.r - (1.14, 0.0, 0.1455) == pytest.approx(np.outer(values, (0.0, 1.0, 0.0)), abs=1e-16)
+    assert rack.v == pytest.approx(np.tile((0.0, 0.2, 0.0, 0.0, 0.0, 0.0), (9, 1)), abs=1e-15)
+    assert np.abs(found.points["wheel"].position[:, 2] - 0.101).max() <= 2e-16
+    for k in range(len(values)):
+        path = naive.along(moving_bodies(mechanism, found, k))
+        parts = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
+        assert [np.abs(part).max() < limit for part, limit in zip(parts, (2e-15, 1e-13, 1e-11), strict=True)] == [True] * 3
+
+
+def test_swept_from_either_end_the_two_drivers_meet():
+    """Stroke at a steered design and steering at a stroked one pass through the same pose."""
+    corner = {}
+    for first, second, a, b in (("stroke", "steer", 0.03, 0.02), ("steer", "stroke", 0.02, 0.03)):
+        at = moved_to(steered(), first, a)
+        corner[first] = solve(at, second, [b]).points["rod_end"].position[0]
+    assert corner["stroke"] == pytest.approx(corner["steer"], abs=1e-14)
+
+
+def moved_to(mechanism, driver, value):
+    """The mechanism as designed at another driver value: points and axes taken along with their bodies."""
+    found = solve(mechanism, driver, [value], bodies=[body.name for body in mechanism.moving])
+    before = naive.design(mechanism)
+    now = before | {name: naive.Body(each.r[0], each.p[0]) for name, each in found.bodies.items()}
+
+    def carried(body, point):
+        return tuple(now[body].r + now[body].A @ naive.arm(before[body], point))
+
+    def turned(body, axis):
+        return tuple(now[body].A @ before[body].A.T @ np.array(axis))
+
+    joints = []
+    for joint in mechanism.joints:
+        changes = {}
+        if hasattr(joint, "point"):
+            changes["point"] = carried(joint.i, joint.point)
+        if hasattr(joint, "axis"):
+            changes["axis"] = turned(joint.i, joint.axis)
+        if hasattr(joint, "points"):
+            changes["points"] = tuple(carried(*each) for each in zip(joint.bodies, joint.points, strict=True))
+        joints.append(replace(joint, **changes))
+    bodies = [replace(b, origin=tuple(now[b.name].r), euler_parameters=tuple(now[b.name].p)) for b in mechanism.bodies]
+    points = [replace(point, position=carried(point.body, point.position)) for point in mechanism.points]
+    return replace(mechanism, bodies=bodies, joints=joints, points=points)
