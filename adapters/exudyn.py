@@ -97,7 +97,7 @@ class ExudynModel:
         self._add_bodies()
         for joint in self.mechanism.joints:
             _JOINTS[type(joint)](self, joint)
-        drives = {driver.name: _DRIVERS[type(driver)](self, driver) for driver in self.mechanism.drivers}
+        self.drives = [_DRIVERS[type(driver)](self, driver) for driver in self.mechanism.drivers]
         self.mbs.Assemble()
 
         self.settings: Any = exu.SimulationSettings()
@@ -113,10 +113,10 @@ class ExudynModel:
         self.kept = self.unknowns + np.array(constraints + normalisation)
         self.target = np.array([value for *_, value in self.rows] + [0.0] * len(normalisation))
 
-        self.drive = drives[case.sweep.driver]
-        self.drive_frame: Array = np.array(self.mbs.GetMarkerParameter(self.drive.marker, "localHT"))
-        self.rates = np.zeros(len(self.kept))
-        self.rates[self.drive.row] = self.drive.rate
+        self.drive_frames = [np.array(self.mbs.GetMarkerParameter(drive.marker, "localHT")) for drive in self.drives]
+        self.columns = np.zeros((len(self.kept), len(self.drives)))
+        for k, drive in enumerate(self.drives):
+            self.columns[drive.row, k] = drive.rate
         points = [(self.bodies[point.body], np.array(point.position)) for point in map(self.mechanism.point, case.points)]
         self.wanted = [(number, position - origin) for (number, origin), position in points]
         kinds = exu.OutputVariableType
@@ -180,8 +180,9 @@ class ExudynModel:
         q[:, 3:] = parameters / np.linalg.norm(parameters, axis=1, keepdims=True) - NO_ROTATION
         self.restore(q.ravel())
 
-    def residual(self, c: float) -> Array:
-        self.mbs.SetMarkerParameter(self.drive.marker, "localHT", self.drive_frame @ self.drive.move(c))
+    def residual(self, c: Array) -> Array:
+        for drive, frame, value in zip(self.drives, self.drive_frames, c, strict=True):
+            self.mbs.SetMarkerParameter(drive.marker, "localHT", frame @ drive.move(value))
         self.solver.ComputeAlgebraicEquations(self.mbs)
         return self.solver.GetSystemResidual()[self.kept] - self.target
 
@@ -190,8 +191,8 @@ class ExudynModel:
         self.solver.ComputeNewtonJacobian(self.mbs, self.settings)
         return self.solver.GetSystemJacobian()[self.kept, : self.unknowns]
 
-    def rate_rows(self) -> Array:
-        return self.rates
+    def driver_columns(self) -> Array:
+        return self.columns
 
     def bias(self, v: Array) -> Array:
         # The driven frame rests meanwhile: where the rows are met, the terms that its motion would add are all zero.

@@ -202,11 +202,10 @@ class _Model:
         self.tendons = [(row, each.i, each.j) for row, each in enumerate(owners) if each.kind == "tendon"]
         self.present: slice | NDArray[np.intp] = slice(self.n)
         self.A = np.zeros((self.n + len(mechanism.drivers), self.m.nv))
-        self.nu = np.zeros(len(self.A))
+        self.columns = np.eye(len(self.A))[:, self.n :]  # the rows of the drivers are the last
         self.coordinates: list[tuple[int, int, float]] = []  # row, address in qpos, sign
         self.pulled: list[tuple[int, int, Array, Array]] = []  # row, site, unit direction, design position
         for row, driver in enumerate(mechanism.drivers, start=self.n):
-            self.nu[row] = driver.name == case.sweep.driver
             if isinstance(driver, PointCoordinate):
                 direction, start = np.array(driver.direction), np.array(mechanism.point(driver.point).position)
                 self.pulled.append((row, int(sites[driver.point].id), direction / np.linalg.norm(direction), start))
@@ -228,7 +227,7 @@ class _Model:
     def move(self, dx: Array) -> None:
         self.mj.mj_integratePos(self.m, self.d.qpos, dx, 1.0)
 
-    def residual(self, c: float) -> Array:
+    def residual(self, c: Array) -> Array:
         mj, m, d = self.mj, self.m, self.d
         mj.mj_kinematics(m, d)
         mj.mj_comPos(m, d)
@@ -236,7 +235,7 @@ class _Model:
         mj.mj_makeConstraint(m, d)
         # MuJoCo leaves out an equality while its whole Jacobian is zero; the rest keeps its order, efc_J its full length
         self.present = slice(self.n) if d.ne == self.n else np.flatnonzero(np.isin(self.owner, d.efc_id))
-        r = -c * self.nu
+        r = -(self.columns @ c)
         r[self.present] = d.efc_pos
         if d.ne != self.n:
             for k in set(range(len(self.closures))).difference(d.efc_id.tolist()):
@@ -254,8 +253,8 @@ class _Model:
             self.A[row] = direction @ self.slope(site)
         return self.A
 
-    def rate_rows(self) -> Array:
-        return self.nu
+    def driver_columns(self) -> Array:
+        return self.columns
 
     def bias(self, v: Array) -> Array:
         d, b = self.d, np.zeros(len(self.A))

@@ -38,8 +38,8 @@ class Native:
 
     def build(self, case: Case) -> Model:
         """Select the rows and trace the programs for the points that the outputs read."""
-        return compile_model(case.mechanism, Request(case.sweep.driver, case.points))
+        return compile_model(case.mechanism, Request(tuple(case.sweep.path.motions), case.points))
 
     def solve(self, model: Model, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""
-        return sweep(model, case.sweep.change, case.sweep.rate, tol)
+        return sweep(model, case.sweep.path, tol)

@@ -123,8 +123,7 @@ class _Model:
         ends = np.cumsum([each.n for each in self.conditions])
         self.slices = [slice(end - each.n, end) for end, each in zip(ends, self.conditions, strict=True)]
         self.J = np.zeros((ends[-1], self.model.nv))
-        self.swept = np.zeros(ends[-1])
-        self.swept[[driver.name for driver in mechanism.drivers].index(case.sweep.driver) - len(mechanism.drivers)] = 1.0
+        self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]  # the rows of the drivers are the last
         self.data = self.model.createData()
         self.reset()
 
@@ -154,10 +153,10 @@ class _Model:
     def move(self, dx: Array) -> None:
         self.q = self.pin.integrate(self.model, self.q, dx)
 
-    def residual(self, c: float) -> Array:
+    def residual(self, c: Array) -> Array:
         self.pin.computeJointJacobians(self.model, self.data, self.q)
         self.pin.updateFramePlacements(self.model, self.data)
-        r = -c * self.swept
+        r = -(self.columns @ c)
         for rows, condition in zip(self.slices, self.conditions, strict=True):
             phi, self.J[rows] = condition.rows()
             r[rows] += phi
@@ -166,13 +165,13 @@ class _Model:
     def jacobian(self) -> Array:
         return self.J
 
-    def rate_rows(self) -> Array:
-        return self.swept
+    def driver_columns(self) -> Array:
+        return self.columns
 
     def bias(self, v: Array) -> Array:
         # with no acceleration of the coordinates, a frame's acceleration is its Jdot v
         self.pin.forwardKinematics(self.model, self.data, self.q, v, np.zeros_like(v))
-        bias = np.empty_like(self.swept)
+        bias = np.empty(len(self.J))
         for rows, condition in zip(self.slices, self.conditions, strict=True):
             bias[rows] = condition.bias()
         return bias

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..core.analysis.continuity import continuous
 from ..core.errors import SolveError
 from ..core.harness.case import Case
+from ..core.motions import Path
 from ..core.trajectory import Array, PointMotion, Trajectory
 
 MAX_ITERATIONS = 20
@@ -48,16 +49,16 @@ class ProjectionModel(Protocol):
         """Advance the configuration by dx, shape (unknowns,)."""
         ...
 
-    def residual(self, c: float) -> Array:
-        """All rows with the swept driver at c, measured from the design position (`Sweep.change`), shape (rows,)."""
+    def residual(self, c: Array) -> Array:
+        """All rows with the drivers at c, in the mechanism's order, from their design values, shape (rows,)."""
         ...
 
     def jacobian(self) -> Array:
         """Derivative of the rows by dx, shape (rows, unknowns); a copy, or valid until the next call."""
         ...
 
-    def rate_rows(self) -> Array:
-        """Derivative of the rows by c, negated: J v = rate * rate_rows, shape (rows,)."""
+    def driver_columns(self) -> Array:
+        """Derivative of the rows by c, negated: J v = driver_columns c_t, shape (rows, drivers)."""
         ...
 
     def bias(self, v: Array) -> Array:
@@ -73,7 +74,7 @@ class ProjectionModel(Protocol):
 class _Sample:
     """A solved pose: everything the walk needs to go on from there."""
 
-    c: float
+    t: float
     saved: Any
     x: Array
     v: Array
@@ -90,10 +91,11 @@ def solve_by_projection(model: ProjectionModel, case: Case, tol: float, details:
 class _Walk:
     def __init__(self, model: ProjectionModel, case: Case, tol: float) -> None:
         self.model, self.case, self.tol = model, case, tol
+        self.drivers = [driver.name for driver in case.mechanism.drivers]
         corners = [np.asarray(case.mechanism.point(name).position) for name in case.points]
         self.size = max(1e-3, float(np.ptp(np.stack([*corners, *_joint_points(case)]), axis=0).max()))
         model.reset()
-        model.residual(0.0)
+        model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
         singular = np.linalg.svd(jacobian, compute_uv=False)
         self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
@@ -111,8 +113,8 @@ class _Walk:
             return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
         return np.asarray(np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0], dtype=np.float64)
 
-    def newton(self, c: float) -> tuple[int, float] | None:
-        """Iterations and final residual at driver value c, or None."""
+    def newton(self, c: Array) -> tuple[int, float] | None:
+        """Iterations and final residual at driver values c, or None."""
         met = False
         for iteration in range(1, MAX_ITERATIONS + 1):
             r = self.model.residual(c)
@@ -131,62 +133,79 @@ class _Walk:
             self.model.move(step)
         return None
 
-    def solve(self, c: float) -> _Sample | None:
-        """Position, velocity and acceleration at driver value c from the current configuration, or None."""
+    def solve(self, path: Path, t: float) -> _Sample | None:
+        """Position, velocity and acceleration on a path at time t from the current configuration, or None."""
+        c, c_t, c_tt = path.drive(self.drivers, np.array([t]))[..., 0]
         done = self.newton(c)
         if done is None:
             return None
-        jacobian = np.array(self.model.jacobian())
-        nu = self.case.sweep.rate * self.model.rate_rows()
+        jacobian, columns = np.array(self.model.jacobian()), self.model.driver_columns()
+        nu = columns @ c_t
         try:
             v = self.linear(jacobian, nu)
-            a = self.linear(jacobian, -self.model.bias(v))
+            gamma = columns @ c_tt - self.model.bias(v)
+            a = self.linear(jacobian, gamma)
         except np.linalg.LinAlgError:
             return None
-        # least squares would hide a velocity that no row set can meet (a driver pushed at a dead centre)
-        if not np.abs(jacobian @ v - nu).max() <= 1e-6 * (1.0 + np.abs(nu).max()):
+        # least squares would hide rates that no row set can meet (a driver pushed at a dead centre)
+        if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
             return None
         position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
-        return _Sample(c, self.model.save(), position.ravel(), v, (position, velocity, acceleration), *done)
+        return _Sample(t, self.model.save(), position.ravel(), v, (position, velocity, acceleration), *done)
 
-    def advance(self, start: _Sample, c: float, step: float) -> tuple[_Sample, bool]:
-        """Walk from start to c, halving steps that fail; (where it ended, whether that is c)."""
-        at, h = start, c - start.c
-        while at.c != c:
-            to = c if abs(c - at.c) <= abs(h) else at.c + h
-            dt = (to - at.c) / self.case.sweep.rate
+    def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
+        """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t)."""
+        at, h = start, t - start.t
+        while at.t != t:
+            to = t if abs(t - at.t) <= abs(h) else at.t + h
+            dt = to - at.t
             self.model.restore(at.saved)
             self.model.move(dt * at.v)
-            new = self.solve(to)
+            new = self.solve(path, to)
             if new is not None and bool(
                 continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), np.float64(dt), self.size)
             ):
                 at, h = new, 2.0 * h
             else:
-                h = 0.5 * min(abs(h), abs(c - at.c)) * math.copysign(1.0, h)
+                h = 0.5 * min(abs(h), abs(t - at.t)) * math.copysign(1.0, h)
                 if abs(h) < SMALLEST_STEP * step:
                     return at, False
         return at, True
 
+    def start(self, path: Path) -> tuple[_Sample | None, str]:
+        """The pose the samples are reached from: the design, or the first sample where the design is not on the path."""
+        self.model.reset()
+        lead_in = path if path.from_design else path.lead_in()
+        design = self.solve(lead_in, 0.0)
+        if design is None:
+            return None, "no assembly at the design position: the model does not close there"
+        if path.from_design:
+            return design, ""
+        first, reached = self.advance(lead_in, design, 1.0, 1.0)
+        if not reached:
+            return None, f"the drivers reach only {first.t:.3g} of the way from the design to the first sample; start nearer"
+        self.model.restore(first.saved)
+        return self.solve(path, float(path.times[0])), ""
+
     def trajectory(self, details: Mapping[str, Any]) -> Trajectory:
-        values = self.case.sweep.change
-        n, points = len(values), self.case.points
+        path, points = self.case.sweep.path, self.case.points
+        times, n = path.times, len(path.times)
         motion = np.full((3, n, len(points), 3), np.nan)
         iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)
         solved, messages = np.zeros(n, dtype=np.bool_), list[str]()
-        self.model.reset()
-        design = self.solve(0.0)
-        if design is None:
-            messages.append("no assembly at the design position: the model does not close there")
+        origin, message = self.start(path)
+        if origin is None:
+            messages.append(message)
         else:
-            step = float(np.abs(np.diff(values)).max()) if n > 1 else abs(float(values[0])) or 1.0
-            outward = np.argsort(np.abs(values), kind="stable")
-            for side in (outward[values[outward] >= 0], outward[values[outward] < 0]):
-                at = design
+            step = float(np.abs(np.diff(times)).max()) if n > 1 else abs(float(times[0])) or 1.0
+            outward = np.argsort(np.abs(times - origin.t), kind="stable")
+            ahead = times[outward] >= origin.t
+            for side in (outward[ahead], outward[~ahead]):
+                at = origin
                 for k in side:
-                    at, reached = self.advance(at, float(values[k]), step)
+                    at, reached = self.advance(path, at, float(times[k]), step)
                     if not reached:
-                        messages.append(_stopped(self.case, side, solved, at.c, float(values[k])))
+                        messages.append(_stopped(path, side[solved[side]], at.t, int(k)))
                         break
                     motion[:, k] = at.rows
                     iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
@@ -195,12 +214,16 @@ class _Walk:
         return Trajectory(moves, solved, iterations, float(residual.max(initial=0.0)), "; ".join(messages), facts)
 
 
-def _stopped(case: Case, side: NDArray[np.intp], solved: NDArray[np.bool_], at: float, wanted: float) -> str:
-    reached = [float(case.sweep.change[k]) for k in side if solved[k]]
-    last = f"last reachable sample {reached[-1]:.9g}" if reached else "no sample reached on this side of the design"
+def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
+    # a millionth: far above round-off, far below a row that is not met
+    return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))
+
+
+def _stopped(path: Path, reached: NDArray[np.intp], t: float, wanted: int) -> str:
+    last = f"last reachable sample at {path.where(float(path.times[reached[-1]]))}" if len(reached) else "no sample reached on this side"
     return (
-        f"driver {case.sweep.driver!r} cannot be followed beyond {at:.9g} (wanted {wanted:.9g}): Newton does not converge "
-        f"or jumps to another assembly; {last}; shorten the sweep or drive another coordinate"
+        f"cannot be followed beyond {path.where(t)} (wanted {path.where(path.times[wanted])}): Newton does not converge or jumps "
+        f"to another assembly; {last}; shorten the sweep or drive another coordinate"
     )
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -90,6 +91,43 @@ class Table(Motion):
 
         spline = CubicSpline(self.times, self.values, bc_type="natural")
         return spline(t), spline(t, 1), spline(t, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The way a mechanism is driven: the motions of its drivers over time; drivers without a motion hold their design value.
+
+    Attributes:
+        motions: by driver name.
+        times: of the samples, in the order wanted [s], shape (n,).
+        design: values of drivers at the design position where they are not zero; for messages.
+    """
+
+    motions: Mapping[str, Motion]
+    times: Array
+    design: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def where(self, t: float) -> str:
+        """The values of the moving drivers at time t, to read."""
+        values = self.drive(list(self.motions), np.array([t]))[0, :, 0]
+        named = zip(self.motions, values, strict=True)
+        return ", ".join(f"{name} = {self.design.get(name, 0.0) + value:.9g}" for name, value in named)
+
+    @property
+    def from_design(self) -> bool:
+        """Whether the mechanism is at its design position at time zero, and so can be followed from there both ways."""
+        return all(float(motion.at(np.zeros(1))[0][0]) == 0.0 for motion in self.motions.values())
+
+    def drive(self, names: Sequence[str], t: Array) -> Array:
+        """Value, velocity and acceleration of the named drivers at times t, shape (3, names, *t.shape)."""
+        still = (np.zeros_like(t),) * 3
+        return np.stack([np.stack(self.motions[name].at(t) if name in self.motions else still) for name in names], axis=1)
+
+    def lead_in(self) -> Path:
+        """The straight way of all drivers from the design at time zero to the first sample, at time one."""
+        first = self.times[:1]
+        ramps = {name: Ramp(float(motion.at(first)[0][0])) for name, motion in self.motions.items()}
+        return Path(ramps, np.ones(1))
 
 
 def _finite(who: str, **numbers: float) -> None:

@@ -3,7 +3,7 @@
 import importlib
 import pkgutil
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields, replace
 
 import numpy as np
 from kincheck.core import primitives as p
@@ -200,6 +200,16 @@ def driven_angle(rng):
     return Specimen(p.DrivenAngle(h, drive.numbers), drive, turn)
 
 
+def named_turn(rng):
+    specimen = driven_angle(rng)
+    return replace(specimen, primitive=p.NamedTurn(specimen.primitive.h, specimen.drive.numbers))
+
+
+def named_slide(rng):
+    drive, arms = driver_motion(rng), [vector(rng) for _ in range(3)]
+    return Specimen(p.NamedSlide(*arms, h=direction(rng), drive=drive.numbers), drive)
+
+
 MAKERS = {
     p.Distance: distance,
     p.Dot10: dot10,
@@ -211,6 +221,8 @@ MAKERS = {
     p.DrivenCoordinate: driven_coordinate,
     p.Ground: ground,
     p.LockedDisplacement: locked_displacement,
+    p.NamedSlide: named_slide,
+    p.NamedTurn: named_turn,
     p.Spherical: spherical,
 }
 
@@ -221,9 +233,13 @@ def entry(table, kind):
 
 
 def make(kind, rng):
+    """A specimen of a type, by its own maker or by that of the type it restyles without further fields."""
     maker = entry(MAKERS, kind)
-    assert maker, f"{kind.__name__} is not tested: add a maker for it to MAKERS in tests/specimens.py"
+    untested = f"{kind.__name__} is not tested: add a maker for it to MAKERS in tests/specimens.py"
+    assert maker, untested
     specimen = maker(rng)
+    required = {each.name for each in fields(kind) if each.default is MISSING and each.default_factory is MISSING}
+    assert required <= {each.name for each in fields(specimen.primitive)}, untested
     return replace(specimen, primitive=retyped(specimen.primitive, kind))
 
 

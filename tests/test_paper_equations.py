@@ -41,6 +41,7 @@ TWINS = {
     p.Dot11: lambda x, i, j: naive.dot11(i, j, (x.f, x.g, x.h), (x.f, x.g, x.h)),
     p.Dot20: lambda x, i, j: [naive.dot20(i, j, x.a, x.s_i, x.s_j) - x.a @ x.d0 - x.drive.c],
     p.Spherical: lambda x, i, j: naive.spherical(i, j, x.s_i, x.s_j),
+    p.NamedSlide: lambda x, i, j: naive.spherical(i, j, x.s_i, x.s_j) - x.drive.c * (i.A @ x.h),
     p.Distance: lambda x, i, j: half(naive.distance(i, j, x.s_i, x.s_j, x.length), x.length),
     p.DrivenCoordinate: lambda x, i, j: [x.k @ (naive.line(naive.GROUND, j, NO_ARM, x.s) - x.s) - x.drive.c],
 }

@@ -4,13 +4,13 @@ The equations run over any scalar, so phi is differentiated by running it on jet
 lanes: a thousand random ones are one evaluation. The primitives are discovered; one without a maker in specimens.py fails.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from kincheck.core import primitives as p
 from kincheck.core.algebra import Vec3
-from kincheck.core.primitives.base import GROUND_POSE, Drive
+from kincheck.core.primitives.base import GROUND_POSE, Drive, Primitive
 
 from .specimens import MAKERS, admissible, direction, discovered, lanes, make, retyped, rotation, vector
 
@@ -169,3 +169,19 @@ def test_battery_finds_the_printed_gamma_of_dot11(rng):
     specimen = make(p.Dot11, rng)
     printed = changed(specimen.primitive, "gamma", lambda values: (values[0], -values[1]))
     assert worst_defect(replace(specimen, primitive=printed), rng) > 0.1
+
+
+def test_an_unknown_primitive_is_pointed_out(rng):
+    """Neither a new type nor one that adds fields to a known one slips through."""
+
+    @dataclass(frozen=True)
+    class New(Primitive):
+        n = 1
+
+    @dataclass(frozen=True)
+    class More(p.Dot10):
+        extra: Vec3
+
+    for kind in (New, More):
+        with pytest.raises(AssertionError, match="add a maker"):
+            make(kind, rng)

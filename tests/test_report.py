@@ -268,12 +268,13 @@ def test_a_browser_draws_every_figure_and_the_controls_work(tmp_path: Path) -> N
     assert console == []
     assert before.count('data-drawn="yes"') == 4  # two outputs; position and velocity errors of one
     assert before.count('class="main-svg"') >= 4
-    # An output: the reference, and lines and markers of native and one. An error: their curves and zeros, and the ring.
-    assert before.count('class="trace scatter trace') == 4 * 5
+    # An output: the reference, and lines and markers of native and one. An error: curve, zeros and
+    # what is told of each, and the ring.
+    assert before.count('class="trace scatter trace') == 2 * 5 + 2 * 7
     path.write_text(path.read_text(encoding="utf-8").replace("</body>", act), encoding="utf-8")
     after, console = in_chromium(path, tmp_path / "profile")
     assert console == []
     assert after.count('data-drawn="yes"') == 6
     assert 'data-shown="4"' in after
     assert re.search(r'aria-pressed="false" data-series="one"', after)
-    assert after.count('class="trace scatter trace') == 6 * 3
+    assert after.count('class="trace scatter trace') == 2 * 3 + 4 * 4

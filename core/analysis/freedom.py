@@ -14,7 +14,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
-from .equations import Frames, constraints
+from .equations import Frames, constraints, frames
 from .formulation import Formulation
 
 # Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
@@ -123,17 +123,28 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     )
 
 
+def require_driven(mechanism: Mechanism, frame: Frames | None = None) -> FreedomAccount:
+    """The account of a mechanism that has as many drivers as degrees of freedom.
+
+    Raises:
+        SolveError: it has more or fewer, or nothing moves.
+    """
+    if not mechanism.moving:
+        raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
+    frame = frame or frames(mechanism)
+    found = account(mechanism, frame)
+    if found.dof != len(mechanism.drivers):
+        raise SolveError(_mismatch(mechanism, frame, found))
+    return found
+
+
 def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:
     """The rows of a formulation to solve for, drivers first.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
     """
-    found, drivers = account(mechanism, frame), len(mechanism.drivers)
-    if not mechanism.moving:
-        raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
-    if found.dof != drivers:
-        raise SolveError(_mismatch(mechanism, frame, found))
+    found, drivers = require_driven(mechanism, frame), len(mechanism.drivers)
     matrix = design_jacobian(formulation)
     kept = independent_rows(matrix, drivers)
     if len(kept) < formulation.unknowns:

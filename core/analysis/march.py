@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..motions import Path
 from ..trajectory import Array
 from .continuity import LARGEST_DEVIATION, NEGLIGIBLE
 from .model import Model
@@ -52,7 +53,7 @@ class _Front:
 
     ahead: NDArray[np.intp]
     anchor: Array
-    at: float = 0.0
+    at: float
     reach: int = LANES
     dividing: bool = False
     rounds: int = 0
@@ -66,27 +67,38 @@ class _Front:
         return len(self.aims) - HALVINGS * self.dividing
 
 
-def march(model: Model, values: Array, rate: float, tol: float) -> March:
-    """Solve a model at driver values measured from the design position; see `solve` for the arguments."""
-    return _Marcher(model, values, rate, tol).run()
+def march(model: Model, path: Path, tol: float) -> March:
+    """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance."""
+    if path.from_design:
+        return _Marcher(model, path, tol, model.design(path.drive(model.request.drivers, np.zeros(1))), 0.0).run()
+    way = path.lead_in()
+    lead_in = _Marcher(model, way, tol, model.design(way.drive(model.request.drivers, np.zeros(1))), 0.0)
+    found = lead_in.run()
+    if not found.solved.all():
+        n = len(path.times)
+        nothing = np.full((len(found.lanes), n), np.nan)
+        return March(
+            nothing, np.zeros(n, np.bool_), np.zeros(n, np.int64), (f"on the way to the first sample: {found.messages[0]}",)
+        )
+    first = model.moving(found.lanes[:, 0], path.drive(model.request.drivers, path.times[:1]))
+    return _Marcher(model, path, tol, first, float(path.times[0])).run()
 
 
 class _Marcher:
-    def __init__(self, model: Model, values: Array, rate: float, tol: float) -> None:
-        self.model, self.values, self.rate = model, values, rate
-        self.tol = tol
+    def __init__(self, model: Model, path: Path, tol: float, anchor: Array, at: float) -> None:
+        self.model, self.path, self.values, self.tol = model, path, path.times, tol
+        self.anchor, self.at = anchor, at
         self.slots = model.slots
-        self.executor = model.executor(min(LANES, len(values)) + 2 * HALVINGS)
+        self.executor = model.executor(min(LANES, len(path.times)) + 2 * HALVINGS)
         self.block = self.executor.block
-        n = len(values)
+        n = len(path.times)
         self.lanes = np.full((len(self.block), n), np.nan)
         self.solved, self.iterations = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
 
     def run(self) -> March:
-        anchor = self.model.design(self.rate)
-        outward = np.argsort(np.abs(self.values), kind="stable")
-        sides = (outward[self.values[outward] >= 0.0], outward[self.values[outward] < 0.0])
-        fronts = [_Front(side, anchor) for side in sides if len(side)]
+        outward = np.argsort(np.abs(self.values - self.at), kind="stable")
+        ahead = self.values[outward] >= self.at
+        fronts = [_Front(side, self.anchor, self.at) for side in (outward[ahead], outward[~ahead]) if len(side)]
         while active := [front for front in fronts if len(front.ahead) and not front.message]:
             self._round(active)
         return March(self.lanes, self.solved, self.iterations, tuple(front.message for front in fronts if front.message))
@@ -103,11 +115,11 @@ class _Marcher:
             front.lanes = slice(used, used + len(front.aims))
             used = front.lanes.stop
             self.block[:, front.lanes] = front.anchor[:, None]
-            self.block[self.slots["h"], front.lanes] = (front.aims - front.at) / self.rate
+            self.block[self.slots["h"], front.lanes] = front.aims - front.at
         self.executor.run("predict")
         predicted = self.block[self.model.state, :used]
         for front in active:
-            self.model.drive(self.block[:, front.lanes], front.aims, self.rate)
+            self.model.drive(self.block[:, front.lanes], self.path.drive(self.model.request.drivers, front.aims))
         iterations, done = self._newton(used)
         if self.model.request.order:
             self.executor.run("motion")
@@ -176,14 +188,14 @@ class _Marcher:
         return front.lanes.start + k
 
     def _end(self, front: _Front) -> str:
-        wanted = float(front.aims[0])
-        side = self.solved & ((self.values >= 0.0) == (wanted >= 0.0))
-        last = f"last reachable sample {self.values[side][np.abs(self.values[side]).argmax()]:.9g}" if side.any() else ""
+        wanted, where = float(front.aims[0]), self.path.where
+        side = self.solved & ((self.values >= self.at) == (wanted >= self.at))
+        farthest = self.values[side][np.abs(self.values[side] - self.at).argmax()] if side.any() else None
+        last = f"last reachable sample at {where(farthest)}" if farthest is not None else "no sample reached on this side"
         return (
-            f"driver {self.model.request.driver!r} cannot be followed beyond {front.at:.9g} (wanted {wanted:.9g}): "
-            f"{self._reason(front.lanes.stop - 1)}; smallest pivot there {front.anchor[self.slots['pivot']]:.3g} (zero at a "
-            f"lock-up or dead centre); {last or 'no sample reached on this side of the design'}; shorten the sweep or drive "
-            "another coordinate"
+            f"cannot be followed beyond {where(front.at)} (wanted {where(wanted)}): {self._reason(front.lanes.stop - 1)}; smallest "
+            f"pivot there {front.anchor[self.slots['pivot']]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or "
+            "drive another coordinate"
         )
 
     def _reason(self, lane: int) -> str:

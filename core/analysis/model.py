@@ -10,7 +10,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..program import NumpyExecutor, Program
 from ..trajectory import Array
-from .programs import RATE, RATE_T, Request, Tracer
+from .programs import Request, Tracer
 
 
 def compile_model(mechanism: Mechanism, request: Request) -> Model:
@@ -48,8 +48,6 @@ class Model:
         self._at_design = tracer.formulation.design
         self.state = np.array([slot for name in self._at_design for slot in self.vectors[name]])
         self._executors: dict[int, NumpyExecutor] = {}
-        angle = self.mechanism.driver(self.request.driver).type == "joint_angle"
-        self._drive_scale = 1.0 if angle else 1.0 / self.frame.unit
         self._design = self._solve_design()
 
     @property
@@ -63,28 +61,36 @@ class Model:
             self._executors[lanes] = NumpyExecutor(self.programs.values(), np.zeros((len(self.slots), lanes)))
         return self._executors[lanes]
 
-    def drive(self, block: Array, values: Array, rate: float) -> None:
-        """Set the swept driver in the lanes of a block, shape (slots, lanes), to values from the design [m or rad]."""
-        block[self.slots["c"]] = self._drive_scale * values
-        block[self.slots["c_t"]] = self._drive_scale * rate
-        block[self.slots["half_cos"]] = np.cos(0.5 * values)
-        block[self.slots["half_sin"]] = np.sin(0.5 * values)
+    def drive(self, block: Array, drive: Array) -> None:
+        """Set the moving drivers in the lanes of a block, shape (slots, lanes).
 
-    def design(self, rate: float) -> Array:
-        """The lane of the design position moving at the given rate, shape (slots,)."""
-        lane = self._design.copy()
-        # at constant rate, velocities are linear in it and accelerations quadratic
-        lane[self.vectors[RATE]] *= rate
-        lane[self.vectors[RATE_T]] *= rate * rate
-        return lane
+        Args:
+            drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, lanes).
+        """
+        for k, name in enumerate(self.request.drivers):
+            places, angle = self.vectors[f"drive {name}"], self.mechanism.driver(name).type == "joint_angle"
+            block[places[:3]] = drive[:, k] * (1.0 if angle else 1.0 / self.frame.unit)
+            block[places[3]], block[places[4]] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
+
+    def design(self, drive: Array) -> Array:
+        """The lane of the design position, moving as the drive says, shape (slots,); drive as for `drive`, one lane."""
+        return self.moving(self._design, drive)
+
+    def moving(self, lane: Array, drive: Array) -> Array:
+        """A solved lane with the rates that the drive gives it there, shape (slots,)."""
+        executor = self.executor(1)
+        executor.block[:, 0] = lane
+        self.drive(executor.block, drive)
+        executor.run("tangent")
+        return executor.block[:, 0].copy()
 
     def _solve_design(self) -> Array:
-        """The pose with all drivers at their design value, with v and a at unit rate; normally the design itself."""
-        executor = NumpyExecutor(self.programs.values(), np.zeros((len(self.slots), 1)))
+        """The pose with all drivers at their design value; normally the design itself."""
+        executor = self.executor(1)
         block = executor.block
         for name, value in self._at_design.items():
             block[self.vectors[name], 0] = value
-        self.drive(block, np.zeros(1), 1.0)
+        self.drive(block, np.zeros((3, len(self.request.drivers), 1)))
         residual = block[self.slots["residual"]]
         for _ in range(50):  # a rod given longer or shorter than its design distance is taken up here
             executor.run("newton")
@@ -97,5 +103,4 @@ class Model:
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual "
                 f"{closure * self.frame.unit:.3g} m after Newton's iteration, expected 0; check points, axes and lengths"
             )
-        executor.run("tangent")
         return block[:, 0].copy()

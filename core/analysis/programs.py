@@ -30,13 +30,13 @@ class Request:
     """What a sweep is to give.
 
     Attributes:
-        driver: the swept driver; the others hold their design value.
+        drivers: names of the drivers that move; the others hold their design value, and cost nothing.
         points, bodies: names whose motion is wanted.
         order: 0 positions, 1 and velocities, 2 and accelerations.
         style: how the rows are written.
     """
 
-    driver: str
+    drivers: tuple[str, ...]
     points: tuple[str, ...]
     bodies: tuple[str, ...] = ()
     order: int = 2
@@ -74,8 +74,7 @@ class Tracer:
         self.mechanism, self.request, self.frame = mechanism, request, frames(mechanism)
         self.selection = select_rows(mechanism, self.frame, self._formulate({}))
         self.tape, self.layout = Tape(), Layout()
-        drive = Drive(self._in("c"), self._in("c_t"), 0.0, self._in("half_cos"), self._in("half_sin"))
-        self.formulation = self._formulate({request.driver: drive})
+        self.formulation = self._formulate({name: Drive(*self._vector(f"drive {name}", 5)) for name in request.drivers})
         design = self.formulation.design
         self.at = self.formulation.configuration({name: self._vector(name, len(value)) for name, value in design.items()})
         self.unknowns = self.formulation.unknowns

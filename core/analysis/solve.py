@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..mechanism import Mechanism
+from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .equations import Style
 from .march import March, march
@@ -26,6 +27,7 @@ def solve(
     order: int = 2,
     tol: float = 1e-12,
     style: str = "native",
+    motions: Mapping[str, Motion] | None = None,
 ) -> Trajectory:
     """Sweep one driver over values, measured from the design position.
 
@@ -38,8 +40,9 @@ def solve(
         bodies: bodies whose motion is wanted, in the paper's variables.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for is not computed.
         tol: largest accepted constraint residual, relative to the mechanism's size.
-        style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes) or "conventional" (full
-            products); the solutions are the same.
+        style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes), "conventional" (full
+            products) or "mixed" (joint coordinates as further unknowns); the solutions are the same.
+        motions: of further drivers, over the time in which the swept one goes from zero at the rate; the others hold.
 
     Returns:
         The motion; NaN where a sample cannot be reached, and the reason in its message.
@@ -48,13 +51,14 @@ def solve(
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
-    model = compile_model(mechanism, Request(driver, wanted, tuple(bodies), order, Style(style)))
-    return sweep(model, np.asarray(values, dtype=np.float64), rate, tol)
+    path = Path({**(motions or {}), driver: Ramp(rate)}, np.asarray(values, dtype=np.float64) / rate)
+    model = compile_model(mechanism, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style)))
+    return sweep(model, path, tol)
 
 
-def sweep(model: Model, values: Array, rate: float, tol: float) -> Trajectory:
-    """Run a compiled model over driver values measured from the design position; see `solve`."""
-    found = march(model, values, rate, tol)
+def sweep(model: Model, path: Path, tol: float) -> Trajectory:
+    """Run a compiled model over the samples of a path; see `solve`."""
+    found = march(model, path, tol)
     worst = {
         "closure": _row(model, found, "closure").max(initial=0.0),
         "redundant_residual": _row(model, found, "leftover").max(initial=0.0) * model.frame.unit,

@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from ..mechanism import Mechanism, Vector
+from ..motions import Motion, Path, Ramp
 from ..trajectory import Array
+
+TIME = "time"
+"""The name a sweep has instead of a driver's where time itself is swept."""
 
 
 class Truth(StrEnum):
@@ -26,24 +30,33 @@ class Truth(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """One driver moved over a grid of values; all other drivers hold their design value.
+    """One driver moved over a grid of values at a constant rate, or time; other drivers follow motions of their own, or hold.
 
     Attributes:
-        driver: name of the swept driver.
-        values: driver values in the order start..stop [m or rad], shape (n,).
+        driver: name of the swept driver, or "time" where drivers follow their motions only.
+        values: driver values in the order start..stop [m or rad], or times [s], shape (n,).
         rate: driver units per second; velocities and accelerations are per second at this constant rate.
         design: the driver's value at the design position: zero unless its values are absolute [m or rad].
+        motions: of the drivers other than the swept one, over the time in which that goes from its design value at the rate.
     """
 
     driver: str
     values: Array
     rate: float = 1.0
     design: float = 0.0
+    motions: Mapping[str, Motion] = field(default_factory=dict[str, Motion])
 
     @property
     def change(self) -> Array:
         """Driver values measured from the design position, shape (n,); what an engine sets."""
         return self.values - self.design
+
+    @property
+    def path(self) -> Path:
+        """How all moving drivers go with time, and the times of the samples."""
+        if self.driver == TIME:
+            return Path(self.motions, self.values)
+        return Path({**self.motions, self.driver: Ramp(self.rate)}, self.change / self.rate, {self.driver: self.design})
 
 
 @dataclass(frozen=True)

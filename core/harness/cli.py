@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from ..errors import KincheckError
+from ..errors import KincheckError, SolveError
 from .case import Case
 from .engine import Engine
 from .record import Outcome, Record, Results
@@ -99,6 +99,7 @@ def _run(options: argparse.Namespace) -> int:
     from . import run as running
 
     problems: list[str] = []
+    _return_cases(options)
     cases = _cases(options.case, problems)
     engines, baseline = _engines([*options.engine, *options.require] if options.engine else [], options, problems)
     files: dict[str, Any] = {"out": options.out, "json": options.json, "junit": options.junit}
@@ -129,9 +130,20 @@ def _run(options: argparse.Namespace) -> int:
     return DEVIATES if any(record.outcome.bad for record in results.records) else WITHIN
 
 
+def _return_cases(options: argparse.Namespace) -> None:
+    """Give back the cases that an option taking several names has swallowed: `run --engine native my_case.toml`."""
+    from ... import adapters, cases
+
+    for names in (options.engine, options.require):
+        swallowed = [name for name in names if name not in adapters.ENGINES and (name in cases.names() or Path(name).suffix)]
+        options.case += swallowed
+        names[:] = [name for name in names if name not in swallowed]
+
+
 def _cases(names: Sequence[str], problems: list[str]) -> list[Case]:
     """The cases asked for; what is wrong with any of them is added to the problems."""
     from ... import cases as builtin
+    from ..analysis.freedom import require_driven
     from .casefile import load_case
 
     found: dict[str, Case] = {}
@@ -144,6 +156,10 @@ def _cases(names: Sequence[str], problems: list[str]) -> list[Case]:
                 case = load_case(Path(name))
             else:
                 raise KincheckError(_unknown("case", name, known) + "; a case file ends in .toml or .json")
+            require_driven(case.mechanism)
+        except SolveError as error:  # it names the mechanism; the file is what the reader has to open
+            problems.append(f"{name}: {error}")
+            continue
         except KincheckError as error:
             problems += str(error).splitlines()
             continue

@@ -162,7 +162,7 @@ def output_figure(
         look = {"mode": "markers", "marker": marker, "hoverinfo": "skip", "uid": f"{style.key}-markers", "meta": style.name}
         traces.append(curve([values[k] for k in some], [axis.shown[k] for k in some], **look))
     value_axis: Figure = {"title": {"text": plain(f"{output_label(output)} [{unit}]")}, "hoverformat": ".9g", "zeroline": True}
-    moved_axis: Figure = {"title": {"text": plain(axis.title)}, "hoverformat": ".6g", "zeroline": True} | _ticks(axis)
+    moved_axis: Figure = {"title": {"text": plain(axis.title)}, "hoverformat": ".6~g", "zeroline": True} | _ticks(axis)
     sides = {"xaxis": value_axis, "yaxis": moved_axis} if axis.vertical else {"xaxis": moved_axis, "yaxis": value_axis}
     return {"data": traces, "layout": {**sides, "hovermode": "y unified" if axis.vertical else "x unified"}}
 
@@ -205,7 +205,7 @@ def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Styl
     stride = max(1, math.ceil((high - low) / 6))
     decades = range(low + 1, math.floor(high) + 1, stride)
     layout: Figure = {
-        "xaxis": {"title": {"text": plain(axis.label)}, "hoverformat": ".6g", "zeroline": False} | _ticks(axis),
+        "xaxis": {"title": {"text": plain(axis.label)}, "hoverformat": ".6~g", "zeroline": False} | _ticks(axis),
         "yaxis": {
             "type": "log",
             "title": {"text": plain(f"{motion} error [{unit}]")},

@@ -1,0 +1,111 @@
+"""The same mechanism written differently, or of another size, in another place, at another rate: the same motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.core import PointCoordinate
+from kincheck.core.analysis.solve import solve
+
+from .mechanisms import mcpherson, placed, slider_crank, swapped, without_fixed_bodies
+
+TURNS = 2.0 * np.pi * np.linspace(-1.0, 1.0, 31)
+STROKES = np.linspace(-0.08, 0.08, 33)
+
+
+def wheel(mechanism=None, values=STROKES, **options):
+    found = solve(mechanism or mcpherson(), "stroke", values, **options)
+    assert found.solved.all(), found.message
+    return found.points["wheel"]
+
+
+def assert_same(found, expected, position=2e-16, velocity=2e-15, acceleration=2e-14):
+    """Two motions of a point that differ by round-off: numbers near one, amplified by the condition (36)."""
+    assert np.abs(found.position - expected.position).max() <= position
+    assert np.abs(found.velocity - expected.velocity).max() <= velocity
+    assert np.abs(found.acceleration - expected.acceleration).max() <= acceleration
+
+
+@pytest.mark.parametrize("rate", [0.25, -2.0, 1e3])
+def test_rate_scales_velocities_and_accelerations(rate):
+    expected, found = wheel(), wheel(rate=rate)
+    assert np.abs(found.position - expected.position).max() <= 2e-16
+    assert found.velocity == pytest.approx(rate * expected.velocity, rel=1e-13, abs=1e-15 * abs(rate))
+    assert found.acceleration == pytest.approx(rate**2 * expected.acceleration, rel=1e-13, abs=1e-14 * rate**2)
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_order_of_the_bodies_of_a_joint_does_not_matter(number):
+    """Each joint exchanged by itself, and all of them."""
+    m = mcpherson()
+    exchanged = [joint.reversed() if number in (k, 5) else joint for k, joint in enumerate(m.joints)]
+    assert_same(wheel(replace(m, joints=exchanged)), wheel())
+
+
+def test_order_of_the_bodies_of_a_driven_joint_turns_its_sign():
+    forward, back = (solve(m, "turn", a) for m, a in ((slider_crank(), TURNS), (swapped(slider_crank()), -TURNS)))
+    assert np.abs(back.points["pin"].position - forward.points["pin"].position).max() <= 1e-15
+    assert np.abs(back.points["pin"].velocity + forward.points["pin"].velocity).max() <= 1e-15
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_order_of_bodies_and_joints_does_not_matter(seed):
+    rng, m = np.random.default_rng(seed), mcpherson()
+    bodies, joints = ([m.bodies[k] for k in rng.permutation(5)], [m.joints[k] for k in rng.permutation(5)])
+    assert_same(wheel(replace(m, bodies=bodies, joints=joints)), wheel(), acceleration=5e-14)
+
+
+def test_fixed_bodies_or_ground():
+    assert_same(wheel(without_fixed_bodies(mcpherson())), wheel(), 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 7.0, 1e3])
+def test_size_does_not_matter(factor):
+    """All lengths, the stroke and the rate scaled: everything scales, to the same relative accuracy."""
+    small = placed(mcpherson(), lambda point: tuple(factor * np.array(point)), factor=factor)
+    found, expected = wheel(small, factor * STROKES, rate=factor), wheel()
+    # scaling rounds every hardpoint once, which moves the result by the condition times 1e-16
+    assert found.position / factor == pytest.approx(expected.position, abs=3e-15)
+    assert found.velocity / factor == pytest.approx(expected.velocity, abs=3e-15)
+    assert found.acceleration / factor == pytest.approx(expected.acceleration, abs=5e-14)
+
+
+def snapped(point):
+    """Rounded to 2^-30 m, so that whole numbers of metres up to 2^22 can be added without rounding."""
+    return tuple(np.round(np.array(point) * 2.0**30) / 2.0**30)
+
+
+@pytest.mark.parametrize("offset", [(1e6, 0.0, 0.0), (-1e6, 1e6, 2e6)])
+def test_place_does_not_matter(offset):
+    """A thousand kilometres away: only the sum with the position rounds, at 1e-10 m; the motion keeps all its digits."""
+    here = placed(mcpherson(), snapped)
+    away = placed(here, lambda point: tuple(np.add(point, offset)))
+    found, expected = wheel(away), wheel(here)
+    assert np.abs(found.position - (expected.position + offset)).max() <= 2.4e-10
+    assert (found.velocity == expected.velocity).all()
+    assert (found.acceleration == expected.acceleration).all()
+
+
+def test_orientation_does_not_matter():
+    """The strut turned in space, and the direction of its driver with it."""
+    turn = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+
+    def turned(point):
+        return tuple(turn @ point)
+
+    m = placed(mcpherson(), turned, turned)
+    m = replace(m, drivers=[PointCoordinate("stroke", "wheel", turned((0.0, 0.0, 1.0)))])
+    found, expected = wheel(m), wheel()
+    # turning rounds every hardpoint, as scaling does
+    assert found.position @ turn == pytest.approx(expected.position, abs=3e-15)
+    assert found.velocity @ turn == pytest.approx(expected.velocity, abs=5e-15)
+    assert found.acceleration @ turn == pytest.approx(expected.acceleration, abs=5e-14)
+
+
+def test_units_of_axes_do_not_matter():
+    m = mcpherson()
+    long = placed(m, tuple, lambda axis: tuple(137.0 * np.array(axis)))
+    assert_same(wheel(long), wheel())
+    drawn = replace(m, drivers=[PointCoordinate("stroke", "wheel", (0.0, 0.0, 4.0))])
+    assert_same(wheel(drawn), wheel(), 0.0, 0.0, 0.0)
