@@ -120,48 +120,90 @@ def arm(body, point):
     return body.A.T @ (np.asarray(point, dtype=float) - body.r)
 
 
-def _revolute(joint, i0, j0, i, j):
-    axes = triad(joint.axis)
-    return [spherical(i, j, arm(i0, joint.point), arm(j0, joint.point)), dot11(i, j, to_body(i0, *axes), to_body(j0, *axes))]
+class Pair:
+    """A joint's bodies at design and now, its points as arms and its axes as triads in both."""
 
+    def __init__(self, joint, i0, j0, i, j):
+        self.joint, self.i, self.j, self._i0, self._j0 = joint, i, j, i0, j0
+        points = getattr(joint, "points", (getattr(joint, "point", None),) * 2)
+        P_i, P_j = (j0.r if point is None else np.asarray(point, dtype=float) for point in points)
+        self.d0 = P_j - P_i
+        self.s_i, self.s_j = arm(i0, P_i), arm(j0, P_j)
+        self.axes_i, self.axes_j = self.in_both(triad(getattr(joint, "axis", (0.0, 0.0, 1.0))))
 
-def _spherical(joint, i0, j0, i, j):
-    return [spherical(i, j, arm(i0, joint.point), arm(j0, joint.point))]
+    def in_both(self, axes):
+        """Global vectors at design, fixed in body i and fixed in body j."""
+        return to_body(self._i0, *axes), to_body(self._j0, *axes)
 
+    def spherical(self):
+        return spherical(self.i, self.j, self.s_i, self.s_j)
 
-def _universal(joint, i0, j0, i, j):
-    a, b = (np.asarray(axis) / np.linalg.norm(axis) for axis in joint.axes)
-    cosine = dot10(i, j, to_body(i0, a)[0], to_body(j0, b)[0]) - a @ b
-    return [spherical(i, j, arm(i0, joint.point), arm(j0, joint.point)), [cosine]]
+    def parallel(self):
+        return dot11(self.i, self.j, self.axes_i, self.axes_j)
 
+    def lock(self):
+        return dot12(self.i, self.j, self.axes_i, self.axes_j)
 
-def _translational(joint, i0, j0, i, j):
-    axes = triad(joint.axis)
-    axes_i, axes_j = to_body(i0, *axes), to_body(j0, *axes)
-    return [dot12(i, j, axes_i, axes_j), dot21(i, j, axes_i, arm(i0, joint.point), arm(j0, joint.point))]
+    def line(self):
+        return dot21(self.i, self.j, self.axes_i, self.s_i, self.s_j)
 
+    def plane(self):
+        """h_i . d, with its design value taken off."""
+        h = self.axes_i[2]
+        return [dot20(self.i, self.j, h, self.s_i, self.s_j) - self._i0.A @ h @ self.d0]
 
-def _fixed(joint, i0, j0, i, j):
-    point = j0.r if joint.point is None else joint.point
-    axes = triad([0.0, 0.0, 1.0])
-    return [spherical(i, j, arm(i0, point), arm(j0, point)), dot12(i, j, to_body(i0, *axes), to_body(j0, *axes))]
+    def angle(self):
+        """The cosine of the angle between the first axis, on i, and the second, on j, with its design value taken off."""
+        a, b = (np.asarray(axis) / np.linalg.norm(axis) for axis in self.joint.axes)
+        return [dot10(self.i, self.j, self._i0.A.T @ a, self._j0.A.T @ b) - a @ b]
 
+    def distance(self):
+        length = getattr(self.joint, "length", None)
+        return distance(self.i, self.j, self.s_i, self.s_j, np.linalg.norm(self.d0) if length is None else length)
 
-def _distance(joint, i0, j0, i, j):
-    P_i, P_j = joint.points
-    L = np.linalg.norm(np.subtract(P_j, P_i)) if joint.length is None else joint.length
-    return [distance(i, j, arm(i0, P_i), arm(j0, P_j), L)]
+    def twist(self):
+        """f_i . g_j - g_i . f_j: constant velocity; shaft j's axes are shaft i's carried over by the shortest rotation."""
+        h, k = (np.asarray(axis) / np.linalg.norm(axis) for axis in self.joint.axes)
+        f, g, _ = triad(h)
+        N = tilde(np.cross(h, k))
+        carry = np.eye(3) + N + N @ N / (1.0 + h @ k)
+        (f_i, g_i), (f_j, g_j) = to_body(self._i0, f, g), to_body(self._j0, carry @ f, carry @ g)
+        return [dot10(self.i, self.j, f_i, g_j) - dot10(self.i, self.j, g_i, f_j)]
+
+    def thread(self):
+        """d = lead theta / 2 pi, as the sine of the difference of the two turns: smooth, and good for any number of turns."""
+        radius = self.joint.lead / (2.0 * np.pi)
+        turn = self.plane()[0] / radius
+        (f_i, g_i, _), (f_j, _, _) = self.axes_i, self.axes_j
+        cosine, sine = dot10(self.i, self.j, f_i, f_j), dot10(self.i, self.j, g_i, f_j)
+        return [radius * (np.sin(turn) * cosine - np.cos(turn) * sine)]
 
 
 JOINTS = {
-    "revolute": _revolute,
-    "spherical": _spherical,
-    "universal": _universal,
-    "translational": _translational,
-    "fixed": _fixed,
-    "distance": _distance,
+    "revolute": (Pair.spherical, Pair.parallel),
+    "spherical": (Pair.spherical,),
+    "universal": (Pair.spherical, Pair.angle),
+    "translational": (Pair.lock, Pair.line),
+    "fixed": (Pair.spherical, Pair.lock),
+    "distance": (Pair.distance,),
+    "cylindrical": (Pair.parallel, Pair.line),
+    "screw": (Pair.parallel, Pair.line, Pair.thread),
+    "planar": (Pair.parallel, Pair.plane),
+    "inline": (Pair.line,),
+    "in_plane": (Pair.plane,),
+    "parallel_axes": (Pair.parallel,),
+    "perpendicular_axes": (Pair.angle,),
+    "orientation_lock": (Pair.lock,),
+    "revolute_spherical": (Pair.distance, Pair.plane),
+    "constant_velocity": (Pair.spherical, Pair.twist),
 }
-"""Joint type -> its residuals (joint, bodies i and j at design, bodies i and j now)."""
+"""Joint type -> the conditions it is made of (formulation section 6)."""
+
+
+def joint_residuals(joint, i0, j0, i, j):
+    """The residuals of a joint between bodies i and j, which were at i0 and j0 at design."""
+    pair = Pair(joint, i0, j0, i, j)
+    return np.concatenate([condition(pair) for condition in JOINTS[joint.type]])
 
 
 def design(mechanism):
@@ -173,11 +215,9 @@ def residuals(mechanism, now):
     """The residuals of all joints with the bodies (by name; those not named are at design) where they are now."""
     before = design(mechanism)
     after = before | now
-    parts = []
-    for joint in mechanism.joints:
-        i, j = joint.bodies
-        parts += JOINTS[joint.type](joint, before[i], before[j], after[i], after[j])
-    return np.concatenate(parts)
+    return np.concatenate(
+        [joint_residuals(each, before[each.i], before[each.j], after[each.i], after[each.j]) for each in mechanism.joints]
+    )
 
 
 def taylor(function, radius=0.1, points=32):

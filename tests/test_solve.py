@@ -9,7 +9,6 @@ import pytest
 from kincheck.core import Body, Fixed, JointDisplacement, Mechanism, Point, Revolute, Translational, Universal
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.solve import solve
-from kincheck.core.joints import Joint
 
 from . import naive
 from .mechanisms import four_bar, mcpherson, slider_crank, swapped, without_fixed_bodies
@@ -93,14 +92,6 @@ SWEEPS = {
     "four_bar": (four_bar, "turn", np.linspace(-4.0, 9.0, 5)),
     "universal_chain": (universal_chain, "turn", np.linspace(-4.0, 9.0, 5)),
 }
-
-
-def test_the_sweeps_cover_every_joint_type():
-    """A joint type that is in no mechanism here has not been compared with its unsimplified equations."""
-    types = {joint.type for make, *_ in SWEEPS.values() for joint in make().joints}
-    covered = {name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck.")}
-    assert covered - types == set(), "add a mechanism with these joints to SWEEPS, and their equations to naive.JOINTS"
-    assert covered <= set(naive.JOINTS)
 
 
 def moving_bodies(mechanism, found, k):

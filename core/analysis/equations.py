@@ -114,7 +114,7 @@ def constraints(
             found += _axial(original, frame, coupled, mixed)
             continue
         # the ground as body i: its rows are constant and the simplified ones need nothing of body j
-        joint = original.reversed() if mechanism.is_fixed(original.j) else original
+        joint = original.reversed() if original.symmetric and mechanism.is_fixed(original.j) else original
         i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
         composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
         found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]

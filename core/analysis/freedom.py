@@ -32,8 +32,8 @@ class FreedomAccount:
         bodies: all bodies, fixed ones included (the ground itself is none).
         coordinates: 7 per body: position and Euler parameters.
         equations: joint rows, 6 ground rows per fixed body, 1 normalisation per body.
-        moving_coordinates: 6 per moving body: the unknowns of the native formulation.
-        rows: joint rows.
+        moving_coordinates: 6 per moving body, 1 per joint coordinate that is coupled: the unknowns of the native formulation.
+        rows: joint rows, and those that name and couple coordinates.
         rank: numerical rank of the joint rows.
         redundant_rows: joint rows that are left out, as "joint: primitive".
     """
@@ -115,8 +115,8 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     return FreedomAccount(
         bodies=len(mechanism.bodies),
         coordinates=EULER_PARAMETERS * len(mechanism.bodies),
-        equations=joint_rows + COLUMNS * fixed + len(mechanism.bodies),
-        moving_coordinates=COLUMNS * len(mechanism.moving),
+        equations=sum(joint.rows for joint in mechanism.joints) + len(mechanism.couplers) + COLUMNS * fixed + len(mechanism.bodies),
+        moving_coordinates=formulation.unknowns,
         rows=joint_rows,
         rank=len(kept),
         redundant_rows=tuple(names[k] for k in range(joint_rows) if k not in kept),

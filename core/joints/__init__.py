@@ -4,9 +4,21 @@ import importlib
 import pkgutil
 
 from .base import Attachment, AxialJoint, Coupler, Joint, Kind
+from .constant_velocity import ConstantVelocity
+from .cylindrical import Cylindrical
 from .distance import Distance
 from .fixed import Fixed
+from .gear import Gear
+from .in_plane import InPlane
+from .inline import Inline
+from .orientation_lock import OrientationLock
+from .parallel_axes import ParallelAxes
+from .perpendicular_axes import PerpendicularAxes
+from .planar import Planar
+from .rack_pinion import RackPinion
 from .revolute import Revolute
+from .revolute_spherical import RevoluteSpherical
+from .screw import Screw
 from .spherical import Spherical
 from .translational import Translational
 from .universal import Universal
@@ -17,12 +29,24 @@ for _module in pkgutil.iter_modules(__path__):
 __all__ = [
     "Attachment",
     "AxialJoint",
+    "ConstantVelocity",
     "Coupler",
+    "Cylindrical",
     "Distance",
     "Fixed",
+    "Gear",
+    "InPlane",
+    "Inline",
     "Joint",
     "Kind",
+    "OrientationLock",
+    "ParallelAxes",
+    "PerpendicularAxes",
+    "Planar",
+    "RackPinion",
     "Revolute",
+    "RevoluteSpherical",
+    "Screw",
     "Spherical",
     "Translational",
     "Universal",

@@ -76,6 +76,7 @@ class Joint(ABC):
     Attributes:
         type: the name in case files.
         freedoms: the relative motions the joint leaves, as drivers name them.
+        symmetric: both bodies may change places; not so where geometry belongs to one of them (a line, a plane, a hinge).
 
     Raises:
         MechanismError: a number is not finite, a direction is zero, or a shape is wrong.
@@ -83,6 +84,7 @@ class Joint(ABC):
 
     type: ClassVar[str]
     freedoms: ClassVar[tuple[str, ...]]
+    symmetric: ClassVar[bool] = True
     registry: ClassVar[dict[str, type[Joint]]] = {}
 
     name: str
@@ -170,6 +172,10 @@ class AxialJoint(Joint):
         return (slide, "translation"), (turn, "rotation")
 
     @property
+    def rows(self) -> int:
+        return super().rows + len(self.relations)
+
+    @property
     def relations(self) -> Sequence[Mapping[str, float]]:
         """Linear relations between its own coordinates [m, rad]: coefficients by freedom, whose weighted sum stays zero."""
         return ()
@@ -210,6 +216,21 @@ def unit(a: Sequence[Scalar]) -> Vec3:
     """The direction of a, length one."""
     v = vec(a)
     return (1.0 / math.sqrt(v @ v)) * v
+
+
+# Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more is a mistake in the table.
+# Within it the axes keep their design angle, as the two hinges of a simulator do.
+ROUNDED_RIGHT_ANGLE = 1e-2
+
+
+def require_perpendicular(joint: Joint, axes: Sequence[Sequence[float]]) -> None:
+    """Raise MechanismError unless the two axes are perpendicular up to the rounding of a table."""
+    cosine = unit(axes[0]) @ unit(axes[1])
+    if abs(cosine) > ROUNDED_RIGHT_ANGLE:
+        raise MechanismError(
+            f"{joint}: the axes are not perpendicular, the cosine of their angle is {cosine:.3g}; "
+            "expected 0 up to rounding of the table; give the two axes of the cross"
+        )
 
 
 def triad(axis: Sequence[Scalar]) -> tuple[Vec3, Vec3, Vec3]:

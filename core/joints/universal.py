@@ -7,12 +7,7 @@ from dataclasses import dataclass
 
 from .. import primitives as p
 from ..algebra import vec
-from ..errors import MechanismError
-from .base import Attachment, Joint, directions, position, unit
-
-# Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more is a mistake in the table.
-# Within it the cross keeps its design angle, as the two hinges of a simulator do.
-ROUNDED_RIGHT_ANGLE = 1e-2
+from .base import Attachment, Joint, directions, position, require_perpendicular, unit
 
 
 @dataclass(frozen=True)
@@ -26,12 +21,7 @@ class Universal(Joint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        cosine = unit(self.axes[0]) @ unit(self.axes[1])
-        if abs(cosine) > ROUNDED_RIGHT_ANGLE:
-            raise MechanismError(
-                f"{self}: the axes are not perpendicular, the cosine of their angle is {cosine:.3g}; "
-                "expected 0 up to rounding of the table; give the two axes of the cross"
-            )
+        require_perpendicular(self, self.axes)
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P = vec(self.point)

@@ -1,6 +1,7 @@
 """Primitive constraints: one geometric condition a file, its derivation on top."""
 
 from .base import Drive, Motion, Pose, Primitive, Row
+from .constant_velocity import ConstantVelocity
 from .distance import Distance
 from .dot10 import Dot10
 from .dot11 import Dot11
@@ -13,6 +14,7 @@ from .named import NamedSlide, NamedTurn
 from .spherical import Spherical
 
 __all__ = [
+    "ConstantVelocity",
     "Distance",
     "Dot10",
     "Dot11",

@@ -21,6 +21,7 @@ from typing import Any
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross
 from . import paper
 from .base import Motion, Pose, Primitive, Row
+from .constant_velocity import ConstantVelocity
 from .dot10 import Dot10
 from .dot11 import Dot11
 from .dot12 import Dot12
@@ -96,6 +97,18 @@ class ConventionalDot20(Dot20):
         return (self.drive.c_tt + 2.0 * sliding - turning,)
 
 
+@dataclass(frozen=True)
+class ConventionalConstantVelocity(ConstantVelocity):
+    """The difference of two dot10 by full products."""
+
+    body_axes = True
+
+    @property
+    def pair(self) -> tuple[Dot10, Dot10]:
+        """The two dot10 that are subtracted."""
+        return ConventionalDot10(self.f_i, self.g_j), ConventionalDot10(self.g_i, self.f_j)
+
+
 def _dot10(native: Dot10) -> tuple[Primitive, ...]:
     return (ConventionalDot10(native.a, native.b),)
 
@@ -133,5 +146,6 @@ TWINS: Mapping[type[Primitive], Callable[[Any], tuple[Primitive, ...]]] = {
     Dot20: _dot20,
     Dot21: _dot21,
     LockedDisplacement: _locked,
+    ConstantVelocity: lambda native: (ConventionalConstantVelocity(native.f_i, native.g_i, native.f_j, native.g_j),),
 }
 """Native primitive -> the primitives of this style that replace it."""

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..algebra import ZERO, Mat3, Scalar, Vec3, X, Y, Z, cross
 from .base import Motion, Pose, Primitive, Row
+from .constant_velocity import ConstantVelocity
 from .distance import Distance
 from .dot10 import Dot10
 from .dot11 import Dot11
@@ -205,6 +206,18 @@ class PaperDrivenAngle(DrivenAngle):
 
 
 @dataclass(frozen=True)
+class PaperConstantVelocity(ConstantVelocity):
+    """The difference of two dot10 in body axes."""
+
+    body_axes = True
+
+    @property
+    def pair(self) -> tuple[Dot10, Dot10]:
+        """The two dot10 that are subtracted."""
+        return PaperDot10(self.f_i, self.g_j), PaperDot10(self.g_i, self.f_j)
+
+
+@dataclass(frozen=True)
 class PaperGround(Ground):
     """Rows I_6."""
 
@@ -248,6 +261,7 @@ TWINS: Mapping[type[Primitive], Callable[[Any], tuple[Primitive, ...]]] = {
         (DrivenCoordinate, PaperDrivenCoordinate),
         (DrivenAngle, PaperDrivenAngle),
         (Ground, PaperGround),
+        (ConstantVelocity, PaperConstantVelocity),
     )
 }
 """Native primitive -> the primitives of this style that replace it."""

@@ -1,0 +1,49 @@
+"""Constant velocity: two shafts turn at the same rate whatever their angle (1 row).  Formulation section 2.
+
+With f_i, g_i across shaft i and f_j, g_j across shaft j, the twist between the shafts vanishes:
+
+    phi   = f_i . g_j - g_i . f_j          the difference of two dot10
+    rows, gamma                            the same difference of theirs, exact everywhere
+
+phi is -4 e0 e3 of the relative Euler parameters: besides the zero twist e3 = 0 it is zero where e0 = 0, a relative turn of 180
+degrees; there f_i . f_j + g_i . g_j is not positive, which is the branch test.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import ZERO, Scalar, Vec3
+from .base import Motion, Pose, Primitive, Row
+from .dot10 import Dot10
+
+
+@dataclass(frozen=True)
+class ConstantVelocity(Primitive):
+    """f_i, g_i on body i and f_j, g_j on body j: across the shafts, unit, zero twist at design [-]."""
+
+    n = 1
+    f_i: Vec3
+    g_i: Vec3
+    f_j: Vec3
+    g_j: Vec3
+
+    @property
+    def pair(self) -> tuple[Dot10, Dot10]:
+        """The two dot10 that are subtracted."""
+        return Dot10(self.f_i, self.g_j), Dot10(self.g_i, self.f_j)
+
+    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        (plus,), (minus,) = (dot.phi(i, j) for dot in self.pair)
+        return (plus - minus,)
+
+    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
+        (plus,), (minus,) = (dot.rows(i, j) for dot in self.pair)
+        return (Row(ZERO, plus.pi - minus.pi, ZERO, plus.pj - minus.pj),)
+
+    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+        (plus,), (minus,) = (dot.gamma(i, j, vi, vj) for dot in self.pair)
+        return (plus - minus,)
+
+    def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        return (i.turn(self.f_i) @ j.turn(self.f_j) + i.turn(self.g_i) @ j.turn(self.g_j),)
