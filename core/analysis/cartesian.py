@@ -23,10 +23,15 @@ COLUMNS = 6
 
 @dataclass(frozen=True, eq=False)
 class Cartesian:
-    """The constraints over the named moving bodies; implements `Formulation`."""
+    """The constraints over the named moving bodies; implements `Formulation`.
+
+    Attributes:
+        named: coordinates that have a column whether or not a primitive is driven by them.
+    """
 
     constraints: Sequence[Constraint | Relation]
     bodies: Sequence[str]
+    named: Sequence[str] = ()
 
     @cached_property
     def columns(self) -> Mapping[str, int]:
@@ -36,8 +41,8 @@ class Cartesian:
     @cached_property
     def coordinates(self) -> Mapping[str, int]:
         """Column of every named coordinate; they come after the bodies."""
-        names = dict.fromkeys(c.coordinate for c in self.constraints if isinstance(c, Constraint) and c.coordinate)
-        return {name: COLUMNS * len(self.bodies) + k for k, name in enumerate(names)}
+        driven = (c.coordinate for c in self.constraints if isinstance(c, Constraint) and c.coordinate)
+        return {name: COLUMNS * len(self.bodies) + k for k, name in enumerate(dict.fromkeys([*self.named, *driven]))}
 
     @property
     def unknowns(self) -> int:

@@ -92,6 +92,7 @@ class Style(StrEnum):
     PAPER = "paper"
     CONVENTIONAL = "conventional"
     MIXED = "mixed"
+    RELATIVE = "relative"
 
 
 def constraints(
@@ -101,10 +102,10 @@ def constraints(
 
     Args:
         drives: the motion of each driver by name; drivers not named hold their design value.
-        style: how rows are written. MIXED names the coordinates of all axial joints; the others only those that couplers need.
+        style: how rows are written. MIXED and RELATIVE name the coordinates of all axial joints, the others those of couplers.
         keep_fixed: fixed bodies move in principle and are held by ground rows, as in the paper's count; else they are ground.
     """
-    mixed = style is Style.MIXED
+    mixed = style in (Style.MIXED, Style.RELATIVE)
     coupled = {f"{joint}.{freedom}" for c in mechanism.couplers for joint, freedom in zip(c.joints, c.freedoms, strict=True)}
     found: list[Constraint | Relation] = []
     if keep_fixed:

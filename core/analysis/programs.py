@@ -23,6 +23,7 @@ from .cartesian import Cartesian
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
+from .relative import Relative
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,10 @@ class Tracer:
         self.unknowns = self.formulation.unknowns
 
     def _formulate(self, drives: Mapping[str, Drive]) -> Formulation:
-        return Cartesian(constraints(self.mechanism, self.frame, drives, self.request.style), self.frame.moving)
+        found = constraints(self.mechanism, self.frame, drives, self.request.style)
+        if self.request.style is Style.RELATIVE:
+            return Relative.of(self.mechanism, self.frame, found)
+        return Cartesian(found, self.frame.moving)
 
     def _in(self, name: str) -> Scalar:
         return self.tape.input(self.layout.scalar(name))
