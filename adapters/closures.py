@@ -1,181 +1,55 @@
 """Loop closures for simulators that have a tree of joints: a cut joint as conditions on two frames, one on each body.
 
-The frames sit at the joint's point, with axes that are global at design. From what a simulator says of them come two kinds of
-moving vectors (w, alpha: angular velocity and acceleration of the body; J_w: its angular Jacobian)
-
-                         vector x      Jacobian J_x     rate x'        bias b_x = x'' - J_x (coordinates)''
-    direction of a body  A a0          -skew(x) J_w     w × x          alpha × x + w × (w × x)
-    point i to point j   p_j - p_i     J_j - J_i        v_j - v_i      a_j - a_i
-
-and three conditions on them
-
-    x = 0          row  J_x                       bias b_x
-    x . y = c      row  y . J_x + x . J_y         bias y . b_x + x . b_y + 2 x' . y'
-    |x| = L        row  u . J_x,  u = x / |x|     bias u . b_x + x' . x' / |x|      with u . x' = 0 already
-
-None is redundant in itself, so a loop has dependent rows only where its geometry makes them so (planar loops).
+No joint's own rows are redundant, so a loop has dependent rows only where its geometry makes them so (planar loops).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Vec3
-from ..core.joints import Distance, Fixed, Joint, Revolute, Spherical, Translational, Universal
+from ..core.joints import (
+    ConstantVelocity,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Inline,
+    InPlane,
+    Joint,
+    OrientationLock,
+    ParallelAxes,
+    PerpendicularAxes,
+    Planar,
+    Revolute,
+    RevoluteSpherical,
+    Screw,
+    Spherical,
+    Translational,
+    Universal,
+)
 from ..core.joints.base import triad, unit
+from ..core.mechanism import Mechanism, Vector
 from ..core.trajectory import Array
-
-
-class Frame(Protocol):
-    """A point of a body and axes that are global at design, in the simulator's current configuration; global axes."""
-
-    @property
-    def position(self) -> Array:
-        """Of the point [m], shape (3,)."""
-        ...
-
-    @property
-    def rotation(self) -> Array:
-        """Of the body since design, shape (3, 3)."""
-        ...
-
-    @property
-    def jacobian(self) -> Array:
-        """Of the point over that of the rotation, shape (6, unknowns)."""
-        ...
-
-    @property
-    def velocity(self) -> Array:
-        """Of the point [m/s] and angular [rad/s], shape (6,)."""
-        ...
-
-    @property
-    def acceleration(self) -> Array:
-        """Of the point [m/s^2] and angular [rad/s^2], shape (6,); where the coordinates have none, it is Jdot v."""
-        ...
-
-
-class Vector(Protocol):
-    """A vector that moves with the mechanism."""
-
-    def placed(self) -> tuple[Array, Array]:
-        """x and J_x, shapes (3,) and (3, unknowns)."""
-        ...
-
-    def moving(self) -> tuple[Array, Array, Array]:
-        """x, its rate and its bias, each of shape (3,)."""
-        ...
-
-
-class Condition(Protocol):
-    """n equations; zero where they hold."""
-
-    @property
-    def n(self) -> int: ...
-
-    def rows(self) -> tuple[Any, Array]:
-        """Residuals [m or -], n of them, and their Jacobian, n rows."""
-        ...
-
-    def bias(self) -> Any:
-        """Jdot v, n numbers."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Direction:
-    """A unit vector a0 of a body, as it is at design."""
-
-    frame: Frame
-    a0: Array
-
-    def placed(self) -> tuple[Array, Array]:
-        x = self.frame.rotation @ self.a0
-        return x, -_skew(x) @ self.frame.jacobian[3:]
-
-    def moving(self) -> tuple[Array, Array, Array]:
-        x, w, alpha = self.frame.rotation @ self.a0, _skew(self.frame.velocity[3:]), _skew(self.frame.acceleration[3:])
-        return x, w @ x, alpha @ x + w @ (w @ x)
-
-
-@dataclass(frozen=True, eq=False)
-class Difference:
-    """From the point of frame i to that of frame j [m]."""
-
-    i: Frame
-    j: Frame
-
-    def placed(self) -> tuple[Array, Array]:
-        return self.j.position - self.i.position, (self.j.jacobian - self.i.jacobian)[:3]
-
-    def moving(self) -> tuple[Array, Array, Array]:
-        rate, bias = self.j.velocity - self.i.velocity, self.j.acceleration - self.i.acceleration
-        return self.j.position - self.i.position, rate[:3], bias[:3]
-
-
-@dataclass(frozen=True, eq=False)
-class Coincident:
-    """x = 0."""
-
-    x: Vector
-    n = 3
-
-    def rows(self) -> tuple[Any, Array]:
-        return self.x.placed()
-
-    def bias(self) -> Any:
-        return self.x.moving()[2]
-
-
-@dataclass(frozen=True, eq=False)
-class Dot:
-    """x . y = c."""
-
-    x: Vector
-    y: Vector
-    c: float = 0.0
-    n = 1
-
-    def rows(self) -> tuple[Any, Array]:
-        (x, J_x), (y, J_y) = self.x.placed(), self.y.placed()
-        return x @ y - self.c, y @ J_x + x @ J_y
-
-    def bias(self) -> Any:
-        (x, x_dot, b_x), (y, y_dot, b_y) = self.x.moving(), self.y.moving()
-        return y @ b_x + x @ b_y + 2.0 * (x_dot @ y_dot)
-
-
-@dataclass(frozen=True, eq=False)
-class Length:
-    """|x| = L: the length itself, so that the row is in metres like the others."""
-
-    x: Vector
-    L: float
-    n = 1
-
-    def rows(self) -> tuple[Any, Array]:
-        x, J_x = self.x.placed()
-        length = np.sqrt(x @ x)
-        return length - self.L, (x / length) @ J_x
-
-    def bias(self) -> Any:
-        x, x_dot, b_x = self.x.moving()
-        return (x @ b_x + x_dot @ x_dot) / np.sqrt(x @ x)
+from .conditions import Coincident, Condition, Difference, Direction, Dot, EqualDots, Frame, Length, Thread
 
 
 @dataclass(frozen=True)
 class Closure:
-    """How a joint type is cut: what its rows say, and the rows."""
+    """How a joint type is cut: what its rows say, and the rows.
+
+    The frames are where `ends_of` says.
+    """
 
     text: str
     conditions: Callable[[Any, Frame, Frame], Sequence[Condition]]
 
 
-def _common_point(i: Frame, j: Frame) -> list[Condition]:
+def _at_point(i: Frame, j: Frame) -> list[Condition]:
     return [Coincident(Difference(i, j))]
 
 
@@ -195,32 +69,74 @@ def _on_line(joint: Any, i: Frame, j: Frame) -> list[Condition]:
     return [Dot(Direction(i, a), Difference(i, j)) for a in (f, g)]
 
 
-def _cross(joint: Any, i: Frame, j: Frame) -> list[Condition]:
-    # a table rounds the right angle of the cross; its design angle is what two hinges keep
+def _on_plane(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+    return [Dot(Direction(i, _array(unit(joint.axis))), Difference(i, j))]
+
+
+def _crossed(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+    # a table rounds the right angle; the design angle is what two hinges keep
     a, b = (_array(unit(axis)) for axis in joint.axes)
     return [Dot(Direction(i, a), Direction(j, b), float(a @ b))]
 
 
+def _link(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+    h, d = _array(unit(joint.axis)), np.subtract(*joint.points[::-1])
+    return [Length(Difference(i, j), math.hypot(*d)), Dot(Direction(i, h), Difference(i, j), float(h @ d))]
+
+
+def twistless(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+    """The row of a constant-velocity joint about its shafts: with f × g along each of them, f_i . g_j = g_i . f_j."""
+    f, g, h = triad(joint.axes[0])
+    # the shortest rotation from h to the other shaft acts on what is normal to h as the reflection that takes h to its opposite
+    m = unit(tuple(h + unit(joint.axes[1])))
+    f_j, g_j = (_array(a - (2.0 * (m @ a)) * m) for a in (f, g))
+    left, right = ((f, g_j), (g, f_j))
+    return [EqualDots(*(Dot(Direction(i, _array(a)), Direction(j, b)) for a, b in (left, right)))]
+
+
+def _threaded(joint: Screw, i: Frame, j: Frame) -> list[Condition]:
+    f, _, h = map(_array, triad(joint.axis))
+    return [Thread(i, j, f, h, joint.lead / (2.0 * math.pi))]
+
+
 CLOSURES: dict[type[Joint], Closure] = {
-    Spherical: Closure("points coincide (3 rows)", lambda joint, i, j: _common_point(i, j)),
-    Revolute: Closure(
-        "points coincide (3 rows), axes parallel (2)", lambda joint, i, j: _common_point(i, j) + _parallel(joint, i, j)
-    ),
+    Spherical: Closure("points coincide (3 rows)", lambda joint, i, j: _at_point(i, j)),
+    Revolute: Closure("points coincide (3 rows), axes parallel (2)", lambda joint, i, j: _at_point(i, j) + _parallel(joint, i, j)),
     Translational: Closure("axes aligned (3 rows), point on line (2)", lambda joint, i, j: _alike(i, j) + _on_line(joint, i, j)),
     Universal: Closure(
-        "points coincide (3 rows), axes at right angle (1)", lambda joint, i, j: _common_point(i, j) + _cross(joint, i, j)
+        "points coincide (3 rows), axes at right angle (1)", lambda joint, i, j: _at_point(i, j) + _crossed(joint, i, j)
     ),
-    Fixed: Closure("points coincide (3 rows), axes aligned (3)", lambda joint, i, j: _common_point(i, j) + _alike(i, j)),
+    Fixed: Closure("points coincide (3 rows), axes aligned (3)", lambda joint, i, j: _at_point(i, j) + _alike(i, j)),
     Distance: Closure("points at constant distance (1 row)", lambda joint, i, j: [Length(Difference(i, j), joint.rod_length)]),
+    Cylindrical: Closure(
+        "axes parallel (2 rows), point on line (2)", lambda joint, i, j: _parallel(joint, i, j) + _on_line(joint, i, j)
+    ),
+    Screw: Closure(
+        "axes parallel (2 rows), point on line (2), displacement by turn (1)",
+        lambda joint, i, j: _parallel(joint, i, j) + _on_line(joint, i, j) + _threaded(joint, i, j),
+    ),
+    Planar: Closure(
+        "axes parallel (2 rows), point on plane (1)", lambda joint, i, j: _parallel(joint, i, j) + _on_plane(joint, i, j)
+    ),
+    ConstantVelocity: Closure(
+        "points coincide (3 rows), shafts turn alike (1)", lambda joint, i, j: _at_point(i, j) + twistless(joint, i, j)
+    ),
+    OrientationLock: Closure("axes aligned (3 rows)", lambda joint, i, j: _alike(i, j)),
+    ParallelAxes: Closure("axes parallel (2 rows)", _parallel),
+    PerpendicularAxes: Closure("axes at right angle (1 row)", _crossed),
+    Inline: Closure("point on line (2 rows)", _on_line),
+    InPlane: Closure("point on plane (1 row)", _on_plane),
+    RevoluteSpherical: Closure("points at constant distance (1 row), link across the hinge (1)", _link),
 }
 """By exact joint type."""
 
 
+def ends_of(mechanism: Mechanism, joint: Joint) -> tuple[Vector, Vector]:
+    """Where the frames of a joint are on its first and second body, global at design [m]."""
+    # a fixed joint may come without a point and some types have none: any serves, the origin of a moving body is near
+    P = vars(joint).get("point") or next(body.origin for body in mechanism.moving if body.name in joint.bodies)
+    return vars(joint).get("points", (P, P))
+
+
 def _array(a: Vec3) -> Array:
     return np.array([*a], dtype=float)
-
-
-def _skew(a: Array) -> Array:
-    """The matrix that multiplies by a from the left in a vector product."""
-    x, y, z = a.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -8,7 +8,7 @@ velocity and classical acceleration of a frame, of which `closures` makes the ro
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,26 @@ import numpy as np
 
 from ..core.drivers import JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ..core.harness.case import Case
-from ..core.joints import Fixed, Joint, Revolute, Spherical, Translational, Universal
-from ..core.joints.base import unit
+from ..core.joints import (
+    AxialJoint,
+    ConstantVelocity,
+    Cylindrical,
+    Fixed,
+    Joint,
+    OrientationLock,
+    Planar,
+    Revolute,
+    Screw,
+    Spherical,
+    Translational,
+    Universal,
+)
+from ..core.joints.base import triad, unit
 from ..core.mechanism import GROUND, Vector
 from ..core.topology import spanning_tree
 from ..core.trajectory import Array, Trajectory
-from .closures import CLOSURES, Condition
+from .closures import CLOSURES, ends_of, twistless
+from .conditions import Condition
 from .projection import solve_by_projection
 
 
@@ -52,13 +66,10 @@ class Pinocchio:
             if type(joint) not in CLOSURES:
                 known = ", ".join(each.type for each in CLOSURES)
                 return f"{joint}: the pinocchio adapter cannot express this type; it knows {known}"
-        cut = {joint.name: joint for joint in spanning_tree(case.mechanism).cut}
         for driver in case.mechanism.drivers:
-            who = f"driver {driver.name!r} ({driver.type})"
             if type(driver) not in (PointCoordinate, JointAngle, JointDisplacement):
+                who = f"driver {driver.name!r} ({driver.type})"
                 return f"{who}: the pinocchio adapter drives point coordinates, joint angles and joint displacements only"
-            if isinstance(driver, JointDriver) and driver.joint in cut:
-                return f"{who}: {cut[driver.joint]} closes a loop of driven joints and is no coordinate of a tree; drive a point"
         return None
 
     def build(self, case: Case) -> _Model:
@@ -70,55 +81,75 @@ class Pinocchio:
         return solve_by_projection(model, case, tol, {"closures": model.closures})
 
 
-# Axes are normalised, because Pinocchio takes others without a word and then shears the body. A universal joint is two
-# revolutes, which keep the design angle of the cross where a table has rounded its right angle.
-_TREE: dict[type[Joint], Callable[[Any, Any], list[Any]]] = {
+# Axes are normalised, because Pinocchio takes others without a word and then shears the body.
+def _turns(pin: Any, *axes: Iterable[float]) -> list[Any]:
+    return [pin.JointModelRevoluteUnaligned(_unit(axis)) for axis in axes]
+
+
+def _slides(pin: Any, *axes: Iterable[float]) -> list[Any]:
+    return [pin.JointModelPrismaticUnaligned(_unit(axis)) for axis in axes]
+
+
+_TREE: dict[type[Joint], Callable[[Any, Any], Sequence[Any]]] = {
     Spherical: lambda pin, joint: [pin.JointModelSpherical()],
-    Revolute: lambda pin, joint: [pin.JointModelRevoluteUnaligned(_unit(joint.axis))],
-    Translational: lambda pin, joint: [pin.JointModelPrismaticUnaligned(_unit(joint.axis))],
-    Universal: lambda pin, joint: [pin.JointModelRevoluteUnaligned(_unit(axis)) for axis in joint.axes],
+    Revolute: lambda pin, joint: _turns(pin, joint.axis),
+    Translational: lambda pin, joint: _slides(pin, joint.axis),
+    Cylindrical: lambda pin, joint: _turns(pin, joint.axis) + _slides(pin, joint.axis),
+    # its relation makes a row
+    Screw: lambda pin, joint: _turns(pin, joint.axis) + _slides(pin, joint.axis),
+    # two hinges keep the design angle of the cross where a table has rounded its right angle
+    Universal: lambda pin, joint: _turns(pin, *joint.axes),
+    # a row keeps it from twisting
+    ConstantVelocity: lambda pin, joint: [pin.JointModelSpherical()],
+    Planar: lambda pin, joint: _slides(pin, *triad(joint.axis)[:2]) + _turns(pin, joint.axis),
+    OrientationLock: lambda pin, joint: [pin.JointModelTranslation()],
     Fixed: lambda pin, joint: [],
 }
-"""The joints of the tree that make a joint, from its first body to its second; a distance carries nothing."""
+"""Pinocchio's joints that make a joint, from first body to second, one a freedom of an axial joint; other types are always cut."""
 
 
 class _Model:
-    """The mechanism in Pinocchio; a `ProjectionModel`. Rows: those of the cut joints, then one a driver."""
+    """The mechanism in Pinocchio; a `ProjectionModel`. Rows: those of joints, then of couplers, then one a driver."""
 
     def __init__(self, pin: Any, case: Case) -> None:
         mechanism, tree = case.mechanism, spanning_tree(case.mechanism)
         self.pin, self.model, self.axes = pin, pin.Model(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        self.carrier = {name: 0 for name in (GROUND, *(body.name for body in mechanism.bodies)) if mechanism.is_fixed(name)}
+        carrier = {name: 0 for name in (GROUND, *(body.name for body in mechanism.bodies)) if mechanism.is_fixed(name)}
         self.origin = [np.zeros(3)]
-        moved: dict[str, tuple[int, int]] = {}
-        for branch in tree.branches:
-            joint, at = branch.joint, self.carrier[branch.parent]
-            if joint is None:
-                at = self._add_joint(at, pin.JointModelFreeFlyer(), mechanism.body(branch.child).origin)
-            else:
-                sign = 1 if joint.j == branch.child else -1
-                for each in _TREE[type(joint)](pin, joint)[::sign]:
-                    at = self._add_joint(at, each, vars(joint)["point"])
-                moved[joint.name] = at, sign
-            self.carrier[branch.child] = at
-
+        self.coordinates: dict[tuple[str, str], tuple[int, int]] = {}
         self.conditions: list[Condition] = []
         self.closures: dict[str, str] = {}
+        for branch in tree.branches:
+            joint, at = branch.joint, carrier[branch.parent]
+            if joint is None:
+                carrier[branch.child] = self._add_joint(at, pin.JointModelFreeFlyer(), mechanism.body(branch.child).origin)
+                continue
+            P = ends_of(mechanism, joint)[0]
+            carrier[branch.child] = self._add_chain(at, joint, P, 1 if joint.j == branch.child else -1)
+            if isinstance(joint, ConstantVelocity):
+                self.closures[joint.name] = "ball joint of the tree, shafts turn alike (1 row)"
+                self.conditions += twistless(joint, *(self._add_frame(carrier[body], P) for body in joint.bodies))
+
+        named = {name for coupler in mechanism.couplers for name in coupler.joints}
+        named |= {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
         for joint in tree.cut:
-            # a fixed joint may come without a point: any serves, the origin of a moving body is near
-            P = vars(joint).get("point") or next(body.origin for body in mechanism.moving if body.name in joint.bodies)
-            i, j = map(self._add_frame, joint.bodies, vars(joint).get("points", (P, P)))
-            closure = CLOSURES[type(joint)]
-            self.closures[joint.name] = closure.text
-            self.conditions += closure.conditions(joint, i, j)
+            (i, j), ends = (carrier[body] for body in joint.bodies), ends_of(mechanism, joint)
+            closure, copied = CLOSURES[type(joint)], ""
+            if joint.name in named:
+                # what is driven or coupled must be a coordinate, which counts the turns: it moves a copy of the second body
+                i, closure, copied = self._add_chain(i, joint, ends[0], 1), CLOSURES[Fixed], f"on a copy of {joint.j!r}: "
+            self.closures[joint.name] = copied + closure.text
+            self.conditions += closure.conditions(joint, *map(self._add_frame, (i, j), ends))
+        for each in mechanism.couplers:
+            self.conditions.append(self._linear(*zip(each.joints, each.freedoms, each.coefficients, strict=True)))
         for driver in mechanism.drivers:
             if isinstance(driver, PointCoordinate):
                 point = mechanism.point(driver.point)
-                frame = self._add_frame(point.body, point.position)
+                frame = self._add_frame(carrier[point.body], point.position)
                 self.conditions.append(_DrivenPoint(frame, _unit(driver.direction), np.array(point.position)))
             elif isinstance(driver, JointDriver):
-                self.conditions.append(_DrivenJoint(self, *moved[driver.joint]))
-        self.wanted = [self._add_frame(point.body, point.position) for point in map(mechanism.point, case.points)]
+                self.conditions.append(self._linear((driver.joint, driver.freedom, 1.0)))
+        self.wanted = [self._add_frame(carrier[point.body], point.position) for point in map(mechanism.point, case.points)]
 
         ends = np.cumsum([each.n for each in self.conditions])
         self.slices = [slice(end - each.n, end) for end, each in zip(ends, self.conditions, strict=True)]
@@ -127,15 +158,32 @@ class _Model:
         self.data = self.model.createData()
         self.reset()
 
+    def _add_chain(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
+        """The number of the last of the joints that make a joint, from its first body on or (sign -1) from its second."""
+        chain = list(enumerate(_TREE[type(joint)](self.pin, joint)))
+        for k, each in chain[::sign]:
+            at = self._add_joint(at, each, P)
+            if isinstance(joint, AxialJoint):
+                self.coordinates[joint.name, joint.freedoms[k]] = at, sign
+        for relation in joint.relations if isinstance(joint, AxialJoint) else ():
+            self.conditions.append(self._linear(*((joint.name, *term) for term in relation.items())))
+        return at
+
+    def _linear(self, *terms: tuple[str, str, float]) -> _Linear:
+        """The weighted sum of coordinates, each given by joint, freedom and weight."""
+        moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
+        joints = [self.model.joints[at] for at, _, _ in moved]
+        weights = np.array([sign * weight for _, sign, weight in moved])
+        return _Linear(self, [each.idx_q for each in joints], [each.idx_v for each in joints], weights)
+
     def _add_joint(self, parent: int, joint: Any, at: Vector) -> int:
         """The number of a new joint at that point, global at design."""
         placement = self.pin.SE3(np.eye(3), np.array(at) - self.origin[parent])
         self.origin.append(np.array(at))
         return self.model.addJoint(parent, joint, placement, f"joint {self.model.njoints}")
 
-    def _add_frame(self, body: str, at: Vector) -> _Frame:
-        """A new frame on the body at that point, global at design."""
-        joint = self.carrier[body]
+    def _add_frame(self, joint: int, at: Vector) -> _Frame:
+        """A new frame on what the joint carries, at that point, global at design."""
         placement = self.pin.SE3(np.eye(3), np.array(at) - self.origin[joint])
         # numbered, because a second frame of one name would silently be the first one
         name = f"frame {self.model.nframes}"
@@ -226,22 +274,23 @@ class _DrivenPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class _DrivenJoint:
-    """A joint's coordinate, with the sign that makes it second body relative to first [rad or m]."""
+class _Linear:
+    """A weighted sum of coordinates [m or rad]: a driver's, or zero by a coupler or a joint's own relation."""
 
     of: _Model
-    joint: int
-    sign: int
+    q: list[int]
+    v: list[int]
+    weights: Array
     n = 1
 
     def rows(self) -> tuple[Any, Array]:
-        moved, row = self.of.model.joints[self.joint], np.zeros(self.of.model.nv)
-        row[moved.idx_v] = self.sign
-        return self.sign * self.of.q[moved.idx_q], row
+        row = np.zeros(self.of.model.nv)
+        row[self.v] = self.weights
+        return self.weights @ self.of.q[self.q], row
 
     def bias(self) -> Any:
         return 0.0
 
 
-def _unit(a: Vector) -> Array:
-    return np.array([*unit(a)])
+def _unit(a: Iterable[float]) -> Array:
+    return np.array([*unit(tuple(a))])

@@ -54,7 +54,8 @@ class JointDriver(Driver):
         if self.freedom not in joint.freedoms:
             raise MechanismError(
                 f"driver {self.name!r} ({self.type}): joint {joint.name!r} is {joint.type} and has no {self.freedom} "
-                f"to drive; its freedoms: {', '.join(joint.freedoms) or 'none'}"
+                f"to drive; its freedoms: {', '.join(joint.freedoms) or 'none'}",
+                f"drivers.{self.name}.joint",
             )
 
 

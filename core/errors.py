@@ -6,7 +6,15 @@ class KincheckError(Exception):
 
 
 class MechanismError(KincheckError, ValueError):
-    """The description of a mechanism does not make sense."""
+    """The description of a mechanism does not make sense.
+
+    Attributes:
+        key: of a case file, what is to blame there ("joints.pivot.bodies"); empty where that is not known.
+    """
+
+    def __init__(self, message: str, key: str = "") -> None:
+        super().__init__(message)
+        self.key = key
 
 
 class CaseError(KincheckError, ValueError):

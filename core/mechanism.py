@@ -77,38 +77,43 @@ class Mechanism:
             object.__setattr__(self, what, tuple(getattr(self, what)))
             _unique(what, [each.name for each in getattr(self, what)])
         if any(body.name == GROUND for body in self.bodies):
-            raise MechanismError(f"body {GROUND!r} exists by itself; give the fixed body another name or leave it out")
+            raise MechanismError(f"body {GROUND!r} exists by itself; give the fixed body another name or leave it out", "bodies")
         known = [GROUND, *(body.name for body in self.bodies)]
         for joint in self.joints:
             for name in joint.bodies:
-                _known(f"joint {joint.name!r} ({joint.type})", "body", name, known)
+                _known(f"joint {joint.name!r} ({joint.type})", "body", name, known, f"joints.{joint.name}.bodies")
             if self.is_fixed(joint.bodies[0]) and self.is_fixed(joint.bodies[1]):
                 raise MechanismError(
                     f"joint {joint.name!r} ({joint.type}): {joint.bodies[0]!r} and {joint.bodies[1]!r} are both fixed; "
-                    "join a moving body or remove the joint"
+                    "join a moving body or remove the joint",
+                    f"joints.{joint.name}.bodies",
                 )
         for point in self.points:
-            _known(f"point {point.name!r}", "body", point.body, known)
+            _known(f"point {point.name!r}", "body", point.body, known, f"points.{point.name}.body")
         for coupler in self.couplers:
             for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
-                who = f"joint {coupler.name!r} ({coupler.type})"
-                _known(who, "joint", name, [joint.name for joint in self.joints])
+                who, key = f"joint {coupler.name!r} ({coupler.type})", f"joints.{coupler.name}.joints"
+                _known(who, "joint", name, [joint.name for joint in self.joints], key)
                 joint = self.joint(name)
                 if freedom not in joint.freedoms:
                     raise MechanismError(
                         f"{who}: joint {name!r} is {joint.type} and has no {freedom} to couple; "
-                        f"its freedoms: {', '.join(joint.freedoms) or 'none'}"
+                        f"its freedoms: {', '.join(joint.freedoms) or 'none'}",
+                        key,
                     )
         for driver in self.drivers:
             if isinstance(driver, PointCoordinate):
-                _known(f"driver {driver.name!r}", "point", driver.point, [point.name for point in self.points])
+                key = f"drivers.{driver.name}.point"
+                _known(f"driver {driver.name!r}", "point", driver.point, [point.name for point in self.points], key)
                 if self.is_fixed(self.point(driver.point).body):
                     raise MechanismError(
                         f"driver {driver.name!r}: point {driver.point!r} is on {self.point(driver.point).body!r}, which is "
-                        "fixed; drive a point of a moving body"
+                        "fixed; drive a point of a moving body",
+                        key,
                     )
             elif isinstance(driver, JointDriver):
-                _known(f"driver {driver.name!r}", "joint", driver.joint, [joint.name for joint in self.joints])
+                key = f"drivers.{driver.name}.joint"
+                _known(f"driver {driver.name!r}", "joint", driver.joint, [joint.name for joint in self.joints], key)
                 driver.check(self.joint(driver.joint))
 
     def is_fixed(self, name: str) -> bool:
@@ -150,12 +155,12 @@ def _find(items: Iterable[_Named], name: str) -> _Named:
 def _unique(what: str, names: Sequence[str]) -> None:
     twice = {name for name in names if names.count(name) > 1}
     if twice:
-        raise MechanismError(f"{what}: the name {min(twice)!r} is used more than once; names must be unique")
+        raise MechanismError(f"{what}: the name {min(twice)!r} is used more than once; names must be unique", what)
 
 
-def _known(who: str, what: str, name: str, known: Sequence[str]) -> None:
+def _known(who: str, what: str, name: str, known: Sequence[str], key: str) -> None:
     if name in known:
         return
     close = difflib.get_close_matches(name, known, n=1)
     remedy = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(sorted(known)) or 'none'}"
-    raise MechanismError(f"{who}: there is no {what} {name!r}; {remedy}")
+    raise MechanismError(f"{who}: there is no {what} {name!r}; {remedy}", key)

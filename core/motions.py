@@ -9,7 +9,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from enum import Enum
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,15 +19,38 @@ from .errors import MechanismError
 from .trajectory import Array
 
 
+class Measure(Enum):
+    """What a field of a motion is measured in; tells a reader which unit applies. A field without is in seconds or hertz."""
+
+    DRIVER = "driver"
+    ANGLE = "angle"
+
+
+def driven() -> Any:
+    """Numbers in the unit of the driver [m or rad], or that per second."""
+    return field(metadata={"measure": Measure.DRIVER})
+
+
+def angle(**options: Any) -> Any:
+    """An angle [rad]."""
+    return field(metadata={"measure": Measure.ANGLE}, **options)
+
+
 @dataclass(frozen=True)
 class Motion(ABC):
-    """Base of the motions. Declaring one registers its type, which case files name."""
+    """Base of the motions. Declaring one with a type registers it; case files name it."""
 
     type: ClassVar[str]
     registry: ClassVar[dict[str, type[Motion]]] = {}
 
     def __init_subclass__(cls) -> None:
-        Motion.registry[cls.type] = cls
+        if "type" in cls.__dict__:
+            Motion.registry[cls.type] = cls
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The times it is given for [s]."""
+        return -math.inf, math.inf
 
     @abstractmethod
     def at(self, t: Array) -> tuple[Array, Array, Array]:
@@ -34,10 +59,10 @@ class Motion(ABC):
 
 @dataclass(frozen=True)
 class Ramp(Motion):
-    """value = rate * t."""
+    """value = rate * t; rate in driver units per second."""
 
     type = "ramp"
-    rate: float
+    rate: float = driven()
 
     def __post_init__(self) -> None:
         _finite("ramp", rate=self.rate)
@@ -48,12 +73,12 @@ class Ramp(Motion):
 
 @dataclass(frozen=True)
 class Sine(Motion):
-    """value = amplitude * sin(2 pi frequency t + phase); frequency in Hz, phase in radians."""
+    """value = amplitude * sin(2 pi frequency t + phase); frequency in Hz, phase an angle."""
 
     type = "sine"
-    amplitude: float
+    amplitude: float = driven()
     frequency: float
-    phase: float = 0.0
+    phase: float = angle(default=0.0)
 
     def __post_init__(self) -> None:
         _finite("sine", amplitude=self.amplitude, frequency=self.frequency, phase=self.phase)
@@ -66,14 +91,14 @@ class Sine(Motion):
 
 @dataclass(frozen=True)
 class Table(Motion):
-    """The natural cubic spline through values at increasing times: twice differentiable, so that accelerations exist.
+    """The natural cubic spline through values at increasing times [s]: twice differentiable, so that accelerations exist.
 
     Outside the table the end pieces go on.
     """
 
     type = "table"
     times: tuple[float, ...]
-    values: tuple[float, ...]
+    values: tuple[float, ...] = driven()
 
     def __post_init__(self) -> None:
         if len(self.times) != len(self.values) or len(self.times) < 2:
@@ -85,12 +110,35 @@ class Table(Motion):
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
             raise MechanismError("table motion: times do not increase; sort them and remove repeats")
 
-    def at(self, t: Array) -> tuple[Array, Array, Array]:
+    @property
+    def span(self) -> tuple[float, float]:
+        return self.times[0], self.times[-1]
+
+    @cached_property
+    def _spline(self) -> Any:
         # slow to import, and rarely wanted
         from scipy.interpolate import CubicSpline  # pyright: ignore[reportMissingTypeStubs]
 
-        spline = CubicSpline(self.times, self.values, bc_type="natural")
-        return spline(t), spline(t, 1), spline(t, 2)
+        return CubicSpline(self.times, self.values, bc_type="natural")
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        return self._spline(t), self._spline(t, 1), self._spline(t, 2)
+
+
+@dataclass(frozen=True)
+class Absolute(Motion):
+    """A motion that gives a driver's absolute value, measured from the design value as all motions are on the way."""
+
+    motion: Motion
+    design: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        return self.motion.span
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        value, velocity, acceleration = self.motion.at(t)
+        return value - self.design, velocity, acceleration
 
 
 @dataclass(frozen=True, eq=False)

@@ -221,13 +221,15 @@ def residuals(mechanism, now):
 
 
 def taylor(function, radius=0.1, points=32):
-    """Value, first and second derivative at t = 0 of an analytic function of t, from its values on a circle (Cauchy).
+    """Value, first and second derivative at t = 0 of an analytic function, real for real t, from values on a circle (Cauchy).
 
     No step size to trade: aliasing is (radius / radius of convergence)^points, round-off 1e-16 / radius^order.
     """
-    circle = radius * np.exp(2j * np.pi * np.arange(points) / points)
+    circle = radius * np.exp(2j * np.pi * np.arange(points // 2 + 1) / points)
     values = np.array([function(t) for t in circle])
-    return [factorial * np.real((circle**-k) @ values) / points for k, factorial in enumerate((1.0, 1.0, 2.0))]
+    # the lower half is conjugate to the upper: all but the two real points count twice
+    weights = np.r_[1.0, np.full(points // 2 - 1, 2.0), 1.0] / points
+    return [factorial * np.real((weights * circle**-k) @ values) for k, factorial in enumerate((1.0, 1.0, 2.0))]
 
 
 def along(bodies):
@@ -244,3 +246,8 @@ def along(bodies):
         return poses
 
     return at
+
+
+def sample(found, k):
+    """One sample of a solution's bodies, as `along` takes them."""
+    return {name: (each.r[k], each.p[k], each.v[k], each.a[k]) for name, each in found.bodies.items()}

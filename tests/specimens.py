@@ -200,6 +200,11 @@ def driven_angle(rng):
     return Specimen(p.DrivenAngle(h, drive.numbers), drive, turn)
 
 
+def constant_velocity(rng):
+    (f_i, g_i, _), (f_j, g_j, _) = frame(rng), frame(rng)
+    return Specimen(p.ConstantVelocity(f_i, g_i, f_j, g_j))
+
+
 def named_turn(rng):
     specimen = driven_angle(rng)
     return replace(specimen, primitive=p.NamedTurn(specimen.primitive.h, specimen.drive.numbers))
@@ -211,6 +216,7 @@ def named_slide(rng):
 
 
 MAKERS = {
+    p.ConstantVelocity: constant_velocity,
     p.Distance: distance,
     p.Dot10: dot10,
     p.Dot11: dot11,

@@ -57,9 +57,18 @@ def test_branch_of_dot11(rng):
     assert np.abs(specimen.primitive.branch(i.pose, j.pose)[0] - 1.0).max() < 1e-14
 
 
-def test_of_the_native_primitives_only_dot11_needs_a_branch_test(rng):
+def test_branch_of_constant_velocity():
+    """A turn of 180 degrees about the shaft has no twist either; bent to a right angle the branch is still the intended one."""
+    shafts = p.ConstantVelocity(X, Y, X, Y)
+    for turn, right in ((rotation(Y, 1.5), True), (rotation(Vec3(0.6, 0.8, 0.0), -1.5), True), (rotation(Z, np.pi), False)):
+        over = Pose.of(ZERO, turn)
+        assert abs(shafts.phi(GROUND_POSE, over)[0]) < 1e-15
+        assert (shafts.branch(GROUND_POSE, over)[0] > 0.1) == right
+
+
+def test_of_the_native_primitives_these_need_a_branch_test(rng):
     i, j = body(rng), body(rng)
-    assert [kind for kind in MAKERS if make(kind, rng).primitive.branch(i.pose, j.pose)] == [p.Dot11]
+    assert [kind for kind in MAKERS if make(kind, rng).primitive.branch(i.pose, j.pose)] == [p.ConstantVelocity, p.Dot11]
 
 
 def newton_from(q, primitive, rows, iterations):

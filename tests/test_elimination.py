@@ -75,6 +75,14 @@ def test_partial_pivoting_takes_the_largest():
     assert found == pytest.approx(np.ones((2, 2)), rel=1e-15)
 
 
+def test_a_small_literal_is_no_safe_pivot():
+    """As the one before, with the small entry known while tracing."""
+    values = np.array([[[1e-20, 1.0], [1.0, 1.0]]])
+    literals = np.array([[True, False], [False, False]])
+    found, _, _ = eliminate(values, literals, np.array([[1.0, 2.0]]))
+    assert found == pytest.approx(np.ones((1, 2)), rel=1e-15)
+
+
 def test_constant_blocks_are_used_up_first():
     """The +-I blocks of the simplified rows leave a core of the rest only, whatever stands beside them."""
     tape = Tape()

@@ -119,7 +119,7 @@ def test_unreachable_stroke_ends_with_a_message():
     last = np.flatnonzero(trajectory.solved)[-1]
     assert trajectory.solved[: last + 1].all()
     assert case.sweep.values[last] == pytest.approx(0.293)
-    assert "last reachable sample 0.293" in trajectory.message
+    assert "last reachable sample at stroke = 0.293;" in trajectory.message
     assert np.isfinite(trajectory.points["wheel"].acceleration[: last + 1]).all()
     assert np.isnan(trajectory.points["wheel"].position[last + 1 :]).all()
 
@@ -273,7 +273,7 @@ def test_nothing_is_printed_and_no_file_is_written(capfd, tmp_path, monkeypatch)
     assert list(Path(tmp_path).iterdir()) == []
 
 
-class Screw(Revolute):
+class Ratchet(Revolute):
     """A subclass of a known joint that means something else."""
 
 
@@ -284,8 +284,8 @@ class Wobble(Driver):
 
 def test_unknown_joints_and_drivers_are_unsupported_by_name():
     case = strut([0.0])
-    screw = Screw("thread", "ground", "knuckle", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    for change, who in (({"joints": [screw]}, "'thread'"), ({"drivers": [Wobble("shaker")]}, "'shaker' (wobble)")):
+    ratchet = Ratchet("pawl", "ground", "knuckle", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    for change, who in (({"joints": [ratchet]}, "'pawl'"), ({"drivers": [Wobble("shaker")]}, "'shaker' (wobble)")):
         assert who in (Exudyn().unsupported(replace(case, mechanism=replace(case.mechanism, **change))) or "")
 
 

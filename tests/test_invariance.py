@@ -29,6 +29,8 @@ def assert_same(found, expected, position=2e-16, velocity=2e-15, acceleration=2e
 @pytest.mark.parametrize("rate", [0.25, -2.0, 1e3])
 def test_rate_scales_velocities_and_accelerations(rate):
     expected, found = wheel(), wheel(rate=rate)
+    once, scaled = (solve(mcpherson(), "stroke", STROKES, rate=each).iterations for each in (1.0, rate))
+    assert sorted(once) == sorted(scaled)  # predicted as well; a negative rate starts at the other side
     assert np.abs(found.position - expected.position).max() <= 2e-16
     assert found.velocity == pytest.approx(rate * expected.velocity, rel=1e-13, abs=1e-15 * abs(rate))
     assert found.acceleration == pytest.approx(rate**2 * expected.acceleration, rel=1e-13, abs=1e-14 * rate**2)

@@ -34,10 +34,15 @@ def half(phi, L):
     return phi * (1.0 + phi / (2.0 * L))
 
 
+def twist(i, j, x):
+    return naive.dot10(i, j, x.f_i, x.g_j) - naive.dot10(i, j, x.g_i, x.f_j)
+
+
 NO_ARM = np.zeros(3)
 TWINS = {
     PaperDot12: lambda x, i, j: naive.dot12(i, j, np.eye(3), np.eye(3)),
     p.Dot10: lambda x, i, j: [naive.dot10(i, j, x.a, x.b) - x.a @ x.b],
+    p.ConstantVelocity: lambda x, i, j: [twist(i, j, x) - twist(naive.GROUND, naive.GROUND, x)],
     p.Dot11: lambda x, i, j: naive.dot11(i, j, (x.f, x.g, x.h), (x.f, x.g, x.h)),
     p.Dot20: lambda x, i, j: [naive.dot20(i, j, x.a, x.s_i, x.s_j) - x.a @ x.d0 - x.drive.c],
     p.Spherical: lambda x, i, j: naive.spherical(i, j, x.s_i, x.s_j),

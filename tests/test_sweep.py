@@ -207,8 +207,8 @@ def test_lock_up(far, limit, steps):
     beyond, wanted, pivot, last = (
         float(x)
         for x in re.match(
-            r"driver 'stroke' cannot be followed beyond (\S+) \(wanted (\S+)\): .*; smallest pivot there (\S+) .*lock-up.*"
-            r"last reachable sample (\S+); shorten the sweep",
+            r"cannot be followed beyond stroke = (\S+) \(wanted stroke = (\S+)\): .*; smallest pivot there (\S+) .*lock-up.*"
+            r"last reachable sample at stroke = (\S+); shorten the sweep",
             found.message,
         ).groups()
     )
@@ -227,7 +227,7 @@ def test_both_ends_are_told():
 def test_an_end_before_the_first_sample():
     found = solve(mcpherson(), "stroke", [0.4])
     assert not found.solved.any()
-    assert "no sample reached on this side of the design" in found.message
+    assert "no sample reached on this side" in found.message
     assert found.points["wheel"].position.shape == (1, 3)
 
 

@@ -18,9 +18,6 @@ from ..trajectory import Array
 from .continuity import LARGEST_DEVIATION, NEGLIGIBLE
 from .model import Model
 
-# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
-LAST_ITERATION = 1e-9
-MAX_ITERATIONS = 12
 # More lanes than this leave the processor's cache, fewer leave numpy idle.
 LANES = 256
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once.
@@ -116,16 +113,11 @@ class _Marcher:
             used = front.lanes.stop
             self.block[:, front.lanes] = front.anchor[:, None]
             self.block[self.slots["h"], front.lanes] = front.aims - front.at
-        self.executor.run("predict")
-        predicted = self.block[self.model.state, :used]
-        for front in active:
             self.model.drive(self.block[:, front.lanes], self.path.drive(self.model.request.drivers, front.aims))
-        iterations, done = self._newton(used)
-        if self.model.request.order:
-            self.executor.run("motion")
-        self.executor.run("outputs")
-        done &= self._closed()[:used]
-        drift = self.block[self.model.state, :used] - predicted
+        self.executor.attempt(used)
+        iterations = self.block[self.slots["iterations"], :used]
+        done = (self.block[self.slots["done"], :used] > 0.0) & self._closed()[:used]
+        drift = self.block[self.model.state, :used] - self.block[self.model.predicted, :used]
         moves = [self._accept(front, done, drift, iterations) for front in active]
         if self.model.request.order < 2 and any(len(front.ahead) for front in active):
             self.executor.run("tangent")
@@ -133,24 +125,12 @@ class _Marcher:
             if lane is not None:
                 front.anchor = self.block[:, lane].copy()
 
-    def _newton(self, used: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Iterate until the used lanes are done; (iterations, converged) of each."""
-        residual = self.block[self.slots["residual"], :used]
-        iterations, done = np.zeros(used, dtype=np.int64), np.zeros(used, dtype=np.bool_)
-        for _ in range(MAX_ITERATIONS):
-            self.executor.run("newton")
-            iterations += ~done
-            done |= residual < LAST_ITERATION
-            if (done | ~np.isfinite(residual)).all():
-                break
-        return iterations, done
-
     def _closed(self) -> NDArray[np.bool_]:
         """Lanes that close within the tolerance, on the intended branch, and agree with the redundant rows."""
         closure, branch, leftover = (self.block[self.slots[name]] for name in ("closure", "branch", "leftover"))
         return (closure <= self.tol) & (branch > 0.0) & (leftover <= max(CONSISTENT, self.tol))
 
-    def _accept(self, front: _Front, done: NDArray[np.bool_], drift: Array, iterations: NDArray[np.int64]) -> int | None:
+    def _accept(self, front: _Front, done: NDArray[np.bool_], drift: Array, iterations: Array) -> int | None:
         """Keep the samples that connect to the front; the lane to go on from, or None where the front stays or ends."""
         first, count = front.lanes.start, front.samples
         good = done[front.lanes] & self._connected(front, drift[:, front.lanes])

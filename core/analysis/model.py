@@ -8,9 +8,14 @@ import numpy as np
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..program import NumpyExecutor, Program
+from ..program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
+from ..program.compiled import available
 from ..trajectory import Array
 from .programs import Request, Tracer
+
+# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
+LAST_ITERATION = 1e-9
+MAX_ITERATIONS = 12
 
 
 def compile_model(mechanism: Mechanism, request: Request) -> Model:
@@ -44,10 +49,17 @@ class Model:
             tracer.frame,
         )
         self.programs: Mapping[str, Program] = {program.name: program for program in programs}
+        for name in ("iterations", "done"):
+            tracer.layout.scalar(name)
         self.slots, self.vectors = tracer.layout.slots, tracer.layout.vectors
         self._at_design = tracer.formulation.design
         self.state = np.array([slot for name in self._at_design for slot in self.vectors[name]])
-        self._executors: dict[int, NumpyExecutor] = {}
+        self.predicted = np.array([slot for name in self._at_design for slot in self.vectors[f"predicted {name}"]])
+        after = ["motion", "outputs"] if self.request.order else ["outputs"]
+        self._plan = Plan(self.programs, self.slots, after, LAST_ITERATION, MAX_ITERATIONS)
+        compiled = self.request.compiled and available()
+        self._code = LlvmCode(self._plan) if compiled else None
+        self._executors: dict[int, Executor] = {}
         self._design = self._solve_design()
 
     @property
@@ -55,10 +67,10 @@ class Model:
         """Operations and flops per lane of each program."""
         return {name: {"operations": len(each.nodes), "flops": each.flops} for name, each in self.programs.items()}
 
-    def executor(self, lanes: int) -> NumpyExecutor:
+    def executor(self, lanes: int) -> Executor:
         """The programs bound to a block of that many lanes; kept, because binding costs as much as running."""
         if lanes not in self._executors:
-            self._executors[lanes] = NumpyExecutor(self.programs.values(), np.zeros((len(self.slots), lanes)))
+            self._executors[lanes] = LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes)
         return self._executors[lanes]
 
     def drive(self, block: Array, drive: Array) -> None:

@@ -35,6 +35,7 @@ class Request:
         points, bodies: names whose motion is wanted.
         order: 0 positions, 1 and velocities, 2 and accelerations.
         style: how the rows are written.
+        compiled: run by machine code where llvmlite is installed, else by numpy; the same results to round-off.
     """
 
     drivers: tuple[str, ...]
@@ -42,6 +43,7 @@ class Request:
     bodies: tuple[str, ...] = ()
     order: int = 2
     style: Style = Style.NATIVE
+    compiled: bool = True
 
 
 RATE, RATE_T = "rate", "rate_t"
@@ -130,7 +132,10 @@ class Tracer:
         v, a = self._vector(RATE, self.unknowns), self._vector(RATE_T, self.unknowns)
         step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
         out: dict[int, Scalar] = {}
-        self._store_state(out, self.formulation.retract(self.at, step))
+        predicted = self.formulation.retract(self.at, step)
+        self._store_state(out, predicted)
+        for name, value in predicted.items():  # kept, to see what the iteration makes of it
+            self._store(out, f"predicted {name}", value)
         return program("predict", self.tape, out)
 
     def outputs(self) -> Program:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
@@ -48,12 +50,29 @@ def solve(
         The motion; NaN where a sample cannot be reached, and the reason in its message.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
+        SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
+            argument makes no sense.
     """
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
+    _require(order in (0, 1, 2), f"order is {order}, expected 0, 1 or 2")
+    _require(math.isfinite(rate) and rate != 0.0, f"rate is {rate}, expected driver units per second other than 0; 1 serves")
+    _require(bool(np.isfinite(values).all()), "values are not all finite; give finite driver values")
+    for what, names, known in (
+        ("driver", [driver, *(motions or {})], mechanism.drivers),
+        ("point", wanted, mechanism.points),
+        ("body", bodies, mechanism.bodies),
+    ):
+        for name in names:
+            there = [each.name for each in known]
+            _require(name in there, f"there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
     path = Path({**(motions or {}), driver: Ramp(rate)}, np.asarray(values, dtype=np.float64) / rate)
     model = compile_model(mechanism, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style)))
     return sweep(model, path, tol)
+
+
+def _require(holds: bool, otherwise: str) -> None:
+    if not holds:
+        raise SolveError(f"solve: {otherwise}")
 
 
 def sweep(model: Model, path: Path, tol: float) -> Trajectory:

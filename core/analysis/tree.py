@@ -2,8 +2,8 @@
 
 A tree joint is a chain of steps from the parent to the child, each with its unknowns: a turn about an axis, a slide along one, or a
 ball (any rotation). Axes are given at design and carried by the chain: body axes are parallel to the global ones at design, so a
-turn by theta about a is the rotation [cos theta/2, a sin theta/2] after those before it. In global axes, with h the carried axis and
-p the joint's point on the chain:
+turn by theta about a is the rotation [cos theta/2, a sin theta/2] after those before it. In global axes, with h the carried axis
+and p the joint's point on the chain:
 
     turn    q = q Q(theta)          w = w + theta_t h         wdot = wdot + theta_tt h + w x theta_t h
     slide   p = p + d h             v = v + d_t h + w x d h   vdot = vdot + d_tt h + 2 w x d_t h + wdot x d h + w x (w x d h)

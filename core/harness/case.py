@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from ..mechanism import Mechanism, Vector
-from ..motions import Motion, Path, Ramp
+from ..motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
 
 TIME = "time"
@@ -37,7 +37,8 @@ class Sweep:
         values: driver values in the order start..stop [m or rad], or times [s], shape (n,).
         rate: driver units per second; velocities and accelerations are per second at this constant rate.
         design: the driver's value at the design position: zero unless its values are absolute [m or rad].
-        motions: of the drivers other than the swept one, over the time in which that goes from its design value at the rate.
+        motions: of the drivers other than the swept one, from their design values, over the time in which the swept one goes
+            from its design value at the rate.
     """
 
     driver: str
@@ -54,9 +55,18 @@ class Sweep:
     @property
     def path(self) -> Path:
         """How all moving drivers go with time, and the times of the samples."""
+        design = {name: motion.design for name, motion in self.motions.items() if isinstance(motion, Absolute)}
         if self.driver == TIME:
-            return Path(self.motions, self.values)
-        return Path({**self.motions, self.driver: Ramp(self.rate)}, self.change / self.rate, {self.driver: self.design})
+            return Path(self.motions, self.values, design)
+        moved = {self.driver: Ramp(self.rate), **self.motions}
+        return Path(moved, self.change / self.rate, {self.driver: self.design, **design})
+
+    @property
+    def moved(self) -> dict[str, Array]:
+        """What is swept [m, rad or s], then every further moving driver [m or rad], at the samples, shape (n,) each."""
+        path = self.path
+        further = {name: path.design.get(name, 0.0) + motion.at(path.times)[0] for name, motion in self.motions.items()}
+        return {self.driver: self.values, **further}
 
 
 @dataclass(frozen=True)

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import msgspec
-import numpy as np
-
-from ..drivers import Driver, JointAngle, JointDisplacement, PointCoordinate
-from ..errors import MechanismError
-from ..joints import Joint, Kind
+from ..joints import Coupler, Joint, Kind
 from ..mechanism import Body, Mechanism, Point, Vector
-from .case import Case, Output, Sweep, Truth
-from .document import as_table, fault, join, parse, read_text, remedy, shown, typed
+from .case import Case, Output, Truth
+from .document import class_of, explained, fault, join, parse, read_text, remedy, shown, typed
+from .driving import read_drivers, read_sweep
 from .reference import Convert, ReferenceKeys, is_derivative, read_reference
 from .schema import (
     SCHEMA,
@@ -25,11 +20,10 @@ from .schema import (
     CaseKeys,
     OutputKeys,
     PointKeys,
-    SweepKeys,
     UnitsKeys,
-    driver_keys,
-    geometry,
     joint_keys,
+    kind_of,
+    own_fields,
 )
 
 LARGEST_FILE = 4_000_000
@@ -43,7 +37,6 @@ DEFAULT_WHY = (
 
 LENGTHS: Mapping[str, Convert] = {"m": float, "mm": lambda x: x / 1000.0}
 ANGLES: Mapping[str, Convert] = {"rad": float, "deg": math.radians}
-DRIVERS: Mapping[str, type[Driver]] = {cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)}
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -62,7 +55,7 @@ def load_case(path: str | Path) -> Case:
     units = typed(file, "units", keys.units, UnitsKeys)
     length, angle = LENGTHS[units.length], ANGLES[units.angle]
     mechanism = _mechanism(file, keys, length)
-    sweep, driver_unit = _sweep(file, keys, mechanism, length, angle)
+    sweep, driver_unit = read_sweep(file, keys, mechanism, length, angle)
     outputs = _outputs(file, keys, mechanism, length)
     case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
     if keys.reference is None:
@@ -76,17 +69,8 @@ def load_case(path: str | Path) -> Case:
     return replace(case, truth=keys.truth, reference=series)
 
 
-@contextmanager
-def _explained(file: Path, key: str = "") -> Generator[None]:
-    """What a description refuses becomes an error of the file."""
-    try:
-        yield
-    except MechanismError as error:
-        raise fault(file, key, str(error)) from None
-
-
-def _scaled(kind: Kind, value: Any, length: Convert) -> Any:
-    """A geometry field in SI; directions have no unit, and what may be left out is None then."""
+def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:
+    """A field of a joint in SI; directions and plain numbers have no unit, and what may be left out is None then."""
     if value is None:
         return None
     match kind:
@@ -96,7 +80,7 @@ def _scaled(kind: Kind, value: Any, length: Convert) -> Any:
             return tuple(map(length, value))
         case Kind.POSITIONS:
             return tuple(tuple(map(length, each)) for each in value)
-        case Kind.DIRECTION | Kind.DIRECTIONS:
+        case Kind.DIRECTION | Kind.DIRECTIONS | None:
             return value
 
 
@@ -104,69 +88,32 @@ def _mechanism(file: Path, keys: CaseKeys, length: Convert) -> Mechanism:
     bodies: list[Body] = []
     for name, value in keys.bodies.items():
         body = typed(file, key := join("bodies", name), value, BodyKeys)
-        with _explained(file, key):
+        with explained(file, key):
             bodies.append(Body(name, _scaled(Kind.POSITION, body.origin, length), body.euler_parameters, body.fixed))
     points: list[Point] = []
     for name, value in keys.points.items():
         point = typed(file, join("points", name), value, PointKeys)
         points.append(Point(name, point.body, _scaled(Kind.POSITION, point.position, length)))
-    joints = [_joint(file, join("joints", name), name, value, length) for name, value in keys.joints.items()]
-    drivers = [_driver(file, join("drivers", name), name, value) for name, value in keys.drivers.items()]
-    if not drivers:
-        raise fault(file, "drivers", "found no driver, expected at least the swept one; add [drivers.NAME]")
-    with _explained(file):
-        return Mechanism(keys.name, bodies, joints, points, drivers)
+    joined = [_joint(file, join("joints", name), name, value, length) for name, value in keys.joints.items()]
+    joints = [each for each in joined if isinstance(each, Joint)]
+    couplers = [each for each in joined if isinstance(each, Coupler)]
+    drivers = read_drivers(file, keys.drivers)
+    with explained(file):
+        return Mechanism(keys.name, bodies, joints, points, drivers, couplers)
 
 
-_Class = TypeVar("_Class", bound=type)
-
-
-def _class(file: Path, key: str, what: str, value: object, known: Mapping[str, _Class]) -> _Class:
-    """The class that the key `type` of a table names."""
-    name = as_table(file, key, value).get("type", "")
-    if not isinstance(name, str) or name not in known:
-        raise fault(file, join(key, "type"), f"found {shown(name)}, expected a {what} type; {remedy(str(name), known)}")
-    return known[name]
-
-
-def _joint(file: Path, key: str, name: str, value: object, length: Convert) -> Joint:
-    cls = _class(file, key, "joint", value, Joint.registry)
+def _joint(file: Path, key: str, name: str, value: object, length: Convert) -> Joint | Coupler:
+    cls = class_of(file, key, "joint", value, Joint.registry | Coupler.registry)
     keys: Any = typed(file, key, value, joint_keys(cls))
-    given = {each.name: _scaled(each.metadata["kind"], getattr(keys, each.name), length) for each in geometry(cls)}
-    with _explained(file, key):
-        return cls(name, *keys.bodies, **given)
-
-
-def _driver(file: Path, key: str, name: str, value: object) -> Driver:
-    cls = _class(file, key, "driver", value, DRIVERS)
-    keys = msgspec.structs.asdict(typed(file, key, value, driver_keys(cls)))
-    del keys["type"]
-    with _explained(file, key):
-        return cls(name, **keys)
+    given = {each.name: _scaled(kind_of(each), getattr(keys, each.name), length) for each in own_fields(cls)}
+    with explained(file, key):
+        return cls(name, keys.joints, **given) if issubclass(cls, Coupler) else cls(name, *keys.bodies, **given)
 
 
 def _unit(direction: Vector) -> Vector:
     length = math.hypot(*direction)
     x, y, z = direction
     return x / length, y / length, z / length
-
-
-def _sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Convert, angle: Convert) -> tuple[Sweep, Convert]:
-    """The sweep, and what makes SI of its driver's values."""
-    sweep = typed(file, "sweep", keys.sweep, SweepKeys)
-    if sweep.driver not in keys.drivers:
-        raise fault(file, "sweep.driver", f"found {shown(sweep.driver)}, expected a driver; {remedy(sweep.driver, keys.drivers)}")
-    if sweep.rate == 0.0:
-        raise fault(file, "sweep.rate", "found 0, expected driver units per second; give 1 to differentiate by the driver's value")
-    if sweep.start == sweep.stop and sweep.steps > 1:
-        problem = f"found the start {sweep.start!r} again with {sweep.steps} steps, expected another value"
-        raise fault(file, "sweep.stop", f"{problem}; give steps = 1 for a single sample")
-    driver, design = mechanism.driver(sweep.driver), 0.0
-    unit = angle if isinstance(driver, JointAngle) else length
-    if isinstance(driver, PointCoordinate) and not driver.relative:
-        design = float(np.dot(_unit(driver.direction), mechanism.point(driver.point).position))
-    grid = np.linspace(sweep.start, sweep.stop, sweep.steps).tolist()
-    return Sweep(sweep.driver, np.array([unit(value) for value in grid]), unit(sweep.rate), design), unit
 
 
 def _outputs(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Convert) -> tuple[Output, ...]:

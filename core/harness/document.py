@@ -10,13 +10,14 @@ import json
 import math
 import reprlib
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
-from ..errors import CaseError
+from ..errors import CaseError, MechanismError
 
 # Numbers are squared and multiplied on the way: within these bounds that neither overflows nor underflows.
 LARGEST, SMALLEST = 1e100, 1e-100
@@ -28,11 +29,21 @@ _short.maxstring = _short.maxother = 60
 _short.maxlevel = 3
 
 _Struct = TypeVar("_Struct", bound=msgspec.Struct)
+_Class = TypeVar("_Class", bound=type)
 
 
 def fault(file: Path, key: str, problem: str) -> CaseError:
     """The error to raise: 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' where no key is to blame."""
     return CaseError(": ".join(filter(None, (str(file), key, problem))))
+
+
+@contextmanager
+def explained(file: Path, key: str = "") -> Generator[None]:
+    """What a description refuses becomes an error of the file, at the key that it names, or else at the one given."""
+    try:
+        yield
+    except MechanismError as error:
+        raise fault(file, error.key or key, str(error)) from None
 
 
 def shown(value: object) -> str:
@@ -144,6 +155,18 @@ def as_table(file: Path, key: str, value: object) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise fault(file, key, f"found {shown(value)}, expected a table; write [{key}] and its keys below")
     return cast("dict[str, Any]", value)
+
+
+def class_of(file: Path, key: str, what: str, value: object, known: Mapping[str, _Class]) -> _Class:
+    """The class that the key `type` of a table names.
+
+    Raises:
+        CaseError: not a table, or no such type.
+    """
+    name = as_table(file, key, value).get("type", "")
+    if not isinstance(name, str) or name not in known:
+        raise fault(file, join(key, "type"), f"found {shown(name)}, expected a {what} type; {remedy(str(name), known)}")
+    return known[name]
 
 
 def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct:

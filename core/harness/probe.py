@@ -8,7 +8,7 @@ joints of a: a rod to the ground moves the first, the coupler the second.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, replace
 from typing import Any, TypeVar
 
@@ -22,8 +22,8 @@ from .case import Case, Output, Sweep, Truth
 
 # The design position: skew axes and uneven numbers, so that no row vanishes by symmetry. All in metres, global.
 HINGE = Revolute("hinge", GROUND, "a", (0.1, -0.2, 0.3), (1.0, 2.0, 2.0))
-POINT: Vector = (0.4, 0.1, 0.2)
-LINK: Vector = (0.53, 0.02, 0.34)
+POINT: Vector = (0.2, -0.1, 0.2)
+LINK: Vector = (0.33, -0.18, 0.34)
 AXIS: Vector = (2.0, -1.0, 2.0)
 LENGTH = 0.05
 NUMBER = 1.5
@@ -36,8 +36,14 @@ PAIRS = tuple(
 
 # Ends on b and on the ground. Drawn at random and chosen so that, whatever number of them a built-in joint takes, the mechanism
 # stays far from lock-up over the sweep and every freedom moves.
-RODS: Sequence[tuple[Vector, Vector]] = (((0.5, 0.3, 0.1), (0.9, 0.5, -0.2)),)
-TIPS: Sequence[Vector] = ((0.55, 0.15, 0.4), (0.3, 0.35, 0.15))
+RODS: Sequence[tuple[Vector, Vector]] = (
+    ((0.49, 0.09, 0.28), (0.8, -0.47, 0.26)),
+    ((0.06, -0.32, 0.56), (1.02, -0.46, 0.73)),
+    ((0.55, 0.24, 0.51), (0.4, -0.62, 1.12)),
+    ((0.12, -0.21, 0.36), (-0.22, -0.1, 1.22)),
+    ((0.43, -0.42, 0.1), (-0.03, -0.81, 0.14)),
+)
+TIPS: Sequence[Vector] = ((0.35, -0.05, 0.4), (0.1, 0.15, 0.15))
 
 TURN = np.linspace(-0.4, 0.4, 41)
 """Of the hinge [rad], at 1 rad/s."""
@@ -46,7 +52,7 @@ TURN = np.linspace(-0.4, 0.4, 41)
 ATOL = 1e-9
 WHY = "residual tolerance 1e-12 over the smallest pivot of a built-in joint's probe (0.02), x20"
 
-_Tested = TypeVar("_Tested", Joint, Coupler)
+_Tested = TypeVar("_Tested", bound=Joint | Coupler)
 
 
 def probe(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Case:
@@ -58,9 +64,14 @@ def probe(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Case:
     Raises:
         MechanismError: no specimen of the type can be made.
     """
-    if isinstance(tested, type):
-        tested = specimen(tested)
-    return _of_joint(tested) if isinstance(tested, Joint) else _of_coupler(tested)
+    one = specimen(tested) if isinstance(tested, type) else tested
+    return _of_joint(one) if isinstance(one, Joint) else _of_coupler(one)
+
+
+def probes() -> list[Case]:
+    """A probe of every registered type, joints first, then couplers, each in the order of their names."""
+    registries: Sequence[Mapping[str, type[Joint | Coupler]]] = (Joint.registry, Coupler.registry)
+    return [probe(registry[name]) for registry in registries for name in sorted(registry)]
 
 
 def specimen(of: type[_Tested]) -> _Tested:
@@ -71,11 +82,11 @@ def specimen(of: type[_Tested]) -> _Tested:
     Raises:
         MechanismError: the class accepts neither of the pairs of directions, or has a field of unknown kind.
     """
-    bodies = {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}
+    between: dict[str, Any] = {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}
     refused: MechanismError | None = None
     for pair in PAIRS:
         try:
-            return of(name="tested", **bodies, **dict(_geometry(of, pair)))
+            return of(name="tested", **between, **dict(_geometry(of, pair)))
         except MechanismError as error:
             refused = error
     raise MechanismError(

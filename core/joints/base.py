@@ -188,6 +188,9 @@ class Coupler(ABC):
     Attributes:
         joints: names of the two joints.
         freedoms: which coordinate of each: "rotation" or "translation".
+
+    Raises:
+        MechanismError: one joint twice, or a weight that is zero or not finite.
     """
 
     type: ClassVar[str]
@@ -201,6 +204,19 @@ class Coupler(ABC):
         super().__init_subclass__(**options)
         if "type" in cls.__dict__:
             Coupler.registry[cls.type] = cls
+
+    def __post_init__(self) -> None:
+        if self.joints[0] == self.joints[1]:
+            raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
+        if not all(weight and math.isfinite(weight) for weight in self.coefficients):
+            given = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ("name", "joints")}
+            raise MechanismError(
+                f"{self}: {', '.join(f'{name} = {value}' for name, value in given.items())} would lock or lose a joint; "
+                "give a finite number other than zero"
+            )
+
+    def __str__(self) -> str:
+        return f"joint {self.name!r} ({self.type})"
 
     @property
     @abstractmethod

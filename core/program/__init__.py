@@ -1,12 +1,18 @@
 """Programs: equations traced to lists of operations, and what runs them."""
 
 from .elimination import Elimination
+from .executor import Executor, Plan
+from .llvm_executor import LlvmCode, LlvmExecutor
 from .numpy_executor import NumpyExecutor
 from .trace import Program, Tape, Traced, absolute, cos, maximum, minimum, program, sin, sqrt, where_larger
 
 __all__ = [
     "Elimination",
+    "Executor",
+    "LlvmCode",
+    "LlvmExecutor",
     "NumpyExecutor",
+    "Plan",
     "Program",
     "Tape",
     "Traced",

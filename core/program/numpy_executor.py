@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..trajectory import Array
+from .executor import Plan
 from .trace import Program, operands
 
 
@@ -46,26 +47,38 @@ def _where(m: Array, p: Array, q: Array, out: Array) -> None:
 
 
 class NumpyExecutor:
-    """The programs bound to one block of lanes.
+    """A plan bound to a block of lanes."""
 
-    Args:
-        programs: programs that read and write the same slots.
-        block: shape (slots, lanes); the programs read and write it in place.
-    """
-
-    def __init__(self, programs: Iterable[Program], block: Array) -> None:
-        self.block = block
-        self._scratch = np.empty((2, block.shape[1]))
-        self._programs = {program.name: program for program in programs}
+    def __init__(self, plan: Plan, lanes: int) -> None:
+        self.block: Array = np.zeros((len(plan.slots), lanes))
+        self._plan = plan
+        self._scratch = np.empty((2, lanes))
         self._calls: dict[str, list[Call]] = {}
 
     def run(self, name: str) -> None:
-        """Run one program over all lanes. Lanes that divide by zero hold inf or nan afterwards; nothing is raised."""
+        """See `Executor`."""
         if name not in self._calls:
-            self._calls[name] = self._bind(self._programs[name])
+            self._calls[name] = self._bind(self._plan.programs[name])
         with np.errstate(all="ignore"):
             for call, arguments in self._calls[name]:
                 call(*arguments)
+
+    def attempt(self, lanes: int) -> None:
+        """See `Executor`."""
+        slots = self._plan.slots
+        residual, iterations = (self.block[slots[name], :lanes] for name in ("residual", "iterations"))
+        done = np.zeros(lanes, dtype=np.bool_)
+        iterations[:] = 0.0
+        self.run("predict")
+        for _ in range(self._plan.most):
+            self.run("newton")
+            iterations += ~done
+            done |= residual < self._plan.tolerance
+            if (done | ~np.isfinite(residual)).all():
+                break
+        for name in self._plan.after:
+            self.run(name)
+        self.block[slots["done"], :lanes] = done
 
     def _bind(self, program: Program) -> list[Call]:
         """Give every operation a register; a register is free again after its last reader."""

@@ -1,0 +1,93 @@
+"""Machine code of programs: compiled by LLVM for this processor, kept on disk by content, processor and version."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import importlib
+import importlib.util
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+DIGEST = 32
+"""Bytes of the checksum at the head of a cached object."""
+
+
+def available() -> bool:
+    """Whether llvmlite is installed."""
+    return importlib.util.find_spec("llvmlite") is not None
+
+
+@cache
+def _llvm() -> Any:
+    llvm: Any = importlib.import_module("llvmlite.binding")
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm
+
+
+@cache
+def _target() -> tuple[Any, str]:
+    """The target machine, and what identifies it together with the compiler."""
+    llvm = _llvm()
+    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line code
+    machine = llvm.Target.from_default_triple().create_target_machine(cpu=cpu, features=features, opt=1)
+    return machine, "\n".join((cpu, features, machine.triple, importlib.import_module("llvmlite").__version__))
+
+
+@cache
+def vector_width() -> int:
+    """Doubles in a vector register of this processor."""
+    features = _llvm().get_host_cpu_features()
+    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+
+
+def load(text: str, functions: Sequence[str]) -> tuple[Any, dict[str, Callable[[int, int], None]]]:
+    """Compile, or fetch from the cache, and load; (what owns the code, the functions of block address and groups).
+
+    The functions release Python's lock while they run.
+    """
+    llvm = _llvm()
+    machine, identity = _target()
+    entry = _folder() / hashlib.sha256(f"{identity}\n{text}".encode()).hexdigest()
+    code = _read(entry)
+    if code is None:
+        module = llvm.parse_assembly(text)
+        code = machine.emit_object(module)
+        _write(entry, code)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    signature = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)
+    return engine, {name: signature(engine.get_function_address(name)) for name in functions}
+
+
+def _folder() -> Path:
+    home = os.environ.get("XDG_CACHE_HOME")
+    return (Path(home) if home else Path.home() / ".cache") / "kincheck"
+
+
+def _read(entry: Path) -> bytes | None:
+    """A cached object, or None where there is none that is whole."""
+    try:
+        kept = entry.read_bytes()
+    except OSError:
+        return None
+    code = kept[DIGEST:]
+    return code if hashlib.sha256(code).digest() == kept[:DIGEST] else None
+
+
+def _write(entry: Path, code: bytes) -> None:
+    """Keep an object; a place that cannot be written only costs the next process a compilation."""
+    try:
+        entry.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=entry.parent, delete=False) as file:
+            file.write(hashlib.sha256(code).digest() + code)
+        Path(file.name).replace(entry)  # whole or not at all, whoever else is writing it
+    except OSError:
+        return
