@@ -6,24 +6,30 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..core.analysis.model import Model, compile_model
+from ..core.analysis.model import LAST_ITERATION, Model, compile_model
 from ..core.analysis.programs import Request
 from ..core.analysis.solve import sweep
 from ..core.harness.case import Case
+from ..core.program.compiled import available
 from ..core.trajectory import Trajectory
 
 
 class Native:
-    """Geometric constraints in global axes, traced and run by numpy over lanes of samples."""
+    """Geometric constraints in global axes, traced, and run over lanes of samples: by machine code, or by numpy without llvmlite."""
 
     name = "native"
     mode = "projection"
-    loop = "python"
+
+    @property
+    def loop(self) -> str:
+        """Newton's iteration over the samples runs in machine code where there is a compiler for it."""
+        return "compiled" if available() else "python"
 
     @property
     def settings(self) -> Mapping[str, Any]:
         """Formulation, executor and how the loop ends."""
-        return {"row_style": "native (global axes)", "executor": "numpy, lanes of samples", "last_iteration_below": 1e-9}
+        executor = "llvm, vectors of lanes" if available() else "numpy, one call an operation over all lanes"
+        return {"row_style": "native (global axes)", "executor": executor, "last_iteration_below": LAST_ITERATION}
 
     def version(self) -> str | None:
         """Version of kincheck."""

@@ -102,9 +102,10 @@ class _Marcher:
 
     def _round(self, active: Sequence[_Front]) -> None:
         """Try the next samples of every front as lanes of one block, and move each front as far as it holds."""
-        share = (self.block.shape[1] - HALVINGS * len(active)) // len(active)
         used = 0
-        for front in active:
+        for waiting, front in enumerate(reversed(active)):
+            free = self.block.shape[1] - used - HALVINGS * len(active)
+            share = free if waiting == len(active) - 1 else free // 2
             front.aims = self.values[front.ahead[: min(front.reach, share)]]
             if front.dividing:
                 parts = front.at + (front.aims[0] - front.at) * 0.5 ** np.arange(1, HALVINGS + 1)

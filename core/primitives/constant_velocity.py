@@ -6,8 +6,8 @@ With f_i, g_i across shaft i and f_j, g_j across shaft j, the twist between the 
     rows, gamma                            the same difference of theirs, exact everywhere
 
 phi is -4 e0 e3 of the relative Euler parameters: besides the zero twist e3 = 0 it is zero where e0 = 0, a relative turn of 180
-degrees. There the trace of the relative rotation is -1; with zero twist it is 1 + 2 cos(bend), positive up to a bend of 120 degrees,
-beyond what such a joint can do. The trace is the branch test.
+degrees. There the trace of the relative rotation is -1; with zero twist it is 1 + 2 cos(bend), positive up to a bend of 120
+degrees, beyond what such a joint can do. The trace is the branch test.
 """
 
 from __future__ import annotations

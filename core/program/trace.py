@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 from ..algebra import Scalar
@@ -226,7 +227,7 @@ class Program:
         """How often each operation occurs."""
         return Counter(node[0] for node in self.nodes)
 
-    @property
+    @cached_property
     def flops(self) -> int:
         """Arithmetic operations of one lane: everything but reading inputs and constants."""
         return sum(count for op, count in self.operations.items() if op in FLOPS)

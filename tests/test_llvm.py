@@ -1,0 +1,139 @@
+"""Machine code against numpy: every operation, whole models, lanes that end in the middle of a vector, and the cache on disk."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from kincheck.core import solve
+from kincheck.core.analysis.equations import Style
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.programs import Request
+from kincheck.core.analysis.solve import sweep
+from kincheck.core.motions import Path, Ramp
+from kincheck.core.program import NumpyExecutor, Plan, Tape, absolute, cos, maximum, minimum, program, sin, sqrt, where_larger
+from kincheck.core.program import compiled as code
+
+from .mechanisms import four_bar, mcpherson
+
+llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
+
+
+def executors(function, inputs: int, lanes: int):
+    """The same program of `inputs` slots, its value in the next one, in both executors."""
+    from kincheck.core.program import LlvmCode, LlvmExecutor
+
+    tape = Tape()
+    traced = program("f", tape, {inputs: function(*(tape.input(k) for k in range(inputs)))})
+    idle = {name: program(name, tape, {}) for name in ("predict", "newton")}
+    slots = {str(k): k for k in range(inputs + 1)} | {"residual": inputs + 1, "iterations": inputs + 2, "done": inputs + 3}
+    plan = Plan({"f": traced, **idle}, slots, (), 1e-9, 3)
+    return NumpyExecutor(plan, lanes), LlvmExecutor(LlvmCode(plan), lanes)
+
+
+OPERATIONS = {
+    "plus": lambda a, b: a + b,
+    "minus": lambda a, b: a - b,
+    "times": lambda a, b: a * b,
+    "over": lambda a, b: a / b,
+    "negative": lambda a, b: -a,
+    "root": lambda a, b: sqrt(a * a),
+    "size": lambda a, b: absolute(a),
+    "smaller": minimum,
+    "larger": maximum,
+    "choice": lambda a, b: where_larger(a, b, a + 1.0, b - 1.0),
+}
+
+
+@pytest.mark.parametrize("lanes", [1, 7, 8, 9, 33])
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_operations_are_numpys(name, lanes):
+    rng = np.random.default_rng(lanes)
+    both = executors(OPERATIONS[name], 2, lanes)
+    values = rng.normal(size=(2, lanes)) * 10.0 ** rng.integers(-3, 4, size=(2, lanes))
+    values[:, -1] = math.nan, 1.0  # min and max must hand on what is not a number
+    for executor in both:
+        executor.block[:2] = values
+        executor.run("f")
+    a, b = (executor.block[2] for executor in both)
+    np.testing.assert_array_equal(np.isnan(a), np.isnan(b))
+    np.testing.assert_allclose(b, a, rtol=2e-16, atol=0.0)
+
+
+@pytest.mark.parametrize(("traced", "true"), [(sin, np.sin), (cos, np.cos)])
+def test_sine_and_cosine_hold_over_thousands_of_turns(traced, true):
+    rng = np.random.default_rng(0)
+    _, executor = executors(lambda x: traced(x), 1, 256)
+    for extent in (1e-9, 1.0, 10.0, 1e4):
+        x = rng.uniform(-extent, extent, size=256)
+        executor.block[0] = x
+        executor.run("f")
+        assert np.abs(executor.block[1] - true(x)).max() <= 4e-16  # two units in the last place of one
+
+
+@pytest.mark.parametrize("style", Style)
+def test_models_give_numpys_results(style):
+    for mechanism, values in ((mcpherson(), np.linspace(-0.08, 0.08, 33)), (four_bar(), np.linspace(0.0, 2.0 * np.pi, 37))):
+        driver = mechanism.drivers[0].name
+        path = Path({driver: Ramp(1.0)}, values)
+        found = []
+        for compiled in (False, True):
+            points = tuple(point.name for point in mechanism.points)
+            request = Request((driver,), points, style=style, compiled=compiled)
+            found.append(sweep(compile_model(mechanism, request), path, 1e-12))
+        for name in found[0].points:
+            a, b = (each.points[name] for each in found)
+            assert np.abs(a.position - b.position).max() <= 2e-15
+            assert np.abs(a.velocity - b.velocity).max() <= 2e-14
+            assert np.abs(a.acceleration - b.acceleration).max() <= 2e-13
+        np.testing.assert_array_equal(found[0].iterations, found[1].iterations)
+
+
+def test_a_lane_that_cannot_be_reached_is_reported_alike():
+    mechanism = mcpherson()
+    messages = []
+    for compiled in (False, True):
+        request = Request((mechanism.drivers[0].name,), (), compiled=compiled)
+        path = Path({mechanism.drivers[0].name: Ramp(1.0)}, np.array([0.0, 0.2, 0.6]))
+        trajectory = sweep(compile_model(mechanism, request), path, 1e-12)
+        assert trajectory.solved.tolist() == [True, True, False]
+        messages.append(trajectory.message.split(":")[0][:60])
+    assert messages[0] == messages[1]
+
+
+def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    wanted = np.linspace(0.0, 1.0, 5)
+
+    def positions():
+        mechanism = four_bar()
+        return solve(mechanism, mechanism.drivers[0].name, wanted).points[mechanism.points[0].name].position
+
+    fresh = positions()
+    (entry,) = (tmp_path / "kincheck").iterdir()
+    kept = entry.read_bytes()
+    np.testing.assert_array_equal(positions(), fresh)
+    assert entry.read_bytes() == kept
+    for damage in (b"", kept[:100], kept[:-1] + bytes([kept[-1] ^ 1]), b"\0" * len(kept)):
+        entry.write_bytes(damage)
+        np.testing.assert_array_equal(positions(), fresh)
+        assert entry.read_bytes() == kept
+
+
+def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
+    (tmp_path / "kincheck").write_text("a file where the folder should be")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    mechanism = four_bar()
+    assert solve(mechanism, mechanism.drivers[0].name, [0.0, 0.5]).solved.all()
+
+
+def test_without_llvmlite_numpy_takes_over(monkeypatch):
+    monkeypatch.setattr("kincheck.core.analysis.model.available", lambda: False)
+    mechanism = four_bar()
+    model = compile_model(mechanism, Request((mechanism.drivers[0].name,), ()))
+    assert isinstance(model.executor(3), NumpyExecutor)
+
+
+def test_the_width_is_that_of_the_processor():
+    assert code.vector_width() in (2, 4, 8)
