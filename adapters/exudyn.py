@@ -95,12 +95,14 @@ class ExudynModel:
             self.followed[each.row, each.value] = each.weight
         self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
         self.unknowns = self.coordinates + rows.values - len(case.mechanism.drivers)
-        markers = rows.turning.items()
-        self.turning = [(row, marker, np.array(self.mbs.GetMarkerParameter(marker, "localHT"))) for row, marker in markers]
+        self.turning = [
+            (row, pair, np.array(self.mbs.GetMarkerParameter(pair[0], "localHT"))) for row, pair in rows.turning.items()
+        ]
         points = [(rows.bodies[point.body], np.array(point.position)) for point in map(case.mechanism.point, case.points)]
         self.wanted = [(number, position - origin) for (number, origin), position in points]
         self.ground = rows.ground
         kinds = exu.OutputVariableType
+        self.rotation = kinds.RotationMatrix
         self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
         self.reset()
 
@@ -129,11 +131,16 @@ class ExudynModel:
 
     def residual(self, c: Array) -> Array:
         values = self.followed @ np.concatenate([c, self.x[self.coordinates :]])
-        for row, marker, frame in self.turning:
-            self.mbs.SetMarkerParameter(marker, "localHT", frame @ turned(values[row]))
-            values[row] = 0.0  # the frame is there: what is left is the sine of the angle still missing
+        for row, (first, second), frame in self.turning:
+            self.mbs.SetMarkerParameter(first, "localHT", frame @ turned(values[row]))
+            # The frame is there: the row is the sine of the angle still missing. From beyond a quarter turn Newton would go to the
+            # other zero of the sine; a residual that is not finite tells the walk to take a shorter step.
+            values[row] = 0.0 if self._x_axis(first) @ self._x_axis(second) > 0.0 else np.nan
         self.solver.ComputeAlgebraicEquations(self.mbs)
         return self.solver.GetSystemResidual()[self.kept] - self.target - values
+
+    def _x_axis(self, marker: int) -> Array:
+        return self.mbs.GetMarkerOutput(marker, self.rotation)[::3]
 
     def jacobian(self) -> Array:
         return np.hstack([self._jacobian(), -self.shared])

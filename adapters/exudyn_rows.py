@@ -16,7 +16,7 @@ A free axis of a generic joint leaves an empty row, which is dropped.
 A row may follow a value: that of a driver, or an unknown that is added for two rows to share. Two coordinates in a fixed ratio
 (screw, gear, rack and pinion) follow the same unknown, and so do the two products whose difference a constant-velocity joint
 keeps at zero. A displacement is compared with its value. An angle is followed by turning the frame on the first body, which
-leaves the sine of what is missing: any number of turns can be followed.
+leaves the sine of what is missing: any number of turns can be followed, in steps that leave less than a quarter turn missing.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Rows:
         nodes: numbers of the nodes, one for each moving body.
         rows: all equations, in order.
         following: which of them follow a value.
-        turning: markers that are turned about their z axes for the rows that follow an angle, by row.
+        turning: rows that follow an angle, and their markers on the first and second body; the first turns about its z axis.
         values: the number of drivers and further unknowns.
     """
 
@@ -95,7 +95,7 @@ class Rows:
         self.nodes: list[int] = []
         self.rows: list[Row] = []
         self.following: list[Following] = []
-        self.turning: dict[int, int] = {}
+        self.turning: dict[int, tuple[int, int]] = {}
         self.values = len(mechanism.drivers)
         self._add_bodies()
         for joint in mechanism.joints:
@@ -152,7 +152,7 @@ class Rows:
         # exchanged, so that the row is the sine of the angle and not of its negative
         first, second = self.markers(joint, joint.point, _frame(joint.axis, 2))
         row = self.connect_generic((second, first), (ABOUT_Z,))
-        self.turning[row] = first
+        self.turning[row] = first, second
         return row
 
     def unknown(self) -> int:

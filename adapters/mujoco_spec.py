@@ -25,7 +25,7 @@ JOINTS = (*CHAINS, Distance)
 
 
 def coordinate(joint: str, name: str) -> str:
-    """The name in the model of a joint's coordinate, "rotation" or "translation"."""
+    """The name in the model of a joint's coordinate."""
     return f"{joint} {name}"
 
 
@@ -53,7 +53,7 @@ class Sketch:
         self.closures: list[Closure] = []
         self.tree: dict[str, str] = {}  # what carries each body
         self.means: dict[str, str] = {}  # what closes each cut joint
-        self.relations: dict[str, str] = {}  # what ties coordinates to one another, by joint or coupler
+        self.relations: list[str] = []  # what ties coordinates to one another
         self.signs: dict[str, float] = {}  # of a joint's coordinate: minus where it moves the joint's first body
         tree = spanning_tree(mechanism)
         for branch in tree.branches:
@@ -69,10 +69,10 @@ class Sketch:
             self.close(joint, self.bodies[joint.i], self.bodies[joint.j])
         for coupler in mechanism.couplers:
             signed = [self.signs[joint] * weight for joint, weight in zip(coupler.joints, coupler.coefficients, strict=True)]
-            self.relate(coupler.name, zip(map(coordinate, coupler.joints, coupler.freedoms), signed, strict=True))
+            self.relate(zip(map(coordinate, coupler.joints, coupler.freedoms), signed, strict=True))
 
     def body(self, parent: Any) -> Any:
-        """A body on its parent's frame. Mass and inertia do not enter kinematics, but MuJoCo wants them positive."""
+        """A body on its parent's frame. Mass and inertia do not enter kinematics, but MuJoCo wants them positive definite."""
         body = parent.add_body()
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
         return body
@@ -98,19 +98,22 @@ class Sketch:
         return CHAINS[type(joint)](joint, self.near(joint))
 
     def attach(self, body: Any, links: Sequence[Link], joint: str = "") -> None:
-        """Let a body move relative to its parent by links, the one next to the parent first."""
+        """Let a body move relative to its parent by links, the one next to the parent first.
+
+        The armature, an inertia of each link alone, keeps MuJoCo from warning of hinges in line.
+        """
         types = self.mj.mjtJoint
         kinds = {"slide": types.mjJNT_SLIDE, "hinge": types.mjJNT_HINGE, "ball": types.mjJNT_BALL}
         for link in links:
             name = coordinate(joint, link.name) if link.name else ""
-            body.add_joint(name=name, type=kinds[link.move], pos=list(link.point), axis=list(link.axis))
+            body.add_joint(name=name, type=kinds[link.move], pos=list(link.point), axis=list(link.axis), armature=1.0)
 
     def carry(self, body: Any, joint: Joint, links: Sequence[Link], sign: float = 1.0) -> None:
         """Let a body move by a joint's links; the sign is minus where that body is the joint's first."""
         self.attach(body, links, joint.name)
         self.signs[joint.name] = sign  # it is that of all the joint's coordinates, so their relations need none
         for relation in relations(joint):
-            self.relate(joint.name, [(coordinate(joint.name, name), weight) for name, weight in relation.items()])
+            self.relate([(coordinate(joint.name, name), weight) for name, weight in relation.items()])
 
     def close(self, joint: Joint, i: Any, j: Any) -> None:
         """Express a cut joint of bodies i and j by an equality constraint."""
@@ -119,7 +122,7 @@ class Sketch:
             self.span(joint, i, j)
             return
         links = self.links(joint)
-        kind, links, point = ("weld", links, self.near(joint))
+        kind, point = "weld", self.near(joint)
         if links and links[-1].move == "ball":
             kind, links, point = "connect", links[:-1], links[-1].point
         self.means[joint.name] = kind
@@ -140,7 +143,7 @@ class Sketch:
         equality.data = [rod.rod_length - rod.design_distance, *[0.0] * (len(equality.data) - 1)]
         self.closures.append(Closure("tendon", ends, rod.rod_length))
 
-    def relate(self, name: str, terms: Iterable[tuple[str, float]]) -> None:
+    def relate(self, terms: Iterable[tuple[str, float]]) -> None:
         """Keep the weighted sum of two coordinates at zero."""
         (other, small), (one, large) = sorted(terms, key=lambda term: abs(term[1]))
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_JOINT, name1=one, name2=other)
@@ -148,7 +151,7 @@ class Sketch:
         # one is a polynomial of the other, of which only the linear term is wanted
         equality.data = [0.0, -small / large, *[0.0] * (len(equality.data) - 2)]
         self.closures.append(Closure("joint"))
-        self.relations[name] = "joint equality"
+        self.relations.append(f"joint equality: {one} = {-small / large:.9g} {other}")
 
     def join(self, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
         """Tie two bodies at a position. The default data stays: it holds the scale of a weld's rotation rows."""

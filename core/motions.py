@@ -20,20 +20,18 @@ from .trajectory import Array
 
 
 class Measure(Enum):
-    """What a field of a motion is measured in; tells a reader which unit applies. A field without is in seconds or hertz."""
+    """What a field of a motion is measured in; tells a reader which unit applies."""
 
-    DRIVER = "driver"
-    ANGLE = "angle"
-
-
-def driven() -> Any:
-    """Numbers in the unit of the driver [m or rad], or that per second."""
-    return field(metadata={"measure": Measure.DRIVER})
+    DRIVER = "driver units"
+    DRIVER_RATE = "driver units per second"
+    ANGLE = "an angle"
+    FREQUENCY = "Hz"
+    TIME = "s"
 
 
-def angle(**options: Any) -> Any:
-    """An angle [rad]."""
-    return field(metadata={"measure": Measure.ANGLE}, **options)
+def measured(measure: Measure, **options: Any) -> Any:
+    """A field of a motion [m or rad, rad, Hz, s]."""
+    return field(metadata={"measure": measure}, **options)
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class Ramp(Motion):
     """value = rate * t; rate in driver units per second."""
 
     type = "ramp"
-    rate: float = driven()
+    rate: float = measured(Measure.DRIVER_RATE)
 
     def __post_init__(self) -> None:
         _finite("ramp", rate=self.rate)
@@ -76,9 +74,9 @@ class Sine(Motion):
     """value = amplitude * sin(2 pi frequency t + phase); frequency in Hz, phase an angle."""
 
     type = "sine"
-    amplitude: float = driven()
-    frequency: float
-    phase: float = angle(default=0.0)
+    amplitude: float = measured(Measure.DRIVER)
+    frequency: float = measured(Measure.FREQUENCY)
+    phase: float = measured(Measure.ANGLE, default=0.0)
 
     def __post_init__(self) -> None:
         _finite("sine", amplitude=self.amplitude, frequency=self.frequency, phase=self.phase)
@@ -97,8 +95,8 @@ class Table(Motion):
     """
 
     type = "table"
-    times: tuple[float, ...]
-    values: tuple[float, ...] = driven()
+    times: tuple[float, ...] = measured(Measure.TIME)
+    values: tuple[float, ...] = measured(Measure.DRIVER)
 
     def __post_init__(self) -> None:
         if len(self.times) != len(self.values) or len(self.times) < 2:

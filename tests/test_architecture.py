@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "mechanism": {"drivers", "errors", "joints", "motions"},
     "topology": {"drivers", "joints", "mechanism"},
     "analysis": {"primitives", "program", *DESCRIPTION},
-    "harness": {"analysis", "program", *DESCRIPTION},
+    "harness": {"analysis", "primitives", "program", *DESCRIPTION},
     "__init__": {"analysis", *DESCRIPTION},
 }
 """Room of core (a module or a folder) -> the rooms it may import besides itself."""

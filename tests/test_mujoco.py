@@ -11,7 +11,7 @@ from kincheck.adapters import mujoco as adapter
 from kincheck.adapters import mujoco_spec
 from kincheck.core.drivers import Driver, JointAngle, JointDisplacement, PointCoordinate
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
-from kincheck.core.joints import Distance, Fixed, Joint, Revolute, Spherical, Translational, Universal
+from kincheck.core.joints import Distance, Fixed, Inline, Joint, Revolute, Screw, Spherical, Translational, Universal
 from kincheck.core.mechanism import Body, Mechanism, Point
 from kincheck.core.topology import SpanningTree, spanning_tree
 from numpy.polynomial import Chebyshev
@@ -202,12 +202,15 @@ def test_any_joint_can_be_mirrored_and_cut(name, cutting, mirrored, monkeypatch)
 
 
 def test_rows_are_the_derivatives_of_one_another(monkeypatch):
-    """Off the solution too, for a connect, a weld, a tendon and a point driver."""
+    """Off the solution too, for connects, a weld, a tendon, a joint equality and a point driver."""
     cut(monkeypatch, "gudgeon")
     brace = Distance("brace", "ground", "slider", ((0.5, 0.4, 0.3), (0.2, 0.0, 0.0)))
     extra = Spherical("extra", "peg", "ground", (0.1, 0.3, 0.3))
+    groove = Inline("groove", "rod", "ground", (0.3, 0.1, 0.2), (1.0, 2.0, 0.0))
+    thread = Screw("pivot", "ground", "crank", (0.0, 0.1, 0.12), (1.0, 0.0, 0.0), 0.3)
     drivers = (PointCoordinate("crank", "peg", (1.0, 2.0, -2.0)),)
-    model, random = adapter.MuJoCo().build(change(slider_crank(), brace, extra, drivers=drivers)), np.random.default_rng(1)
+    mechanism = change(slider_crank(), brace, extra, groove, thread, drivers=drivers)
+    model, random = adapter.MuJoCo().build(mechanism), np.random.default_rng(1)
     model.reset()
     model.residual(np.zeros(1))
     start, v = random.normal(size=(2, model.jacobian().shape[1]))

@@ -115,8 +115,7 @@ def test_unreachable_stroke_is_reported_and_not_invented() -> None:
     found = ENGINE.solve(ENGINE.build(case), case, TOL)
     assert found.solved[:294].all()
     assert not found.solved[294:].any()
-    assert "'stroke'" in found.message
-    assert "last reachable sample 0.293;" in found.message
+    assert "last reachable sample at stroke = 0.293;" in found.message
     motion = found.points["wheel_center"]
     for rows in (motion.position, motion.velocity, motion.acceleration):
         assert np.isfinite(rows[:294]).all()
@@ -247,15 +246,11 @@ def test_unsupported_names_the_driver_or_joint(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(Joint, "registry", dict(Joint.registry))
 
     @dataclass(frozen=True)
-    class Screw(Revolute):
-        type = "screw"
+    class Latch(Revolute):
+        type = "latch"
 
-    screw = Screw("thread", GROUND, "A", HINGE, (0.0, 0.0, 1.0))
-    assert "'thread' (screw)" in reason([screw], [JointAngle("turn", "thread")])
-    coaxial = Revolute("second", GROUND, "A", (0.0, 0.1, -0.1), (0.3, -0.2, 2.0))
-    assert "'again' (joint_angle): joint 'second' (revolute)" in reason(
-        [CRANK, coaxial], [JointAngle("turn", "crank"), JointAngle("again", "second")]
-    )
+    latch = Latch("bolt", GROUND, "A", HINGE, (0.0, 0.0, 1.0))
+    assert "'bolt' (latch)" in reason([latch], [JointAngle("turn", "bolt")])
     assert "'gust' (wind)" in reason([CRANK], [Wind("gust")])
 
 

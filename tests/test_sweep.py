@@ -238,3 +238,11 @@ def test_what_lies_beyond_an_end_is_not_reached_from_elsewhere():
     limit = np.arcsin(0.1 / CRANK)
     assert (found.solved == (np.linspace(0.0, np.pi, 61) < limit)).all()
     assert "cannot be followed" in found.message
+
+
+@pytest.mark.parametrize("samples", [3, 5, 9, 20])
+def test_both_directions_may_end_on_a_coarse_grid(samples):
+    """Both fronts divide their steps at once, in one block of lanes."""
+    found = solve(mcpherson(), "stroke", np.linspace(-1.5, 1.5, samples))
+    assert found.message.count("cannot be followed beyond stroke = ") == 2
+    assert not found.solved.all()

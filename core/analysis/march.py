@@ -103,9 +103,10 @@ class _Marcher:
     def _round(self, active: Sequence[_Front]) -> None:
         """Try the next samples of every front as lanes of one block, and move each front as far as it holds."""
         used = 0
-        for waiting, front in enumerate(reversed(active)):
-            free = self.block.shape[1] - used - HALVINGS * len(active)
-            share = free if waiting == len(active) - 1 else free // 2
+        for waiting, front in zip(range(len(active), 0, -1), reversed(active), strict=True):
+            # what is left, less the parts that each front still to be laid out may need
+            free = self.block.shape[1] - used - HALVINGS * waiting
+            share = free // waiting
             front.aims = self.values[front.ahead[: min(front.reach, share)]]
             if front.dividing:
                 parts = front.at + (front.aims[0] - front.at) * 0.5 ** np.arange(1, HALVINGS + 1)

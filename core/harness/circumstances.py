@@ -12,7 +12,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from .case import Case, Truth
+from ..motions import Absolute, Motion
+from .case import TIME, Case, Truth
 from .compare import as_numbers
 from .record import Record, Results
 
@@ -42,13 +43,24 @@ def results(cases: Sequence[Case], records: Sequence[Record], *, started: dateti
 
 
 def _facts(case: Case) -> dict[str, Any]:
-    driver, sweep = case.mechanism.driver(case.sweep.driver), case.sweep
+    sweep = case.sweep
+    swept = {"name": TIME, "type": TIME} if sweep.driver == TIME else _driver(case, sweep.driver) | {"rate": sweep.rate}
     return {
         "source": case.source,
         "truth": truth_of(case),
-        "driver": {"type": driver.type, **asdict(driver), "rate": sweep.rate, "design": sweep.design},
+        "driver": swept,
+        "motions": {name: _driver(case, name) | {"motion": _motion(motion)} for name, motion in sweep.motions.items()},
         "outputs": {output.name: asdict(output) for output in case.outputs},
     }
+
+
+def _driver(case: Case, name: str) -> dict[str, Any]:
+    driver = case.mechanism.driver(name)
+    return {"type": driver.type, **asdict(driver), "design": case.sweep.path.design.get(name, 0.0)}
+
+
+def _motion(motion: Motion) -> dict[str, Any]:
+    return _motion(motion.motion) if isinstance(motion, Absolute) else {"type": motion.type, **asdict(motion)}
 
 
 def plain(facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -58,12 +58,16 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="solve cases with engines and judge the results", description=_run.__doc__)
     run.set_defaults(do=_run)
     run.add_argument("case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases")
+    run.add_argument(
+        "--joints", action="store_true", help="run a small closed loop around every joint type; no CASE is the default"
+    )
     run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: all engines")
     run.add_argument("--mode", choices=MODES, help="only engines of this mode")
     run.add_argument("--tol", type=_tol, default=TOL, metavar="X", help=f"largest constraint residual [m or -]; default {TOL:g}")
     run.add_argument("--out", type=Path, metavar="DIR", help="write results.json and report.html there")
     run.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
     run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
+    run.add_argument("--markdown", type=Path, metavar="FILE", help="write the table of cases and engines as Markdown")
     run.add_argument(
         "--require",
         nargs="+",
@@ -73,8 +77,19 @@ def _parser() -> argparse.ArgumentParser:
         help="engines that must be there and able (else status 2)",
     )
 
+    bench = commands.add_parser("bench", help="measure the formulation and its programs")
+    benchmarks = bench.add_subparsers(title="benchmarks", required=True, metavar="BENCHMARK")
+    formulation = benchmarks.add_parser(
+        "formulation", help="operation counts and round-off of the paper's rows", description=_bench_formulation.__doc__
+    )
+    formulation.set_defaults(do=_bench_formulation)
+    formulation.add_argument("--seed", type=int, default=943745, metavar="N", help="of the random states; default %(default)s")
+    formulation.add_argument("--out", type=Path, metavar="DIR", help="write bench_formulation.json and .html there")
+    formulation.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+
     listing = commands.add_parser("list", help="list cases and engines", description=_list.__doc__)
     listing.set_defaults(do=_list)
+    listing.add_argument("--joints", action="store_true", help="list the types a case file can name: joints, drivers, motions")
     return parser
 
 
@@ -100,9 +115,9 @@ def _run(options: argparse.Namespace) -> int:
 
     problems: list[str] = []
     _return_cases(options)
-    cases = _cases(options.case, problems)
+    cases = _cases(options.case, problems, joints=options.joints)
     engines, baseline = _engines([*options.engine, *options.require] if options.engine else [], options, problems)
-    files: dict[str, Any] = {"out": options.out, "json": options.json, "junit": options.junit}
+    files: dict[str, Any] = {"out": options.out, "json": options.json, "junit": options.junit, "markdown": options.markdown}
     delivery.check_destinations(problems, **files)
     if problems:  # all of them, and before anything is computed
         raise KincheckError("\n".join(problems))
@@ -122,7 +137,7 @@ def _run(options: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             problems.append(f"interrupted: {len(records)} of {len(cases) * len(engines)} records were made and are kept")
             results = running.results(cases, records, started=started, tol=options.tol, command=options.command)
-    delivery.deliver(results, problems, **files)
+    delivery.deliver(results, problems, matrix=options.joints, **files)
     problems += _lacking(results, options.require)
     _complain(problems)
     if problems:
@@ -140,15 +155,16 @@ def _return_cases(options: argparse.Namespace) -> None:
         names[:] = [name for name in names if name not in swallowed]
 
 
-def _cases(names: Sequence[str], problems: list[str]) -> list[Case]:
-    """The cases asked for; what is wrong with any of them is added to the problems."""
+def _cases(names: Sequence[str], problems: list[str], *, joints: bool) -> list[Case]:
+    """The cases asked for, after those of the joints if they are; what is wrong with any of them is added to the problems."""
     from ... import cases as builtin
     from ..analysis.freedom import require_driven
     from .casefile import load_case
+    from .probe import probes
 
-    found: dict[str, Case] = {}
+    found = {case.name: case for case in probes()} if joints else dict[str, Case]()
     known = list(builtin.names())
-    for name in dict.fromkeys(names or known):
+    for name in dict.fromkeys(names if names or joints else known):
         try:
             if name in known:
                 case = builtin.load(name)
@@ -232,11 +248,31 @@ def how_to_install(engine: str) -> str:
     return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"
 
 
+def _bench_formulation(options: argparse.Namespace) -> int:
+    """Measure the paper's claims: operation counts (Table 3), round-off of rows, errors of a whole sweep. Needs mpmath."""
+    from ... import cases
+    from . import bench, bench_formulation
+    from . import deliver as delivery
+
+    problems: list[str] = []
+    names = [f"{bench_formulation.NAME}.{kind}" for kind in ("json", "html")]
+    delivery.check_destinations(problems, out=options.out, json=options.json, names=names)
+    if problems:
+        raise KincheckError("\n".join(problems))
+    found = bench_formulation.measure(cases.load("mcpherson_strut"), options.seed)
+    bench.deliver(bench_formulation.report(found), found, out=options.out, json=options.json)
+    return WITHIN
+
+
 def _list(options: argparse.Namespace) -> int:
-    """List the built-in cases with their truth and source, and the engines with their versions."""
+    """List the built-in cases with their truth and source, and the engines with their versions; or the types of joints."""
     from ... import adapters, cases
+    from .catalogue import catalogue
     from .circumstances import truth_of
 
+    if options.joints:
+        print(*catalogue(), sep="\n")
+        return WITHIN
     print("cases:")
     names = list(cases.names())
     for name in names:

@@ -6,7 +6,9 @@ accepted up to atol + rtol * range, the range being that of the reference over t
 An output's atol is given for positions. A wrong pose passes its error on: the velocities of a mechanism are its driver's rate
 times functions of the pose, so moving the pose by d, small against the size D of the mechanism, changes a velocity by about
 d * rate / D and an acceleration by d * (rate / D)^2. Hence velocities are held to atol * pace, accelerations to atol * pace^2,
-with pace = rate / D [1/s]; D is a radian for a driver that turns and the mechanism's size for one that shifts. So the same
+with pace = rate / D [1/s]; D is a radian for a driver that turns and the mechanism's size for one that shifts. A driver with
+a motion adds d * s / D to an acceleration, s being its own: pace is then sqrt(s / D) if that is more, the rate being its
+fastest; both are the largest over the samples, and of all drivers the one that goes fastest through D counts. So the same
 relative accuracy is asked of all three, at any scale and any rate: with atol = 1e-9 m, a mechanism of 1 m and a drive of 1 m/s,
 an acceleration of 1 m/s^2 that is wrong by 1e-6 of itself is a thousand times out of tolerance.
 """
@@ -19,7 +21,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from ..drivers import JointDriver
+from ..drivers import Driver, JointDriver
 from ..errors import CaseError
 from ..joints.base import Joint, Kind
 from ..trajectory import Array, Trajectory
@@ -32,21 +34,28 @@ SMALLEST_SIZE = 1e-3
 
 def pace(case: Case) -> float:
     """How fast the mechanism goes through itself [1/s]: see the head of this file."""
-    driver = case.mechanism.driver(case.sweep.driver)
-    turns = isinstance(driver, JointDriver) and driver.freedom == "rotation"
-    return abs(case.sweep.rate) / (1.0 if turns else max(SMALLEST_SIZE, _size(case)))
+    path = case.sweep.path
+    turns = np.array([_turns(case.mechanism.driver(name)) for name in path.motions])
+    values, rates, seconds = path.drive(list(path.motions), path.times)
+    extent = np.where(turns, 1.0, max(SMALLEST_SIZE, _size(case, values[~turns])))
+    rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
+    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
 
 
-def _size(case: Case) -> float:
-    """Largest extent along a global axis of the joints and the compared points at design, or of the sweep [m]."""
+def _turns(driver: Driver) -> bool:
+    return isinstance(driver, JointDriver) and driver.freedom == "rotation"
+
+
+def _size(case: Case, shifts: Array) -> float:
+    """Largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m]."""
     points = [case.mechanism.point(name).position for name in case.points]
     points += [position for joint in case.mechanism.joints for position in _positions(joint)]
-    return max(float(np.ptp(np.array(points), axis=0).max()), float(np.ptp(case.sweep.change)))
+    return max(float(np.ptp(np.array(points), axis=0).max()), float(np.ptp(shifts, axis=1).max(initial=0.0)))
 
 
 def _positions(joint: Joint) -> Iterator[tuple[float, float, float]]:
     for each in fields(joint):
-        if each.metadata.get("kind") is Kind.POSITION:
+        if each.metadata.get("kind") is Kind.POSITION and getattr(joint, each.name) is not None:
             yield getattr(joint, each.name)
         elif each.metadata.get("kind") is Kind.POSITIONS:
             yield from getattr(joint, each.name)

@@ -85,8 +85,10 @@ def _motion(file: Path, mechanism: Mechanism, name: str, value: object, length: 
     key, driver = join(join("drivers", name), "motion"), mechanism.driver(name)
     cls = class_of(file, key, "motion", value, Motion.registry)
     keys = typed(file, key, value, motion_keys(cls))
-    converts = {Measure.DRIVER: _unit(driver, length, angle), Measure.ANGLE: angle, None: float}
-    given = {each.name: _scaled(getattr(keys, each.name), converts[each.metadata.get("measure")]) for each in own_fields(cls)}
+    converts = dict.fromkeys((Measure.DRIVER, Measure.DRIVER_RATE), _unit(driver, length, angle)) | {Measure.ANGLE: angle}
+    given = {
+        each.name: _scaled(getattr(keys, each.name), converts.get(each.metadata["measure"], float)) for each in own_fields(cls)
+    }
     with explained(file, key):
         motion = cls(**given)
     design = _design(mechanism, driver)

@@ -26,8 +26,8 @@ DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
 SYMBOLS = ("circle-open", "square-open", "diamond-open", "triangle-up-open", "x-open", "cross-open", "star-open")
 
 _LABELS = {"half_track_change": "half-track change", "wheelbase_change": "wheel-base change"}
-_DISPLAY = {"m": ("mm", 1e3), "rad": ("°", 180 / math.pi)}
-_DRIVER_UNITS = {"point_coordinate": "m", "joint_displacement": "m", "joint_angle": "rad"}
+_DISPLAY = {"m": ("mm", 1e3), "rad": ("°", 180 / math.pi), "s": ("s", 1.0)}
+_DRIVER_UNITS = {"point_coordinate": "m", "joint_displacement": "m", "joint_angle": "rad", "time": "s"}
 
 
 def engine_name(record: Record) -> str:
@@ -53,29 +53,53 @@ class Style:
 
 
 @dataclass(frozen=True)
-class Axis:
-    """The driver's axis: what is moved, its kept samples and their values as displayed.
+class Moved:
+    """A driver, or time, at the samples: in SI, and what makes display units of that."""
+
+    name: str
+    unit: str
+    scale: float
+    values: list[float]
+
+    @classmethod
+    def of(cls, name: str, driver: Mapping[str, Any], values: list[float]) -> Moved:
+        """What is known of a driver, its type above all, and its values."""
+        unit, scale = _DISPLAY.get(_DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
+        return cls(name.replace("_", " "), unit, scale, values)
+
+    def at(self, step: int) -> str:
+        """The value at a sample, in words."""
+        if step >= len(self.values):
+            return ""
+        value = f"{self.scale * self.values[step]:+.4g}".replace("-", "\N{MINUS SIGN}")
+        return f"{self.name} {value}{self.unit}" if self.unit == "°" else f"{self.name} {value} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Axis(Moved):
+    """The axis of what is swept: its kept samples and their values as displayed.
 
     Attributes:
         title: as written beside the outputs' figures, with the sense of the motion.
         kept: indices of the samples drawn.
         vertical: drawn upwards against the outputs, as wheel travel is.
+        further: the drivers that move besides, or while time is swept, and how, in words.
     """
 
-    name: str
     title: str
-    unit: str
-    scale: float
-    values: list[float]
     kept: list[int]
     vertical: bool
+    further: list[tuple[Moved, str]]
 
     def at(self, step: int) -> str:
-        """The driver's value at a sample, in words."""
-        if step >= len(self.values):
-            return ""
-        value = f"{self.scale * self.values[step]:+.4g}".replace("-", "\N{MINUS SIGN}")
-        return f"{self.name} {value}{self.unit}" if self.unit == "°" else f"{self.name} {value} {self.unit}".rstrip()
+        """The values of all drivers at a sample, in words."""
+        return ", ".join(filter(None, (super().at(step), *(moved.at(step) for moved, _ in self.further))))
+
+    @property
+    def besides(self) -> str:
+        """A sentence that names the drivers in `further`; empty where there are none."""
+        named = [f"{moved.name} ({how})" if how else moved.name for moved, how in self.further]
+        return f"{'Driven' if self.unit == 's' else 'Also driven'}: {', '.join(named)}." if named else ""
 
     @property
     def label(self) -> str:
@@ -88,25 +112,29 @@ class Axis:
         return [self.scale * self.values[k] for k in self.kept]
 
 
-def driver_axis(driver: Mapping[str, Any], records: Sequence[Record], worst: Iterable[int]) -> Axis:
-    """The axis of the swept driver.
+def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iterable[int]) -> Axis:
+    """The axis of what is swept.
 
     Args:
-        driver: what is known of the driver: its name, type, point and direction; may be empty.
+        facts: what is known of the case: its "driver" (name, type, point and direction), its "motions" by name; may be empty.
         records: the records of one case.
         worst: samples that thinning must keep.
     """
     series = next((record.driver for record in records if record.driver), dict[str, list[float]]())
-    moved = (name for name, values in series.items() if len(set(values)) > 1)
-    name = driver.get("name") or next(moved, next(iter(series), "driver"))
-    values = series.get(name, [])
-    unit, scale = _DISPLAY.get(_DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
+    driver, motions = facts.get("driver", {}), facts.get("motions", {})
+    key = driver.get("name") or next(iter(series), "driver")
+    swept = Moved.of(key, driver, series.get(key, []))
+    further = [
+        (Moved.of(name, motions.get(name, {}), values), motions.get(name, {}).get("motion", {}).get("type", ""))
+        for name, values in series.items()
+        if name != key
+    ]
+    name, unit, values = swept.name, swept.unit, swept.values
     vertical = driver.get("type") == "point_coordinate"
-    name = name.replace("_", " ")
     title = f"{name} [{unit}]" if unit else name
     if vertical and "wheel" in driver.get("point", "") and driver.get("direction", (0, 0, 0))[2] > 0.9:
         name, title = "wheel travel", f"rebound \N{LEFTWARDS ARROW}  wheel travel [{unit}]  \N{RIGHTWARDS ARROW} jounce"
-    return Axis(name, title, unit, scale, values, _kept(len(values), worst), vertical)
+    return Axis(name, unit, swept.scale, values, title, _kept(len(values), worst), vertical, further)
 
 
 def _kept(count: int, worst: Iterable[int]) -> list[int]:

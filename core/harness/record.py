@@ -81,7 +81,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         truth: kind of the case's reference; consensus_only where it has none, whatever the case claims.
-        driver: values of the swept driver [m or rad] by its name.
+        driver: values at the samples by name: of what is swept [m, rad or s] first, then of every further moving driver.
         errors: one entry for every output of the case, whatever the outcome.
         residual_max: the engine's own largest constraint residual over the solved samples [m or -].
         iterations: Newton iterations, sum over the solved samples.
@@ -138,7 +138,7 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
     references: dict[str, dict[str, OutputSeries]] = {}
 
 
-def to_json(results: Results) -> bytes:
+def to_json(results: msgspec.Struct) -> bytes:
     """Indented JSON; floats keep all their digits, a list of numbers stays on one line."""
     text = msgspec.json.format(msgspec.json.encode(results), indent=2)
     # a string cannot hold a bare line break, so only white space between numbers is touched

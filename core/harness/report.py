@@ -105,8 +105,8 @@ def write_report(results: Results, path: Path) -> None:
     """Write the report as one HTML file with all scripts, styles and data inside.
 
     Args:
-        results: a run. Of `results.run`, "cases" may give each case's "source" and "driver" (its name, type, point and direction)
-            by case name; everything else is printed as it is.
+        results: a run. Of `results.run`, "cases" may give each case's "source", "driver" (its name, type, point and direction)
+            and "motions" of further drivers by case name; everything else is printed as it is.
         path: the file to write, in a folder that exists.
 
     Raises:
@@ -201,7 +201,7 @@ def _case(results: Results, name: str, anchor: str, styles: Mapping[str, Style],
     records = [record for record in results.records if record.case == name]
     facts: Mapping[str, Any] = results.run.get("cases", {}).get(name, {})
     judged = [Judged(r, output, motion, d) for r in records for output, e in r.errors.items() for motion, d in e.items()]
-    axis = driver_axis(facts.get("driver", {}), records, (each.deviation.worst_step for each in judged))
+    axis = driver_axis(facts, records, (each.deviation.worst_step for each in judged))
     references = results.references.get(name, {})
     outputs: list[OutputView] = []
     for index, output in enumerate(dict.fromkeys(output for record in records for output in record.outputs)):
@@ -218,7 +218,8 @@ def _case(results: Results, name: str, anchor: str, styles: Mapping[str, Style],
             figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, standard)
         tolerance = next((j.deviation.tolerance for j in judged if (j.output, j.motion) == (output, "position")), None)
         figures[key] = output_figure(output, axis, curves, references.get(output), tolerance)
-        outputs.append(OutputView(output, output_label(output), key, _band_caption(references.get(output), tolerance), errors))
+        caption = f"{_band_caption(references.get(output), tolerance)} {axis.besides}".strip()
+        outputs.append(OutputView(output, output_label(output), key, caption, errors))
     return CaseView(
         name=name,
         anchor=anchor,

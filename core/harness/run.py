@@ -214,7 +214,7 @@ def _judged(case: Case, engine: Engine, version: str, answer: _Answer, native: _
         version,
         outcome=outcome,
         message="; ".join(messages),
-        driver={case.sweep.driver: values},
+        driver={name: each.tolist() for name, each in case.sweep.moved.items()},
         outputs={output.name: as_numbers(answer.outputs[output.name], output) for output in case.outputs},
         errors=errors,
         residual_max=float(trajectory.residual) if solved else None,

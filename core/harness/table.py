@@ -36,7 +36,12 @@ def print_table(results: Results, file: TextIO) -> None:
         engine = f"{record.engine} · {record.mode}" if several else record.engine
         table.add_row(Text(record.case), engine, outcome, *errors, truth(record), time)
     console.print(table)
-    for (engine, outcome, message), cases in _messages(results).items():
+    print_messages(results, console)
+
+
+def print_messages(results: Results, console: Console) -> None:
+    """Print every message, then a count of outcomes."""
+    for (engine, outcome, message), cases in messages(results).items():
         console.print(Text(f"{outcome}: {', '.join(cases)} · {engine}: {message}"), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
     console.print(", ".join(f"{count} {outcome}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
@@ -48,15 +53,17 @@ def truth(record: Record) -> str:
 
 
 def _error(record: Record, quantity: str) -> Text:
-    """The largest error of a quantity over the outputs."""
-    found: list[Deviation] = [each for errors in record.errors.values() for name, each in errors.items() if name == quantity]
-    if not found:
-        return Text("–")
-    worst = max(found, key=lambda each: (not each.within, each.max_abs))
-    return Text(f"{worst.max_abs:.1e}", style="" if worst.within else "bold red")
+    found = worst(record, quantity)
+    return Text("–") if found is None else Text(f"{found.max_abs:.1e}", style="" if found.within else "bold red")
 
 
-def _messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
+def worst(record: Record, quantity: str) -> Deviation | None:
+    """The largest error of a quantity over the outputs, those out of tolerance first; None where nothing was compared."""
+    found = [each for errors in record.errors.values() for name, each in errors.items() if name == quantity]
+    return max(found, key=lambda each: (not each.within, each.max_abs), default=None)
+
+
+def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
     """Messages, and the cases they are about; a missing engine says so once."""
     said: dict[tuple[str, Outcome, str], list[str]] = {}
     for record in results.records:

@@ -1,0 +1,300 @@
+"""One joint between two free bodies, its equations traced once and run over any scalar; and ways over its manifold.
+
+The operations that an engine runs are the ones examined here. They are run over lanes of floats, over complex numbers (an exact
+Jacobian: phi(x + i h) = phi + i h phi', without cancellation), over jets (value, first and second derivative by time) and over
+numbers of any precision.
+
+A state is an array (size, lanes): displacement and Euler parameters of body i, of body j, then the joint's named coordinates if it
+relates any; a rate is (unknowns, lanes): v and w of body i, of body j, rates of the coordinates. Lengths are in the unit of the
+frame, so that a joint of any size has numbers of size one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..algebra import Quat, vec
+from ..analysis.cartesian import COLUMNS, Cartesian
+from ..analysis.equations import Frames, Relation, Style, constraints
+from ..errors import MechanismError
+from ..joints import Joint
+from ..mechanism import Body, Mechanism
+from ..program import Tape, program
+from ..trajectory import Array
+from .scalars import JETS, NUMBERS, execute
+
+Mask = NDArray[np.bool_]
+
+BODIES = "i", "j"
+# u and q of two bodies
+POSES = 14
+COMPLEX_STEP = 1e-30
+# h f' = sum of weight * f(k h), sixth order: at h = 0.01 truncation (h^6) and round-off (1e-16 / h) are both near 1e-13.
+DIFFERENCE = 1e-2
+WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+# Newton is quadratic: a step below this ends at round-off.
+SETTLED = 1e-13
+# A pose whose rows are nearer to dependence than this part of their distance at design is on no branch but between two.
+NEARLY_SINGULAR = 0.1
+# A step that has to be corrected by more than this part of itself may have left its branch; it is halved.
+LARGEST_CORRECTION = 0.25
+# What is left of a dependent row of size one is round-off (1e-15); of an independent one, in sound geometry, 1e-2.
+DEPENDENT = 1e-9
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the two bodies of a joint have their origins at design [m], and the unit in which lengths are measured [m]."""
+
+    origins: tuple[tuple[float, ...], tuple[float, ...]]
+    unit: float
+
+    def scaled(self, factor: float) -> Place:
+        """The same place, drawn larger and measured in metres."""
+        return Place((_times(factor, self.origins[0]), _times(factor, self.origins[1])), 1.0)
+
+
+class TracedJoint:
+    """The equations of a joint as programs.
+
+    Attributes:
+        names: of the rows, as "Dot11 row 2".
+        parts: the rows of each primitive.
+        coordinates: named coordinates of the joint, as "joint.rotation".
+        programs: phi, rows, nu, gamma and branch, over the slots of a state and a rate.
+
+    Raises:
+        MechanismError: the equations disagree in number, or are in body axes.
+    """
+
+    def __init__(self, joint: Joint, place: Place, style: Style = Style.NATIVE) -> None:
+        mechanism = Mechanism("joint", [Body(name) for name in BODIES], [joint])
+        origins = {name: (1.0 / place.unit) * vec(origin) for name, origin in zip(BODIES, place.origins, strict=True)}
+        found = constraints(mechanism, Frames(place.unit, origins, BODIES), {}, style)
+        equations = Cartesian(found, BODIES)
+        self.coordinates = tuple(equations.coordinates)
+        self.columns = equations.unknowns
+        self.size = POSES + len(self.coordinates)
+        self.origins = np.array([[*origins[name]] for name in BODIES])
+        self._trace(equations)
+        counts = [1 if isinstance(each, Relation) else each.primitive.n for each in found]
+        ends = np.cumsum(counts)
+        self.parts = [slice(end - count, end) for end, count in zip(ends.tolist(), counts, strict=True)]
+        kinds = [type(each).__name__ if isinstance(each, Relation) else type(each.primitive).__name__ for each in found]
+        self.names = [f"{kind} row {k + 1}" for kind, count in zip(kinds, counts, strict=True) for k in range(count)]
+        lengths = {name: len(self.programs[name].outputs) for name in ("phi", "nu", "gamma")}
+        lengths["rows"] = len(self.programs["rows"].outputs) // self.columns
+        if set(lengths.values()) != {len(self.names)}:
+            found_them = ", ".join(f"{count} of {name}" for name, count in lengths.items())
+            raise MechanismError(f"{joint}: {found_them}, expected {len(self.names)} of each, the sum of n of its primitives")
+        if style is Style.NATIVE and any(not isinstance(each, Relation) and each.primitive.body_axes for each in found):
+            raise MechanismError(f"{joint}: its primitives have rows in body axes; write them in global axes")
+
+    def _trace(self, equations: Cartesian) -> None:
+        tape = Tape()
+        inputs = [tape.input(slot) for slot in range(self.size + self.columns)]
+        state: dict[str, Sequence[Any]] = {"u i": inputs[:3], "q i": inputs[3:7], "u j": inputs[7:10], "q j": inputs[10:14]}
+        state |= {f"x {name}": [inputs[POSES + k]] for k, name in enumerate(self.coordinates)}
+        at = equations.configuration(state)
+        entries = [row.get(column, 0.0) for row in equations.rows(at) for column in range(self.columns)]
+        outputs: dict[str, Sequence[Any]] = {
+            "phi": equations.phi(at),
+            "rows": entries,
+            "nu": equations.nu(at),
+            "gamma": equations.gamma(at, inputs[self.size :]),
+            "branch": equations.branch(at),
+        }
+        self.programs = {name: program(name, tape, dict(enumerate(values))) for name, values in outputs.items()}
+
+    @property
+    def rows_left(self) -> int:
+        """Rows less named coordinates: what the joint takes of the six freedoms, if its rows are independent."""
+        return len(self.names) - len(self.coordinates)
+
+    def _run(self, name: str, inputs: Any, shape: tuple[int, ...]) -> Array:
+        with np.errstate(all="ignore"):
+            found = execute(self.programs[name], NUMBERS, inputs)
+        return np.array([np.broadcast_to(each, shape) for each in found]).reshape(len(found), *shape)
+
+    def phi(self, state: Array) -> Array:
+        """Residuals, shape (rows, ...)."""
+        return self._run("phi", state, state.shape[1:])
+
+    def rows(self, state: Array) -> Array:
+        """The Jacobian as the joint declares it, shape (lanes, rows, columns)."""
+        found = self._run("rows", state, state.shape[1:])
+        return np.moveaxis(found.reshape(len(self.names), self.columns, -1), 2, 0)
+
+    def nu(self, state: Array) -> Array:
+        """Right-hand sides of the velocity equations, shape (rows, lanes)."""
+        return self._run("nu", state, state.shape[1:])
+
+    def gamma(self, state: Array, rate: Array) -> Array:
+        """Right-hand sides of the acceleration equations, shape (rows, lanes)."""
+        return self._run("gamma", np.concatenate([state, rate]), state.shape[1:])
+
+    def branch(self, state: Array) -> Array:
+        """The smallest of the branch tests, shape (lanes,); 1 where there is none."""
+        return self._run("branch", state, state.shape[1:]).min(axis=0, initial=1.0)
+
+    def exact(self, state: Array) -> Array:
+        """The Jacobian that phi has, by complex steps, shape (lanes, rows, columns)."""
+        steps = np.repeat(np.eye(self.columns)[:, :, None], state.shape[1], axis=2) * (1j * COMPLEX_STEP)
+        moved = self._moved(state[:, None, :], steps, lambda a: a)  # the length changes by the square of the step: not at all
+        return np.moveaxis(self.phi(moved).imag / COMPLEX_STEP, (0, 1, 2), (1, 2, 0))
+
+    def differences(self, state: Array) -> Array:
+        """The same by central differences of sixth order."""
+        directions = np.repeat(np.eye(self.columns)[:, :, None], state.shape[1], axis=2)
+        total: Any = 0.0
+        for k, weight in WEIGHTS:
+            total = total + weight * self.phi(self._moved(state[:, None, :], k * DIFFERENCE * directions, _normalised))
+        return np.moveaxis(total / DIFFERENCE, (0, 1, 2), (1, 2, 0))
+
+    def retract(self, state: Array, step: Array) -> Array:
+        """The state after a step (columns, lanes)."""
+        return self._moved(state, step, _normalised)
+
+    def _moved(self, state: Array, step: Any, ended: Callable[[Any], Any]) -> Any:
+        parts: list[Any] = []
+        for k in range(2):
+            u, q = state[7 * k : 7 * k + 3], state[7 * k + 3 : 7 * k + 7]
+            dr, half = step[COLUMNS * k : COLUMNS * k + 3], 0.5 * step[COLUMNS * k + 3 : COLUMNS * (k + 1)]
+            turned = Quat(1.0, vec(tuple(half))) * Quat(q[0], vec(tuple(q[1:])))
+            parts += [u + dr, ended(np.stack([*turned]))]
+        return np.concatenate([*parts, state[POSES:] + step[2 * COLUMNS :]])
+
+    def jets(self, state: Array, rate: Array, acceleration: Array) -> Array:
+        """phi along a motion: value, first and second derivative by time, shape (3, rows, lanes)."""
+        jets: list[Array] = []
+        for k in range(2):
+            u, q = state[7 * k : 7 * k + 3], Quat(state[7 * k + 3], vec(tuple(state[7 * k + 4 : 7 * k + 7])))
+            v, w = rate[COLUMNS * k : COLUMNS * k + 3], vec(tuple(rate[COLUMNS * k + 3 : COLUMNS * (k + 1)]))
+            a, w_t = acceleration[COLUMNS * k : COLUMNS * k + 3], vec(tuple(acceleration[COLUMNS * k + 3 : COLUMNS * (k + 1)]))
+            # q' = w q / 2, q'' = w' q / 2 - |w|^2 q / 4
+            q_t, turning = Quat(0.0, 0.5 * w) * q, Quat(0.0, 0.5 * w_t) * q
+            q_tt = [x - 0.25 * (w @ w) * y for x, y in zip(turning, q, strict=True)]
+            jets += [np.stack([u, v, a]), np.array([[*q], [*q_t], q_tt])]
+        jets.append(np.stack([state[POSES:], rate[2 * COLUMNS :], acceleration[2 * COLUMNS :]]))
+        inputs = np.moveaxis(np.concatenate(jets, axis=1), 1, 0)
+
+        def constant(value: float) -> Array:
+            return np.array([value, 0.0, 0.0])[:, None]
+
+        found = execute(self.programs["phi"], JETS, inputs, constant)
+        return np.stack([np.broadcast_to(each, (3, state.shape[1])) for each in found], axis=1)
+
+
+def design(joint: TracedJoint, lanes: int) -> Array:
+    """The design position, in all lanes."""
+    state = np.zeros((joint.size, lanes))
+    state[[3, 10]] = 1.0
+    return state
+
+
+def min_norm(J: Array, right: Array, columns: slice = slice(None)) -> Array:
+    """The smallest solutions of J x = right over the columns, rows brought to the same size; (lanes, m, n), (m, lanes) -> (n, lanes)."""
+    even, size = _even(J)
+    return (np.linalg.pinv(even[:, :, columns], rcond=DEPENDENT) @ (right.T / size)[:, :, None])[:, :, 0].T
+
+
+def newton(
+    joint: TracedJoint, state: Array, jacobian: Callable[[Array], Array], iterations: int, columns: slice = slice(None)
+) -> tuple[Array, NDArray[np.int64]]:
+    """Newton's iteration by smallest steps over the given columns: where it ends, and iterations until the steps vanish.
+
+    A lane that does not settle has as many iterations as were allowed, plus one.
+    """
+    state = state.copy()
+    taken = np.full(state.shape[1], iterations + 1)
+    for k in range(iterations):
+        active = np.flatnonzero(taken > iterations)
+        if not len(active):
+            break
+        here = state[:, active]
+        step = np.zeros((joint.columns, len(active)))
+        step[columns] = -min_norm(jacobian(here), joint.phi(here), columns)
+        state[:, active] = joint.retract(here, step)
+        settled = np.abs(step).max(axis=0) < SETTLED
+        taken[active[settled]] = k + 1
+    return state, taken
+
+
+def walk(
+    joint: TracedJoint, start: Array, aims: Callable[[Array, Array], Array], steps: int, columns: slice = slice(None)
+) -> list[Array]:
+    """Small steps over the manifold, each followed by a return to it: the states after every step, the start first.
+
+    A lane stays where it is if its step would reach a nearly singular pose, or does not return to the manifold nearby; its next
+    step is shorter.
+
+    Args:
+        aims: state, last step -> the step wanted (columns, lanes); its part along the manifold is taken.
+    """
+    states, share, last = [start], np.ones(start.shape[1]), np.zeros((joint.columns, start.shape[1]))
+    for _ in range(steps):
+        here = states[-1]
+        step, J = np.zeros((joint.columns, here.shape[1])), joint.exact(here)
+        step[columns] = aims(here, last)[columns]
+        step[columns] -= min_norm(J, np.einsum("lmn,nl->ml", J, step), columns)
+        last, step = step, share * step
+        off = joint.retract(here, step)
+        there, taken = newton(joint, off, joint.exact, 6, columns)
+        near = np.linalg.norm(there - off, axis=0) <= LARGEST_CORRECTION * np.linalg.norm(step, axis=0) + SETTLED
+        good = (taken <= 6) & near & regular(joint, there, columns)
+        share = np.where(good, np.minimum(1.0, 2.0 * share), 0.5 * share)
+        states.append(np.where(good, there, here))
+    return states
+
+
+def straight(directions: Array, length: float) -> Callable[[Array, Array], Array]:
+    """Aims that start in the given directions and go straight on, as far as the manifold is straight."""
+
+    def aims(_: Array, last: Array) -> Array:
+        ahead = np.where(np.linalg.norm(last, axis=0) > 0.0, last, directions)
+        return ahead * (length / np.linalg.norm(ahead, axis=0))
+
+    return aims
+
+
+def regular(joint: TracedJoint, state: Array, columns: slice = slice(None)) -> Mask:
+    """Lanes whose rows are not nearly dependent, and none nearly zero, by the measure of the design position."""
+    at_design = joint.exact(design(joint, 1))[:, :, columns]
+    size = np.linalg.norm(at_design, axis=2, keepdims=True)
+    size = np.where(size > 0.0, size, 1.0)
+    return np.asarray(_smallest(joint.exact(state)[:, :, columns] / size) > NEARLY_SINGULAR * _smallest(at_design / size))
+
+
+def smallest(J: Array) -> Array:
+    """How far the rows of each lane are from dependence: smallest singular value of the rows brought to size one, shape (lanes,)."""
+    return _smallest(_even(J)[0])
+
+
+def _smallest(J: Array) -> Array:
+    return np.asarray(np.linalg.svd(np.nan_to_num(J), compute_uv=False)[:, -1])
+
+
+def rank(J: Array) -> NDArray[np.int64]:
+    """Numerical rank of the rows of each lane, shape (lanes,)."""
+    return np.asarray(np.linalg.matrix_rank(_even(J)[0], tol=DEPENDENT))
+
+
+def _even(J: Array) -> tuple[Array, Array]:
+    """The rows brought to size one, and their sizes; a row of zeros stays, one that is not finite becomes zeros."""
+    J = np.where(np.isfinite(J).all(axis=2, keepdims=True), J, 0.0)
+    size = np.linalg.norm(J, axis=2)
+    size = np.where(size > 0.0, size, 1.0)
+    return J / size[:, :, None], size
+
+
+def _normalised(q: Any) -> Any:
+    return q / np.sqrt((q * q).sum(axis=0))
+
+
+def _times(factor: float, values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(factor * value for value in values)
