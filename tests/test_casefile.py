@@ -316,12 +316,12 @@ def test_motions_are_in_the_units_of_the_file(tmp_path: Path):
 
 
 def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path: Path):
-    """-0.3 m at 0.1 m/s are -2.9999999999999996 s."""
+    """2.1 m at 0.7 m/s take 3.0000000000000004 s, more than the table has."""
     motion = MOTION[MOTION.index("[drivers.hang]") :].replace("[0, 1.5]", "[-3, 3]")
     push = edited(
-        ("[sweep]\n", motion.replace("rack_end", "tip")), ("= -0.1", "= -0.3"), ("stop = 0.1", "stop = 0.3"), ("= 2.0", "= 0.1")
+        ("[sweep]\n", motion.replace("rack_end", "tip")), ("= -0.1", "= -2.1"), ("stop = 0.1", "stop = 2.1"), ("= 2.0", "= 0.7")
     )
-    assert load_case(write(tmp_path, push)).sweep.path.times[0] > -3.0 - 1e-12
+    assert load_case(write(tmp_path, push)).sweep.path.times[-1] > 3.0
 
 
 def test_byte_order_mark_and_windows_lines_are_read(tmp_path: Path):

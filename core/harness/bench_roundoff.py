@@ -25,6 +25,9 @@ from .textbook import Condition, conditions
 DIGITS = 50
 DISTANCES = (1.0, 1e3, 1e6)
 TILT = 1e-6
+# Arms and positions are on a grid that holds all of 1e6 m in 53 digits: sums and differences of them are exact, and so all ways get
+# the same inputs, be they displacements from the design or positions.
+GRID = 2.0**32
 
 WAYS = {"printed": "as printed", **AXES}
 """Row style -> how it is named. As printed, (22) is summed from the left; the row styles take r_j - r_i first."""
@@ -68,6 +71,20 @@ class Moving:
         return Motion(self.v, Pose.of(self.u, self.q).A.T @ self.w) if body_axes else Motion(self.v, self.w)
 
 
+@dataclass(frozen=True)
+class States:
+    """Random joints between two bodies on their way; lanes of them.
+
+    Attributes:
+        e0: from the origin of body i to that of body j at design, where P_i and P_j coincide.
+    """
+
+    conditions: tuple[Condition, ...]
+    i: Moving
+    j: Moving
+    e0: Vec3
+
+
 def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
     """Errors of the conditions of Table 3 in all ways, over random states.
 
@@ -84,9 +101,10 @@ def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
     with mpmath.workdps(DIGITS):
         for number, name in enumerate(("d10", "d11", "d12", "d20", "d21")):
             for distance in DISTANCES if name in ("d20", "d21") else DISTANCES[:1]:
-                known, i, j = _states(np.random.default_rng(seed), states, distance, turning=name in ("d10", "d11"))
-                for rows, style, equations in _written(known[number]):
-                    errors = _errors(equations, i, j, mpmath.mpf)
+                known = _states(np.random.default_rng(seed), states, distance, turning=name in ("d10", "d11"))
+                for rows, style, equations in _written(known.conditions[number]):
+                    j = replace(known.j, u=known.e0 + known.j.u) if style == "printed" else known.j
+                    errors = _errors(equations, known.i, j, mpmath.mpf)
                     found.append(RoundOff(name, rows, WAYS[style], distance if name in ("d20", "d21") else None, *errors))
     return found
 
@@ -134,8 +152,8 @@ def _mapped(number: Callable[[Any], Any], value: Any) -> Any:
     return value if isinstance(value, bool) else number(value)
 
 
-def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool) -> tuple[tuple[Condition, ...], Moving, Moving]:
-    """The conditions of n random joints, and their bodies: one turns about the other's h, or slides along it."""
+def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool) -> States:
+    """One body turns about the other's h, or slides along it."""
 
     def vector() -> Vec3:
         return Vec3(*rng.normal(size=(3, n)))
@@ -147,24 +165,22 @@ def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool)
         return Quat(np.cos(0.5 * angle), np.sin(0.5 * angle) * axis)
 
     def gridded(a: Vec3) -> Vec3:
-        return Vec3(*(np.round(x * 2.0**40) / 2.0**40 for x in a))
+        return Vec3(*(np.round(x * GRID) / GRID for x in a))
 
     h = unit(vector())
     f = unit(cross(vector(), h))
-    # On a grid, so that d0, d0 + s_i and what follows from them are exact: all ways get the same inputs.
-    s_i = gridded(vector())
-    s_j = gridded(s_i + rng.normal(size=n) * h)
-    i = Moving(distance * unit(vector()), rotation(unit(vector()), rng.uniform(-np.pi, np.pi, n)), vector(), vector())
+    s_i, s_j = gridded(vector()), gridded(vector())
+    u, q = gridded(distance * unit(vector())), rotation(unit(vector()), rng.uniform(-np.pi, np.pi, n))
+    i = Moving(u, q, vector(), vector())
     angle, slide, rate, tilt = rng.uniform(-np.pi, np.pi, n), rng.normal(size=n), rng.normal(size=n), unit(vector())
     turn = Pose.of(i.u, i.q).turn
-    axis = turn(h)
-    w, q = i.w + TILT * tilt, rotation(tilt, TILT) * i.q * rotation(h, angle if turning else 0.0 * angle)
+    e0, axis, w, tilted = s_i - s_j, turn(h), i.w + TILT * tilt, rotation(tilt, TILT) * i.q
     if turning:
-        j = Moving(i.u, q, i.v, w + rate * axis)
+        j = Moving(i.u, tilted * rotation(h, angle), i.v, w + rate * axis)
     else:
-        e = slide * axis
-        j = Moving(i.u + e, q, i.v + cross(i.w, e) + rate * axis, w)
-    return conditions(f, cross(h, f), h, s_i, s_j, s_j - s_i), i, j
+        e = turn(e0) + slide * axis
+        j = Moving(gridded(i.u + e - e0), tilted, i.v + cross(i.w, e) + rate * axis, w)
+    return States(conditions(f, cross(h, f), h, s_i, s_j), i, j, e0)
 
 
 def verdict(errors: Iterable[RoundOff]) -> list[str]:

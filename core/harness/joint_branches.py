@@ -8,6 +8,7 @@ lead from there. No step crosses a pose where the rows are nearly dependent: the
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -74,7 +75,7 @@ def connected(s: Specimen, state: Array) -> Mask:
 def _led(t: TracedJoint, state: Array, aim: Array) -> Mask:
     """Whether small steps over the manifold lead from each pose to its aim."""
     there, state = np.zeros(state.shape[1], dtype=bool), state.copy()
-    waiting = np.arange(state.shape[1])
+    waiting: Any = np.arange(state.shape[1])
     for _ in range(LEGS):
         goal = aim[:, waiting]
         before = state[:, waiting]

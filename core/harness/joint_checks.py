@@ -39,7 +39,8 @@ class Specimen:
     """A joint, its equations, and motions that it admits.
 
     Attributes:
-        state: poses on the manifold, shape (size, lanes), as `TracedJoint` has them; near: those passed on the way, near the design.
+        state: poses on the manifold, shape (size, lanes), as `TracedJoint` has them.
+        near: poses that were passed on the way, near the design.
         rate, acceleration: of an admissible motion through each, shape (columns, lanes).
         exact: the Jacobian of phi there, shape (lanes, rows, columns).
     """
@@ -78,14 +79,14 @@ def specimen(joint: Joint, place: Place, lanes: int, rng: np.random.Generator) -
     return Specimen(joint, place, traced, way[NEAR], state, rate, acceleration, exact, rng)
 
 
-def _along(J: Array, wanted: Array) -> Array:
+def _along(jacobian: Array, wanted: Array) -> Array:
     """The part of the wanted rates that the rows allow."""
-    return wanted - min_norm(J, times(J, wanted))
+    return wanted - min_norm(jacobian, times(jacobian, wanted))
 
 
-def times(J: Array, rate: Array) -> Array:
+def times(jacobian: Array, rate: Array) -> Array:
     """Rows times rates, (lanes, rows, columns) and (columns, lanes) -> (rows, lanes)."""
-    return np.einsum("lmn,nl->ml", J, rate)
+    return np.einsum("lmn,nl->ml", jacobian, rate)
 
 
 def composition(s: Specimen) -> Iterator[Finding]:
@@ -166,11 +167,11 @@ def defects(t: TracedJoint, state: Array, rate: Array, acceleration: Array, unit
     Args:
         units: of the columns of the equations in those of the rates, shape (columns, 1).
     """
-    J = t.rows(state) * np.reshape(units, (1, 1, -1))
-    size = np.linalg.norm(J, axis=2).T
+    jacobian = t.rows(state) * np.reshape(units, (1, 1, -1))
+    size = np.linalg.norm(jacobian, axis=2).T
     size = np.where(size > 0.0, size, 1.0)
-    velocity = (times(J, rate) - t.nu(state)) / size
-    bent = (times(J, acceleration) - t.gamma(state, rate * units)) / size
+    velocity = (times(jacobian, rate) - t.nu(state)) / size
+    bent = (times(jacobian, acceleration) - t.gamma(state, rate * units)) / size
     speed, turn = np.linalg.norm(rate, axis=0), np.linalg.norm(acceleration, axis=0)
     return np.abs(t.phi(state) / size), np.abs(velocity) / (1.0 + speed), np.abs(bent) / (1.0 + speed**2 + turn)
 

@@ -56,9 +56,9 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
 
 
 def _rates(case: Case) -> Iterator[Finding]:
-    """Velocities and accelerations against differences of positions and velocities: these know nothing of rows and right-hand sides."""
-    values = case.sweep.change
-    values = np.linspace(values[0], values[-1], FINER * (len(values) - 1) + 1)
+    """Velocities and accelerations against differences, which know nothing of rows and right-hand sides."""
+    first, *_, last = grid = case.sweep.change.tolist()
+    values: Array = np.linspace(first, last, FINER * (len(grid) - 1) + 1, dtype=np.float64)
     fine = solve(case.mechanism, case.sweep.driver, values, rate=case.sweep.rate, tol=TOL)
     dt, motion = float(values[1] - values[0]) / case.sweep.rate, fine.points[case.points[0]]
     assert motion.velocity is not None

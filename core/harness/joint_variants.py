@@ -1,5 +1,6 @@
-"""The same joint written differently: bodies exchanged, both moved together, drawn larger, far away, in other unknowns. A motion that
-one admits the other must admit too: position, velocity and acceleration.
+"""The same joint written differently: bodies exchanged, both moved together, drawn larger, far away, in other unknowns.
+
+A motion that the one admits the other must admit too: position, velocity and acceleration.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
     q = s.rng.normal(size=4)
     e0, *e = (q / np.linalg.norm(q)).tolist()
     turn = Quat(e0, vec(e))
-    D = rotation_less_identity(turn)
-    R = np.eye(3) + np.array([[*D.x], [*D.y], [*D.z]])
+    change = rotation_less_identity(turn)
+    rotation = np.eye(3) + np.array([[*change.x], [*change.y], [*change.z]])
     shift = s.rng.normal(size=(3, 1))
 
     def pose(state: Array) -> Array:
@@ -55,20 +56,20 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
         for k, origin in enumerate(s.traced.origins[:, :, None]):
             u, e = state[7 * k : 7 * k + 3], state[7 * k + 3 : 7 * k + 7]
             turned = turn * Quat(e[0], vec(tuple(e[1:])))
-            parts += [R @ (origin + u) + shift - origin, np.stack([*turned])]
+            parts += [rotation @ (origin + u) + shift - origin, np.stack([*turned])]
         return np.concatenate([*parts, state[POSES:]])
 
     def rates(a: Array) -> Array:
-        return np.concatenate([*(R @ a[3 * k : 3 * k + 3] for k in range(4)), a[2 * COLUMNS :]])
+        return np.concatenate([*(rotation @ a[3 * k : 3 * k + 3] for k in range(4)), a[2 * COLUMNS :]])
 
     remedy = "it must not matter where the two bodies are together: check which body each arm and axis belongs to"
     yield _same("rigid motion", s.traced, (pose(s.state), rates(s.rate), rates(s.acceleration)), remedy)
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     here, there = s.traced.phi(off), s.traced.phi(pose(off))
     parts = s.traced.parts
-    change = np.array([np.abs(np.linalg.norm(here[part], axis=0) - np.linalg.norm(there[part], axis=0)) for part in parts])
-    names = [s.traced.names[part.start].split(" row")[0] for part in parts]
-    yield judged("residual elsewhere", change, ROUND_OFF, ROUND_OFF_WHY, names, remedy=remedy)
+    apart = np.array([np.abs(np.linalg.norm(here[a:b], axis=0) - np.linalg.norm(there[a:b], axis=0)) for a, b in parts])
+    names = [s.traced.names[first].split(" row")[0] for first, _ in parts]
+    yield judged("residual elsewhere", apart, ROUND_OFF, ROUND_OFF_WHY, names, remedy=remedy)
 
 
 def size_and_place(s: Specimen) -> Iterator[Finding]:
@@ -102,11 +103,11 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
     own = slice(2 * COLUMNS, None)
     state = np.concatenate([s.state[:POSES], np.zeros((len(mixed.coordinates), s.lanes))])
     state, _ = newton(mixed, state, mixed.rows, 30, own)
-    J = mixed.rows(state)
+    jacobian = mixed.rows(state)
     rate = np.concatenate([s.rate[: 2 * COLUMNS], np.zeros_like(state[POSES:])])
-    rate[own] = min_norm(J, mixed.nu(state) - times(J, rate), own)
+    rate[own] = min_norm(jacobian, mixed.nu(state) - times(jacobian, rate), own)
     acceleration = np.concatenate([s.acceleration[: 2 * COLUMNS], np.zeros_like(state[POSES:])])
-    acceleration[own] = min_norm(J, mixed.gamma(state, rate) - times(J, acceleration), own)
+    acceleration[own] = min_norm(jacobian, mixed.gamma(state, rate) - times(jacobian, acceleration), own)
     yield _same("mixed style", mixed, (state, rate, acceleration), "mixed() must say the same as primitives(): define both")
 
 

@@ -5,31 +5,43 @@ A kind is a table of what the operations of a program are for it.
 
 from __future__ import annotations
 
+import importlib
 import operator
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..program import Program
 from ..trajectory import Array
 
-# Complex numbers are ordered by their real parts, so that their imaginary parts stay derivatives.
-NUMBERS: Mapping[str, Callable[..., Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "neg": operator.neg,
-    "sqrt": np.sqrt,
-    "sin": np.sin,
-    "cos": np.cos,
-    "abs": lambda a: np.where(np.real(a) < 0.0, -a, a),
-    "min": lambda a, b: np.where(np.real(a) <= np.real(b), a, b),
-    "max": lambda a, b: np.where(np.real(a) >= np.real(b), a, b),
-    "larger": lambda a, b: abs(np.real(a)) > abs(np.real(b)),
-    "where": lambda m, p, q: np.where(m, p, q),
-}
+Operation: TypeAlias = Callable[..., Any]
+
+
+def _ordered(key: Operation) -> dict[str, Operation]:
+    """The operations that compare, by a key of the scalars."""
+    where: Operation = np.where
+
+    def absolute(a: Any) -> Any:
+        return where(key(a) < 0.0, -a, a)
+
+    def smaller(a: Any, b: Any) -> Any:
+        return where(key(a) <= key(b), a, b)
+
+    def greater(a: Any, b: Any) -> Any:
+        return where(key(a) >= key(b), a, b)
+
+    def larger(a: Any, b: Any) -> Any:
+        return abs(key(a)) > abs(key(b))
+
+    return {"abs": absolute, "min": smaller, "max": greater, "larger": larger, "where": where}
+
+
+_SUMS: dict[str, Any] = {"+": operator.add, "-": operator.sub, "neg": operator.neg}
+_PRODUCTS: dict[str, Any] = {"*": operator.mul, "/": np.true_divide, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos}
+
+NUMBERS: Mapping[str, Operation] = {**_SUMS, **_PRODUCTS, **_ordered(np.real)}
+"""Arrays of numbers. Complex ones are ordered by their real parts, so that their imaginary parts stay derivatives."""
 
 
 def _product(a: Array, b: Array) -> Array:
@@ -42,7 +54,9 @@ def _quotient(a: Array, b: Array) -> Array:
     return np.stack([x, v, (a[2] - 2.0 * v * b[1] - x * b[2]) / b[0]])
 
 
-def _chain(f: Callable[[Array], tuple[Array, Array, Array]]) -> Callable[[Array], Array]:
+def _chain(f: Callable[[Array], tuple[Array, Array, Array]]) -> Operation:
+    """A function of a jet, from its value and first two derivatives."""
+
     def of(a: Array) -> Array:
         y, slope, bend = f(a[0])
         return np.stack([y, slope * a[1], slope * a[2] + bend * a[1] * a[1]])
@@ -50,45 +64,38 @@ def _chain(f: Callable[[Array], tuple[Array, Array, Array]]) -> Callable[[Array]
     return of
 
 
-JETS: Mapping[str, Callable[..., Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
+JETS: Mapping[str, Operation] = {
+    **_SUMS,
     "*": _product,
     "/": _quotient,
-    "neg": operator.neg,
     "sqrt": _chain(lambda x: (np.sqrt(x), 0.5 / np.sqrt(x), -0.25 / (x * np.sqrt(x)))),
     "sin": _chain(lambda x: (np.sin(x), np.cos(x), -np.sin(x))),
     "cos": _chain(lambda x: (np.cos(x), -np.sin(x), -np.cos(x))),
-    "abs": lambda a: np.where(a[0] < 0.0, -a, a),
-    "min": lambda a, b: np.where(a[0] <= b[0], a, b),
-    "max": lambda a, b: np.where(a[0] >= b[0], a, b),
-    "larger": lambda a, b: abs(a[0]) > abs(b[0]),
-    "where": lambda m, p, q: np.where(m, p, q),
+    **_ordered(operator.itemgetter(0)),
 }
+"""Arrays (3, ...): value, first and second derivative by time."""
 
 
-def execute(
-    traced: Program, kind: Mapping[str, Callable[..., Any]], inputs: Any, lift: Callable[[float], Any] = float
-) -> list[Any]:
-    """Run a program over a kind of scalar: inputs by slot; the outputs in order. Constants are lifted to the kind."""
-    values: list[Any] = []
-    for op, *rest in traced.nodes:
-        if op in ("input", "const"):
-            values.append(inputs[int(rest[0])] if op == "input" else lift(rest[0]))
-        else:
-            values.append(kind[op](*(values[int(k)] for k in rest)))
-    return [values[traced.outputs[slot]] for slot in sorted(traced.outputs)]
-
-
-def precise(digits: int) -> tuple[Mapping[str, Callable[..., Any]], Callable[[Any], Any]]:
-    """Numbers of that many digits in arrays of objects, and what makes them of floats; needs mpmath.
+def precise(digits: int) -> tuple[Mapping[str, Operation], Operation]:
+    """The operations of numbers of that many digits, in arrays of objects; and what makes such arrays of floats.
 
     Raises:
         ModuleNotFoundError: mpmath is not installed.
     """
-    import mpmath
-
-    context: Any = mpmath.MPContext()
+    mpmath: Any = importlib.import_module("mpmath")
+    context = mpmath.MPContext()
     context.dps = digits
-    functions = {name: np.frompyfunc(getattr(context, name), 1, 1) for name in ("sqrt", "sin", "cos")}
-    return {**NUMBERS, **functions}, np.frompyfunc(context.mpf, 1, 1)
+    array_of: Any = np.frompyfunc
+    functions: dict[str, Operation] = {name: array_of(getattr(context, name), 1, 1) for name in ("sqrt", "sin", "cos")}
+    return {**NUMBERS, **functions}, array_of(context.mpf, 1, 1)
+
+
+def execute(program: Program, kind: Mapping[str, Operation], inputs: Any, lift: Callable[[float], Any] = float) -> list[Any]:
+    """Run a program over a kind of scalar: inputs by slot; the outputs in order. Constants are lifted to the kind."""
+    values: list[Any] = []
+    for op, *rest in program.nodes:
+        if op in ("input", "const"):
+            values.append(inputs[int(rest[0])] if op == "input" else lift(rest[0]))
+        else:
+            values.append(kind[op](*(values[int(k)] for k in rest)))
+    return [values[program.outputs[slot]] for slot in sorted(program.outputs)]

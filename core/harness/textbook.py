@@ -15,7 +15,7 @@ round-off are about these. Body axes, with A_ij = A_i^T A_j and W = skew(w):
     dot21   [ -a^T A_i^T | -e^T A_i skew(a) | a^T A_i^T | 0 ] for a = f, g         e = r_j - r_i
             gamma = 2 (v_j - v_i)^T A_i skew(a) w_i + e^T A_i W_i skew(a) w_i
 
-A pose's u is the position r itself: the origins of the two bodies coincide at design.
+A pose's u is the position r itself here.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ class Condition:
         return tuple(twin for dot in self.dots for twin in twins[type(dot)](dot))
 
     def printed(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:
-        """The scalar products as printed; zero where the primitive is if a . b and a . d are zero at design."""
+        """The scalar products as printed; for them, u of body j is r_j - r_i at design and what it has moved since."""
         return tuple(
             PrintedDot10(each.a, each.b, formed=formed)
             if isinstance(each, Dot10)
@@ -223,14 +223,14 @@ class Condition:
         )
 
 
-def conditions(f: Vec3, g: Vec3, h: Vec3, s_i: Vec3, s_j: Vec3, d0: Vec3 = ZERO) -> tuple[Condition, ...]:
-    """The conditions of Table 3 for a joint with axes f, g, h and arms s_i, s_j; d0 lies between the points at design."""
-    across = Dot20(f, s_i, s_j, d0), Dot20(g, s_i, s_j, d0)
+def conditions(f: Vec3, g: Vec3, h: Vec3, s_i: Vec3, s_j: Vec3) -> tuple[Condition, ...]:
+    """The conditions of Table 3 for a joint with axes f, g, h and arms s_i, s_j to a point common to both bodies at design."""
+    across = Dot20(f, s_i, s_j, ZERO), Dot20(g, s_i, s_j, ZERO)
     frames_coincide = Dot10(g, h), Dot10(h, f), Dot10(f, g)
     return (
         Condition("d10", frames_coincide[0], frames_coincide[:1]),
         Condition("d11", Dot11(f, g, h), (Dot10(g, h), Dot10(f, h))),
         Condition("d12", Dot12(), frames_coincide),
         Condition("d20", across[0], across[:1]),
-        Condition("d21", Dot21(f, g, d0 + s_i - s_j), across),
+        Condition("d21", Dot21(f, g, s_i - s_j), across),
     )

@@ -64,7 +64,7 @@ class TracedJoint:
 
     Attributes:
         names: of the rows, as "Dot11 row 2".
-        parts: the rows of each primitive.
+        parts: the rows of each primitive, first and end.
         coordinates: named coordinates of the joint, as "joint.rotation".
         programs: phi, rows, nu, gamma and branch, over the slots of a state and a rate.
 
@@ -82,11 +82,10 @@ class TracedJoint:
         self.size = POSES + len(self.coordinates)
         self.origins = np.array([[*origins[name]] for name in BODIES])
         self._trace(equations)
-        counts = [1 if isinstance(each, Relation) else each.primitive.n for each in found]
-        ends = np.cumsum(counts)
-        self.parts = [slice(end - count, end) for end, count in zip(ends.tolist(), counts, strict=True)]
-        kinds = [type(each).__name__ if isinstance(each, Relation) else type(each.primitive).__name__ for each in found]
-        self.names = [f"{kind} row {k + 1}" for kind, count in zip(kinds, counts, strict=True) for k in range(count)]
+        kinds = [(Relation, 1) if isinstance(each, Relation) else (type(each.primitive), each.primitive.n) for each in found]
+        self.names = [f"{kind.__name__} row {k + 1}" for kind, count in kinds for k in range(count)]
+        ends: list[int] = np.cumsum([count for _, count in kinds]).tolist()
+        self.parts = [(end - count, end) for end, (_, count) in zip(ends, kinds, strict=True)]
         lengths = {name: len(self.programs[name].outputs) for name in ("phi", "nu", "gamma")}
         lengths["rows"] = len(self.programs["rows"].outputs) // self.columns
         if set(lengths.values()) != {len(self.names)}:
@@ -197,9 +196,12 @@ def design(joint: TracedJoint, lanes: int) -> Array:
     return state
 
 
-def min_norm(J: Array, right: Array, columns: slice = slice(None)) -> Array:
-    """The smallest solutions of J x = right over the columns, rows brought to the same size; (lanes, m, n), (m, lanes) -> (n, lanes)."""
-    even, size = _even(J)
+def min_norm(matrix: Array, right: Array, columns: slice = slice(None)) -> Array:
+    """The smallest solutions of matrix x = right over the columns, rows brought to the same size.
+
+    Shapes (lanes, rows, columns), (rows, lanes) -> (columns, lanes).
+    """
+    even, size = _even(matrix)
     return (np.linalg.pinv(even[:, :, columns], rcond=DEPENDENT) @ (right.T / size)[:, :, None])[:, :, 0].T
 
 
@@ -239,9 +241,9 @@ def walk(
     states, share, last = [start], np.ones(start.shape[1]), np.zeros((joint.columns, start.shape[1]))
     for _ in range(steps):
         here = states[-1]
-        step, J = np.zeros((joint.columns, here.shape[1])), joint.exact(here)
+        step, matrix = np.zeros((joint.columns, here.shape[1])), joint.exact(here)
         step[columns] = aims(here, last)[columns]
-        step[columns] -= min_norm(J, np.einsum("lmn,nl->ml", J, step), columns)
+        step[columns] -= min_norm(matrix, np.einsum("lmn,nl->ml", matrix, step), columns)
         last, step = step, share * step
         off = joint.retract(here, step)
         there, taken = newton(joint, off, joint.exact, 6, columns)
@@ -270,26 +272,27 @@ def regular(joint: TracedJoint, state: Array, columns: slice = slice(None)) -> M
     return np.asarray(_smallest(joint.exact(state)[:, :, columns] / size) > NEARLY_SINGULAR * _smallest(at_design / size))
 
 
-def smallest(J: Array) -> Array:
-    """How far the rows of each lane are from dependence: smallest singular value of the rows brought to size one, shape (lanes,)."""
-    return _smallest(_even(J)[0])
+def smallest(matrix: Array) -> Array:
+    """How far the rows of each lane are from dependence: the smallest singular value, rows brought to size one, shape (lanes,)."""
+    return _smallest(_even(matrix)[0])
 
 
-def _smallest(J: Array) -> Array:
-    return np.asarray(np.linalg.svd(np.nan_to_num(J), compute_uv=False)[:, -1])
+def _smallest(matrix: Array) -> Array:
+    singular: Array = np.asarray(np.linalg.svd(np.nan_to_num(matrix), compute_uv=False), dtype=np.float64)
+    return singular[:, -1]
 
 
-def rank(J: Array) -> NDArray[np.int64]:
+def rank(matrix: Array) -> NDArray[np.int64]:
     """Numerical rank of the rows of each lane, shape (lanes,)."""
-    return np.asarray(np.linalg.matrix_rank(_even(J)[0], tol=DEPENDENT))
+    return np.asarray(np.linalg.matrix_rank(_even(matrix)[0], tol=DEPENDENT))
 
 
-def _even(J: Array) -> tuple[Array, Array]:
+def _even(matrix: Array) -> tuple[Array, Array]:
     """The rows brought to size one, and their sizes; a row of zeros stays, one that is not finite becomes zeros."""
-    J = np.where(np.isfinite(J).all(axis=2, keepdims=True), J, 0.0)
-    size = np.linalg.norm(J, axis=2)
+    finite = np.where(np.isfinite(matrix).all(axis=2, keepdims=True), matrix, 0.0)
+    size = np.linalg.norm(finite, axis=2)
     size = np.where(size > 0.0, size, 1.0)
-    return J / size[:, :, None], size
+    return finite / size[:, :, None], size
 
 
 def _normalised(q: Any) -> Any:
