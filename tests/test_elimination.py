@@ -4,7 +4,9 @@ from functools import reduce
 
 import numpy as np
 import pytest
-from kincheck.core.program import Elimination, NumpyExecutor, Tape, absolute, minimum, program
+from kincheck.core.program import Elimination, Tape, absolute, minimum, program
+
+from .running import run_on
 
 LITERALS = [1.0, -1.0, 1.0, -1.0, 0.5, 0.3, -2.0]
 
@@ -36,7 +38,7 @@ def eliminate(values, literals, right):
     outputs = {n * (n + 1) + i: x for i, x in enumerate(elimination.solve(b))} | {n * (n + 2): smallest}
     block = np.zeros((n * (n + 2) + 1, lanes))
     block[: n * n], block[n * n : n * (n + 1)] = values.reshape(lanes, -1).T, right.T
-    NumpyExecutor([program("p", tape, outputs)], block).run("p")
+    run_on([program("p", tape, outputs)], block)
     return block[n * (n + 1) : -1].T, block[-1], elimination
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -22,18 +22,18 @@ from kincheck.core import (
     Revolute,
     Screw,
     Sine,
-    Spherical,
     Translational,
+    Universal,
     solve,
 )
 from kincheck.core.drivers import Driver
 from kincheck.core.harness.case import Sweep
-from kincheck.core.topology import spanning_tree
+from kincheck.core.topology import Branch, SpanningTree, spanning_tree
 from kincheck.core.trajectory import Trajectory
 
 pytest.importorskip("pinocchio")
 
-from .test_pinocchio import ENGINE, TOL, case_of, rotation, solved
+from .test_pinocchio import ENGINE, TOL, adapter, case_of, rotation, solved
 
 Q, AXIS = (0.2, -0.1, 0.3), (0.4, 1.0, -0.7)
 P = (0.5, 0.6, 0.1)
@@ -194,7 +194,7 @@ def test_coupled_joint_that_closes_a_loop(bodies: tuple[str, str]) -> None:
 
 @pytest.mark.parametrize("flip", [1, -1])
 def test_rack_and_pinion_steering(flip: int) -> None:
-    """An inclined column, a rack across the car, tie rods to two knuckles on inclined kingpins: more than two turns of the wheel."""
+    """An inclined column, a rack across the car, tie rods to two knuckles on inclined kingpins: two turns of the wheel and more."""
     left, right = (np.array([-0.2, y, 0.3]) for y in (0.7, -0.7))
     pins = {"left": (left, (-0.1, -0.2, 1.0)), "right": (right, (-0.1, 0.2, 1.0))}
     joints: list[Joint] = [
@@ -218,16 +218,39 @@ def test_rack_and_pinion_steering(flip: int) -> None:
     same_as_native(mechanism, found, turn)
 
 
-def test_leadscrew_lifts_a_lever() -> None:
-    """Threads in a closed loop: a nut on a driven spindle, held from turning only by the lever it moves."""
+def nut_on_lever(mechanism: Mechanism) -> SpanningTree:
+    """The thread is cut, and the nut hangs on the lever."""
+    base, bearing, thread, eye, pivot = mechanism.joints
+    branches = [(GROUND, "housing", base), ("housing", "spindle", bearing), (GROUND, "lever", pivot), ("lever", "nut", eye)]
+    return SpanningTree(tuple(Branch(*each) for each in branches), (thread,))
+
+
+@pytest.mark.parametrize("bodies", [("spindle", "nut"), ("nut", "spindle")])
+@pytest.mark.parametrize("tree", [spanning_tree, nut_on_lever])
+def test_spindle_lifts_a_lever(
+    tree: Callable[[Mechanism], SpanningTree], bodies: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thread in a closed loop in space, between two Hooke's joints that let the spindle swing; over several turns.
+
+    With the thread cut, bodies that turn about several moving axes carry it: the only place where its angle has a bias.
+    """
+    monkeypatch.setattr(adapter, "spanning_tree", tree)
+    along, eye = (0.1, 0.2, 1.0), (0.05, 0.1, 0.5)
     joints = [
-        Revolute("bearing", GROUND, "spindle", (0.0, 0.0, 0.0), (0.0, 0.1, 1.0)),
-        Screw("thread", "spindle", "nut", (0.0, 0.0, 0.0), (0.0, 0.1, 1.0), 0.01),
-        Spherical("eye", "lever", "nut", (0.05, 0.0, 0.2)),
-        Cylindrical("pivot", GROUND, "lever", (0.7, 0.0, 0.25), (0.1, 1.0, 0.0)),
+        Universal("base", GROUND, "housing", (0.0, 0.0, 0.0), ((1.0, 0.0, -0.1), (0.02, 1.0, 0.2))),
+        Revolute("bearing", "housing", "spindle", (0.0, 0.0, 0.0), along),
+        Screw("thread", *bodies, (0.0, 0.0, 0.0), along, 0.02),
+        Universal("eye", "lever", "nut", eye, ((0.1, 1.0, 0.0), (1.0, -0.1, 0.3))),
+        Revolute("pivot", GROUND, "lever", (0.6, 0.0, 0.4), (0.3, 1.0, 0.2)),
     ]
-    bodies = [Body("spindle"), Body("nut"), Body("lever")]
-    points = [Point("eye", "nut", (0.05, 0.0, 0.2)), Point("tip", "lever", (0.9, 0.0, 0.2))]
-    mechanism, turn = Mechanism("jack", bodies, joints, points, [JointAngle("turn", "bearing")]), np.linspace(-12.0, 12.0, 97)
+    parts = [Body(name) for name in ("housing", "spindle", "nut", "lever")]
+    points = [
+        Point("end", "spindle", (0.2, 0.0, 0.6)),
+        Point("nut", "nut", (0.1, 0.2, 0.5)),
+        Point("tip", "lever", (0.9, 0.0, 0.2)),
+    ]
+    mechanism, turn = Mechanism("jack", parts, joints, points, [JointAngle("turn", "bearing")]), np.linspace(-15.0, 15.0, 121)
     found = solved(mechanism, turn)
+    assert ("thread" in found.details["closures"]) == (tree is nut_on_lever)
+    assert np.ptp(found.points["tip"].position[:, 2]) > 0.02
     same_as_native(mechanism, found, turn)

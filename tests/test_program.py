@@ -9,7 +9,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from kincheck.core.program import (
-    NumpyExecutor,
     Tape,
     absolute,
     maximum,
@@ -19,13 +18,15 @@ from kincheck.core.program import (
     where_larger,
 )
 
+from .running import numpy_executor, run_on
+
 INPUTS = 4
 
 
 def run(outputs, block):
     """Run a program that puts out these scalars (slot -> scalar) over a block, in place."""
     tape = next(value.tape for value in outputs.values() if hasattr(value, "tape"))
-    NumpyExecutor([program("p", tape, outputs)], block).run("p")
+    run_on([program("p", tape, outputs)], block)
     return block
 
 
@@ -35,7 +36,7 @@ def traced(function, *columns):
     values = function(*(tape.input(k) for k in range(len(columns))))
     compiled = program("p", tape, {len(columns) + k: value for k, value in enumerate(values)})
     block = np.vstack([np.array(columns, dtype=float), np.full((len(values), len(columns[0])), np.nan)])
-    NumpyExecutor([compiled], block).run("p")
+    run_on([compiled], block)
     return compiled, block[len(columns) :]
 
 
@@ -146,7 +147,7 @@ def test_tracing_changes_no_bit(wanted, samples):
     except (ZeroDivisionError, ValueError):  # folded first, where the plain one takes the other way
         assume(False)
     block = np.array(samples).T.copy()
-    NumpyExecutor([program("p", tape, outputs)], block).run("p")
+    run_on([program("p", tape, outputs)], block)
     np.testing.assert_array_equal(block[: len(wanted)], expected)
     np.testing.assert_array_equal(block[len(wanted) :], np.array(samples).T[len(wanted) :])
 
@@ -249,10 +250,10 @@ def test_programs_share_a_block():
     tape = Tape()
     x, y = tape.input(0), tape.input(1)
     block = np.array([[1.0], [2.0]])
-    executor = NumpyExecutor([program("sum", tape, {0: x + y}), program("product", tape, {1: x * y})], block)
+    executor = numpy_executor([program("sum", tape, {0: x + y}), program("product", tape, {1: x * y})], block)
     for name in ("sum", "product", "sum"):
         executor.run(name)
-    assert block[:, 0].tolist() == [9.0, 6.0]
+    assert executor.block[:, 0].tolist() == [9.0, 6.0]
 
 
 def test_lanes_choose_for_themselves():

@@ -13,6 +13,7 @@ from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .equations import Style
+from .freedom import require_driven
 from .march import March, march
 from .model import Model, compile_model
 from .programs import Request
@@ -64,6 +65,8 @@ def solve(
     ):
         for name in names:
             there = [each.name for each in known]
+            if name not in there:
+                require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
             _require(name in there, f"there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
     path = Path({**(motions or {}), driver: Ramp(rate)}, np.asarray(values, dtype=np.float64) / rate)
     model = compile_model(mechanism, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style)))

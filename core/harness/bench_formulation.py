@@ -16,6 +16,7 @@ from .case import Case
 
 NAME = "bench_formulation"
 STATES = 250
+"""Random states by default: a rms over as many is settled to a tenth."""
 QUANTITIES = ("residual", "jacobian", "gamma")
 STAGES = ("J", "velocity", "acceleration", "gamma")
 
@@ -44,12 +45,12 @@ class Formulation(msgspec.Struct, frozen=True, kw_only=True):
     verdicts: dict[str, list[str]]
 
 
-def measure(case: Case, seed: int, states: int = STATES) -> Formulation:
+def measure(case: Case, seed: int, states: int) -> Formulation:
     """Count, round and sweep.
 
     Args:
         case: has a reference for all its outputs, velocities and accelerations included.
-        seed: of the random states.
+        seed, states: of the random states, and how many.
 
     Raises:
         KincheckError: mpmath is not installed, or a sweep does not reach all its samples.

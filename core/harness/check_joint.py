@@ -18,6 +18,9 @@ row too. A class may offer two things of its own:
 
 from __future__ import annotations
 
+import difflib
+import importlib
+import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -25,6 +28,7 @@ from itertools import groupby
 
 import numpy as np
 
+from ..errors import KincheckError
 from ..joints import Joint
 from . import joint_specimens
 from .engine import Engine
@@ -126,3 +130,33 @@ def _told(error: Exception) -> str:
     """An error with the line that raised it."""
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} (in {where.name}: {where.line})"
+
+
+def load_joint(where: str) -> type[Joint]:
+    """The joint class at MODULE:CLASS; modules of the current folder are found too.
+
+    Raises:
+        KincheckError: there is no such module or class, or it is no joint.
+    """
+    module_name, _, name = where.partition(":")
+    if not (module_name and name):
+        raise KincheckError(f"{where!r} names no class; write MODULE:CLASS, such as my_joint:MyJoint for a class in my_joint.py")
+    if "" not in sys.path:
+        sys.path.insert(0, "")
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        if error.name is None or not module_name.startswith(error.name):
+            raise  # found, but what it imports is not: its own trace says more
+        raise KincheckError(
+            f"there is no module {module_name!r}; start in its folder, or install it, and leave out the ending .py"
+        ) from error
+    found = getattr(module, name, None)
+    if found is None:
+        joints = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Joint)]
+        close = difflib.get_close_matches(name, joints, n=1)
+        remedy = f"did you mean {close[0]!r}?" if close else f"its joints: {', '.join(joints) or 'none'}"
+        raise KincheckError(f"module {module_name!r} has no class {name!r}; {remedy}")
+    if not (isinstance(found, type) and issubclass(found, Joint)):
+        raise KincheckError(f"{where} is no joint type; derive it from kincheck.core.Joint")
+    return found

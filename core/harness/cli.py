@@ -58,9 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="solve cases with engines and judge the results", description=_run.__doc__)
     run.set_defaults(do=_run)
     run.add_argument("case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases")
-    run.add_argument(
-        "--joints", action="store_true", help="run a small closed loop around every joint type; no CASE is the default"
-    )
+    run.add_argument("--joints", action="store_true", help="run a small closed loop around every joint type, and the cases named")
     run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: all engines")
     run.add_argument("--mode", choices=MODES, help="only engines of this mode")
     run.add_argument("--tol", type=_tol, default=TOL, metavar="X", help=f"largest constraint residual [m or -]; default {TOL:g}")
@@ -86,6 +84,11 @@ def _parser() -> argparse.ArgumentParser:
     formulation.add_argument("--seed", type=int, default=943745, metavar="N", help="of the random states; default %(default)s")
     formulation.add_argument("--out", type=Path, metavar="DIR", help="write bench_formulation.json and .html there")
     formulation.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+
+    checking = commands.add_parser("check-joint", help="check a joint type of your own", description=_check_joint.__doc__)
+    checking.set_defaults(do=_check_joint)
+    checking.add_argument("joint", metavar="MODULE:CLASS", help="the class, in a module of this folder or an installed one")
+    checking.add_argument("--seed", type=int, default=0, metavar="N", help="of the random poses; default %(default)s")
 
     listing = commands.add_parser("list", help="list cases and engines", description=_list.__doc__)
     listing.set_defaults(do=_list)
@@ -259,9 +262,19 @@ def _bench_formulation(options: argparse.Namespace) -> int:
     delivery.check_destinations(problems, out=options.out, json=options.json, names=names)
     if problems:
         raise KincheckError("\n".join(problems))
-    found = bench_formulation.measure(cases.load("mcpherson_strut"), options.seed)
+    found = bench_formulation.measure(cases.load("mcpherson_strut"), options.seed, bench_formulation.STATES)
     bench.deliver(bench_formulation.report(found), found, out=options.out, json=options.json)
     return WITHIN
+
+
+def _check_joint(options: argparse.Namespace) -> int:
+    """Check a joint type: its equations against their derivatives, its branches, and a closed loop in every engine."""
+    from ... import adapters
+    from .check_joint import check_joint, load_joint
+
+    report = check_joint(load_joint(options.joint), seed=options.seed, engines=[*map(adapters.engine, adapters.ENGINES)])
+    report.print(sys.stdout)
+    return WITHIN if report.passed else DEVIATES
 
 
 def _list(options: argparse.Namespace) -> int:

@@ -8,14 +8,14 @@ lead from there. No step crosses a pose where the rows are nearly dependent: the
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from ..trajectory import Array
 from .joint_checks import STEP, Specimen
 from .joint_report import Finding, Verdict
-from .traced_joint import COLUMNS, POSES, Mask, TracedJoint, design, newton, regular, straight, walk
+from .manifold import Mask, design, newton, regular, straight, walk
+from .traced_joint import COLUMNS, POSES, TracedJoint
 
 ITERATIONS = 60
 # Body i stays at design; body j and the joint's coordinates move.
@@ -75,7 +75,7 @@ def connected(s: Specimen, state: Array) -> Mask:
 def _led(t: TracedJoint, state: Array, aim: Array) -> Mask:
     """Whether small steps over the manifold lead from each pose to its aim."""
     there, state = np.zeros(state.shape[1], dtype=bool), state.copy()
-    waiting: Any = np.arange(state.shape[1])
+    waiting = np.flatnonzero(~there)
     for _ in range(LEGS):
         goal = aim[:, waiting]
         before = state[:, waiting]

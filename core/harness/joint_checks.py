@@ -17,8 +17,9 @@ from ..analysis.equations import Style
 from ..joints import AxialJoint, Joint
 from ..trajectory import Array
 from .joint_report import Finding, Verdict, judged
+from .manifold import design, min_norm, newton, rank, smallest, straight, walk
 from .scalars import execute, precise
-from .traced_joint import Place, TracedJoint, design, min_norm, newton, rank, smallest, straight, walk
+from .traced_joint import Place, TracedJoint
 
 # Twelve steps of this length [rad, or units of the joint's size] leave the design far behind.
 STEP, STEPS = 0.15, 12

@@ -18,7 +18,8 @@ from ..trajectory import Array
 from .joint_checks import AMPLIFIED, AMPLIFIED_WHY, ROUND_OFF, ROUND_OFF_WHY, Specimen, defects, times
 from .joint_report import Finding, Verdict, judged
 from .joint_specimens import moved, stretched
-from .traced_joint import COLUMNS, POSES, Place, TracedJoint, min_norm, newton
+from .manifold import min_norm, newton
+from .traced_joint import COLUMNS, POSES, Place, TracedJoint
 
 FACTORS = (1e-6, 1e-3, 1e3)
 # A joint a thousand kilometres from the global origin [m].

@@ -214,7 +214,7 @@ class Condition:
         return tuple(twin for dot in self.dots for twin in twins[type(dot)](dot))
 
     def printed(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:
-        """The scalar products as printed; for them, u of body j is r_j - r_i at design and what it has moved since."""
+        """The scalar products as printed; the poses they see hold positions, not displacements from the design."""
         return tuple(
             PrintedDot10(each.a, each.b, formed=formed)
             if isinstance(each, Dot10)

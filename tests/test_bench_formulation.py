@@ -1,0 +1,354 @@
+"""The benchmark of the paper's claims: rows as printed are right, counts are exact, round-off and sweeps bear the verdicts."""
+
+import json
+import sys
+from dataclasses import replace
+
+import kincheck.cases
+import numpy as np
+import pytest
+from kincheck.core.algebra import Mat3, Vec3, cross
+from kincheck.core.analysis.solve import solve
+from kincheck.core.harness import bench_formulation, bench_roundoff, bench_whole, cli
+from kincheck.core.harness.bench import Report, Section, page
+from kincheck.core.harness.bench_operations import (
+    DOTS,
+    FROM_THE_LEFT,
+    MULTIPLIED_OUT,
+    SIMPLIFIED,
+    TABLE_3,
+    TRACED,
+    Executed,
+    Operations,
+    count_operations,
+    executed,
+    traced,
+)
+from kincheck.core.harness.bench_whole import AT_DESIGN, AWAY, BACK, DIFFERENCE
+from kincheck.core.harness.textbook import PrintedDot11, PrintedDot12, PrintedDot21, chain, conditions, skew
+
+from .specimens import alike, body, frame, rotation, vector
+
+SEED = 943745
+# Sums of a few dozen products of numbers up to ten, each rounded at 1e-16.
+ROUND_OFF = 1e-12
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(SEED)
+
+
+@pytest.fixture(scope="module")
+def case():
+    return kincheck.cases.load("mcpherson_strut")
+
+
+@pytest.fixture(scope="module")
+def found(case):
+    return bench_formulation.measure(case, SEED, 40)
+
+
+# Rows as printed
+
+
+def entries(rows):
+    return np.array([np.broadcast_to(x, (1000,)) for row in rows for block in row for x in block])
+
+
+def gammas(equations, i, j):
+    own = [each.in_axes_of(equations[0]).motion for each in (i, j)]
+    return np.array([x for each in equations for x in each.gamma(i.pose, j.pose, *own)])
+
+
+@pytest.mark.parametrize("formed", [True, False])
+@pytest.mark.parametrize("number", range(5))
+def test_dot_products_as_printed_are_the_conventional_rows(rng, number, formed):
+    """At any pose; the printed ones take positions, and are zero where a . b and a . d are."""
+    f, g, h = frame(rng)
+    s_i, s_j = vector(rng), vector(rng)
+    condition = conditions(f, g, h, s_i, s_j)[number]
+    printed, conventional = condition.printed(formed=formed), condition.unsimplified("conventional")
+    i, j = body(rng), body(rng)
+    placed = replace(j, u=s_i - s_j + j.u)
+    for mine, theirs in zip(printed, conventional, strict=True):
+        assert np.array(mine.phi(i.pose, placed.pose)) == pytest.approx(np.array(theirs.phi(i.pose, j.pose)), abs=ROUND_OFF)
+    rows, expected = ([row for e in each for row in e.rows(i.pose, p.pose)] for each, p in ((printed, placed), (conventional, j)))
+    assert entries(rows) == pytest.approx(entries(expected), abs=ROUND_OFF)
+    assert gammas(printed, i, placed) == pytest.approx(gammas(conventional, i, j), abs=100.0 * ROUND_OFF)
+
+
+@pytest.mark.parametrize("formed", [True, False])
+def test_simplified_rows_as_printed_are_the_papers(rng, formed):
+    """The rows at any pose; d11's gamma where the condition holds, for it is simplified too."""
+    f, g, h = frame(rng)
+    s_i, s_j = vector(rng), vector(rng)
+    paper = {each.name: each.simplified("paper") for each in conditions(f, g, h, s_i, s_j) if each.is_simplified}
+    i, j = body(rng), body(rng)
+    placed = replace(j, u=s_i - s_j + j.u)
+    printed = {
+        "d11": PrintedDot11(f, g, formed=formed),
+        "d12": PrintedDot12(i.pose.A.T.times(j.pose.A)),
+        "d21": PrintedDot21(f, g),
+    }
+    assert printed.keys() == paper.keys()
+    for name, mine in printed.items():
+        (theirs,) = paper[name]
+        assert entries(mine.rows(i.pose, placed.pose)) == pytest.approx(entries(theirs.rows(i.pose, j.pose)), abs=ROUND_OFF)
+    (d21,) = paper["d21"]
+    assert gammas([d21], i, j) == pytest.approx(
+        np.array(PrintedDot21(f, g).gamma(i.pose, placed.pose, i.in_axes_of(d21).motion, j.in_axes_of(d21).motion)), abs=1e-10
+    )
+    pinned = replace(i, q=i.q * rotation(h, rng.uniform(-3.0, 3.0, 1000)), w=i.w + rng.normal(size=1000) * i.pose.turn(h))
+    assert gammas([printed["d11"]], i, pinned) == pytest.approx(gammas(paper["d11"], i, pinned), abs=ROUND_OFF)
+    assert np.abs(gammas([printed["d11"]], i, pinned)).max() > 1.0
+    assert gammas([printed["d11"]], *alike(i, pinned)) == pytest.approx(0.0, abs=ROUND_OFF)  # no turning, no gamma
+
+
+def test_chain_and_skew():
+    a, b = Vec3(1.0, 2.0, 3.0), Vec3(-2.0, 5.0, 7.0)
+    assert skew(a) @ b == cross(a, b)
+    assert chain(b, skew(a)) == cross(b, a)
+
+
+# Counts
+
+
+@pytest.mark.parametrize(
+    ("work", "operations"),
+    [
+        (lambda a, M: a @ a, 5),
+        (lambda a, M: M @ a, 15),
+        (lambda a, M: M.times(M), 45),
+        (lambda a, M: cross(a, a), 9),
+        (lambda a, M: chain(a, skew(a), M), 30),  # zeros of the skew matrix included
+        (lambda a, M: -a + a - a, 6),
+        (lambda a, M: 1.0 * a, 0),
+        (lambda a, M: 2.0 * a, 3),
+    ],
+)
+def test_executed_operations_are_all_counted(work, operations):
+    tally = [0]
+    a = Vec3(*(Executed(tally) for _ in range(3)))
+    work(a, Mat3(a, a, a))
+    assert tally == [operations]
+
+
+def by_way(counts):
+    return {(each.condition, each.rows, each.way): each for each in counts}
+
+
+NATIVE = TRACED["native"]
+COUNTS = {
+    # formulation 8.1: d10 and d20 as printed, J and with the velocities; the gamma that Table 3 may print as 18
+    ("d10", DOTS, MULTIPLIED_OUT): Operations(150, 161, 450, 288),
+    ("d20", DOTS, FROM_THE_LEFT): Operations(147, 170, 468, 297),
+    ("d11", SIMPLIFIED, FROM_THE_LEFT): Operations(60, 82, 184, 100),
+    ("d12", SIMPLIFIED, MULTIPLIED_OUT): Operations(0, 18, 18, 0),
+    ("d21", SIMPLIFIED, MULTIPLIED_OUT): Operations(93, 127, 309, 180),
+    # by hand, A given: two turned vectors and their product; two turned vectors; nothing
+    ("d10", DOTS, NATIVE): Operations(15 + 15 + 9, 50, 98, 77),
+    ("d11", SIMPLIFIED, NATIVE): Operations(15 + 15, 52, 89, 65),
+    ("d12", SIMPLIFIED, NATIVE): Operations(0, 3, 3, 0),
+    # A a, A s_i, A s_j (45), P_j - P_i (12 with the swings), r_j - r_i and S_i (6), two products (18)
+    ("d20", DOTS, NATIVE): Operations(45 + 12 + 6 + 18, 104, 189, 144),
+    # A f, A g, r_j - r_i from its value at design, two products
+    ("d21", SIMPLIFIED, NATIVE): Operations(30 + 6 + 18, 88, 153, 99),
+}
+
+
+@pytest.mark.parametrize(("line", "operations"), COUNTS.items(), ids=str)
+def test_counts(found, line, operations):
+    assert by_way(found.operations)[line].general_axes == operations
+
+
+def test_unit_axes_of_native_rows(found):
+    counts = by_way(found.operations)
+    assert counts["d11", SIMPLIFIED, NATIVE].unit_axes == Operations(0, 22, 44, 20)
+    assert counts["d10", DOTS, NATIVE].unit_axes.jacobian == 9
+    for each in found.operations:
+        if each.unit_axes:
+            assert each.unit_axes.jacobian <= each.general_axes.jacobian
+
+
+def test_table_3_is_printed_beside_every_condition(found):
+    printed = {each.condition: each.general_axes for each in found.operations if each.way == TABLE_3}
+    assert list(printed) == ["d10", "d11", "d12", "d20", "d21"]
+    assert printed["d20"] == Operations(144, 167, 398)
+    assert found.operations == count_operations()
+
+
+def test_what_the_simplification_gains_and_what_sharing_does(found):
+    counts = by_way(found.operations)
+    for name in ("d11", "d12", "d21"):
+        for axes in ("paper", "native"):
+            full, dots, simple = (
+                counts[name, rows, way].general_axes
+                for rows, way in ((DOTS, MULTIPLIED_OUT), (DOTS, TRACED[axes]), (SIMPLIFIED, TRACED[axes]))
+            )
+            assert simple.jacobian < dots.jacobian < full.jacobian
+            assert simple.gamma < dots.gamma < full.gamma
+    said = found.verdicts["operations"]
+    assert "d11 300 > 108 > 75" in said[0]
+    assert "d10 jacobian 150" in said[2]
+
+
+def test_tracing_shares_over_rows_and_execution_does_not():
+    f, g, h, *arms = (Vec3(*np.random.default_rng(k).normal(size=3).tolist()) for k in range(5))
+    dots = conditions(f, g, h, *arms)[1].unsimplified("native")
+    one, both = traced(dots[:1]), traced(dots)
+    assert both.jacobian == 2 * one.jacobian - 15  # A_j h once
+    assert traced([*dots, *dots]).gamma == both.gamma
+    assert executed.__doc__
+
+
+# Round-off
+
+
+def test_the_order_of_the_sum_keeps_the_digits(found):
+    """Printed (22) loses as many digits as the distance has; with r_j - r_i first no style loses any."""
+    for each in found.roundoff:
+        if each.distance is None:
+            continue
+        if each.way == "as printed":
+            # half an ulp of each of three coordinates, several times
+            assert 0.02 < each.residual.rms / (each.distance * 1e-15) < 0.5 or each.distance == 1.0
+        else:
+            assert each.residual.max < 3e-15
+            assert each.jacobian.max < 3e-15
+            assert each.gamma.max < 1e-13
+    printed = {each.distance: each for each in found.roundoff if (each.condition, each.way) == ("d20", "as printed")}
+    assert printed[1e6].jacobian.rms > 1e4 * printed[1.0].jacobian.rms
+    assert printed[1e6].gamma.rms > 1e4 * printed[1.0].gamma.rms
+
+
+def test_simplified_rows_gain_little(found):
+    errors = {(each.condition, each.rows, each.way): each for each in found.roundoff if each.distance in (None, 1.0)}
+    printed, simplified = errors["d11", DOTS, "as printed"], errors["d11", SIMPLIFIED, "paper's axes"]
+    assert 1.5 < printed.gamma.rms / simplified.gamma.rms < 5.0
+    for quantity in ("residual", "jacobian"):
+        assert 0.5 < getattr(printed, quantity).rms / getattr(simplified, quantity).rms < 2.0
+    constant = errors["d12", SIMPLIFIED, "native axes"]
+    assert (constant.jacobian.max, constant.gamma.max) == (0.0, 0.0)
+    for each in errors.values():
+        assert 0.0 < each.residual.rms <= each.residual.max  # no product cancels by luck
+
+
+def test_round_off_is_that_of_the_seed_and_fifty_digits_are_enough(monkeypatch):
+    first = bench_roundoff.measure_roundoff(1, 3)
+    monkeypatch.setattr(bench_roundoff, "DIGITS", 80)
+    assert bench_roundoff.measure_roundoff(1, 3) == first
+    assert bench_roundoff.measure_roundoff(2, 3) != first
+    monkeypatch.setattr(bench_roundoff, "DIGITS", 14)
+    assert bench_roundoff.measure_roundoff(1, 3) != first
+
+
+def test_all_ways_get_the_same_inputs(rng):
+    """Displacement and position are the same to the last digit, though a million metres away."""
+    for distance in bench_roundoff.DISTANCES:
+        known = bench_roundoff._states(rng, 50, distance, turning=False)
+        for e, u in zip(known.e0, known.j.u, strict=True):
+            assert ((e + u) - e == u).all()
+            assert ((e + u) - u == e).all()
+        i, j = known.i, known.j
+        assert np.sqrt(i.u @ i.u) == pytest.approx(distance, rel=1e-9)
+        for condition in known.conditions[2:]:
+            for primitive in condition.simplified("paper"):
+                off = np.array(primitive.phi(bench_roundoff.Pose.of(i.u, i.q), bench_roundoff.Pose.of(j.u, j.q)))
+                assert np.abs(off).max() < 20.0 * bench_roundoff.TILT
+
+
+# The whole mechanism
+
+
+def test_programs_are_those_the_solver_runs(found, case):
+    sizes = {each.style: each for each in found.programs}
+    program = solve(case.mechanism, "stroke", [0.0], points=case.points).details["program"]
+    assert (sizes["native"].newton, sizes["native"].motion) == (program["newton"]["flops"], program["motion"]["flops"])
+    assert sizes["native"].newton < sizes["paper"].newton < sizes["conventional"].newton
+    assert sizes["native"].motion < sizes["paper"].motion < sizes["conventional"].motion
+
+
+def test_sweeps_lose_what_the_rounded_points_lose_and_nothing_else(found):
+    assert {each.style for each in found.sweeps} >= {"native", "paper", "conventional", "mixed"}
+    for each in found.sweeps:
+        if each.place == AT_DESIGN:  # numbers near one, times the condition of the rows (36)
+            assert each.position < 1e-15
+            assert each.velocity < 4e-15
+            assert each.acceleration < 4e-14
+        elif each.place == AWAY:  # coordinates are rounded at 6e-11 m
+            assert 1e-11 < each.position < 2e-10
+            assert 1e-11 < each.velocity < 1e-9
+        elif each.place == BACK:
+            assert 1e-12 < each.position < 1e-10
+        else:
+            assert each.place == DIFFERENCE
+            assert (each.velocity, each.acceleration) == (0.0, 0.0)
+            assert each.position < 1.2e-10  # an ulp of a million: outputs are rounded there
+
+
+def test_a_mechanism_moved_away_and_back_is_rounded_once(case):
+    away = bench_whole._moved(case.mechanism, bench_whole.FAR)
+    back = bench_whole._moved(away, tuple(-x for x in bench_whole.FAR))
+    assert bench_whole._moved(back, bench_whole.FAR) == away
+    for one, other in zip(case.mechanism.points, back.points, strict=True):
+        assert one.position != other.position
+        assert other.position == pytest.approx(one.position, abs=1.2e-10)
+    assert away.joints[-1].points[0] == pytest.approx([x + y for x, y in zip((1.115, 0.665, 0.118), bench_whole.FAR, strict=True)])
+
+
+# The command
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(bench_formulation, "STATES", 3)
+
+
+@pytest.mark.usefixtures("few")
+def test_command_writes_tables_json_and_page(tmp_path, capsys):
+    assert cli.main(["bench", "formulation", "--seed", "7", "--json", "-", "--out", str(tmp_path / "new")]) == 0
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert found["schema"] == "kincheck-bench-formulation/1"
+    assert (found["seed"], found["states"], found["digits"]) == (7, 3, 50)
+    written = tmp_path / "new" / "bench_formulation.json"
+    assert json.loads(written.read_text("utf-8")) == found
+    html = (tmp_path / "new" / "bench_formulation.html").read_text("utf-8")
+    for text in (captured.err, html):
+        assert "as printed, multiplied out" in text
+        assert "conventional" in text
+        assert "moved back from there" in text
+    assert "acceleration [m/s²]" in captured.err  # brackets are no markup
+    assert "--paper:" in html  # the style sheet of the report
+    assert "{%" not in html
+    assert "http" not in html
+    assert html.count("<table>") == 4
+
+
+@pytest.mark.usefixtures("few")
+def test_missing_mpmath_is_named(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mpmath", None)
+    assert cli.main(["bench", "formulation"]) == 2
+    said = capsys.readouterr().err
+    assert "pip install mpmath" in said
+    assert "Traceback" not in said
+
+
+def test_bad_destinations_are_named_before_the_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(bench_formulation, "measure", lambda *_: pytest.fail("worked"))
+    (tmp_path / "file").write_text("")
+    (tmp_path / "bench_formulation.html").mkdir()
+    for options in (["--out", tmp_path / "file"], ["--out", tmp_path], ["--json", tmp_path / "no" / "x.json"]):
+        assert cli.main(["bench", "formulation", *map(str, options)]) == 2
+        assert "file" in capsys.readouterr().err
+    assert cli.main(["bench"]) == 2
+
+
+def test_page_escapes():
+    section = Section("<b>", ["<i>"], ["&"], ["<u>", "n"], 1, [["<script>", "1"]])
+    html = page(Report("x", "<title>", ["<s>"], [section]))
+    assert "<script>" not in html
+    for tag in ("<b>", "<i>", "<u>", "<s>"):
+        assert tag not in html
+    assert '<td class="number">1</td>' in html
