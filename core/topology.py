@@ -30,12 +30,13 @@ class SpanningTree:
 
 
 def spanning_tree(mechanism: Mechanism) -> SpanningTree:
-    """The tree whose joints leave the fewest coordinates: driven joints first, then those with the most rows (Prim).
+    """The tree whose joints leave the fewest coordinates: driven and coupled joints first, then those with the most rows (Prim).
 
-    A joint whose axis-bound freedom is driven stays in the tree, where the freedom is a coordinate. Joints of fewer than three
-    rows (a distance) tie a body too loosely to carry it; a body that hangs on such joints only is free.
+    A joint whose axis-bound freedom is driven or coupled stays in the tree, where the freedom is a coordinate. Joints of fewer than
+    three rows (a distance) tie a body too loosely to carry it; a body that hangs on such joints only is free.
     """
-    driven = {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
+    named = {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
+    named |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     placed = {GROUND} | {body.name for body in mechanism.bodies if body.fixed}
     waiting = {body.name: None for body in mechanism.moving}  # a dict keeps the order
     candidates = [joint for joint in mechanism.joints if joint.rows >= 3]
@@ -44,7 +45,7 @@ def spanning_tree(mechanism: Mechanism) -> SpanningTree:
     while waiting:
         reaching = [joint for joint in candidates if (joint.i in placed) != (joint.j in placed)]
         if reaching:
-            joint = max(reaching, key=lambda each: (each.name in driven, each.rows))
+            joint = max(reaching, key=lambda each: (each.name in named, each.rows))
             parent, child = joint.bodies if joint.i in placed else (joint.j, joint.i)
             used.add(joint.name)
         else:

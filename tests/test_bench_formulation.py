@@ -20,6 +20,7 @@ from kincheck.core.harness.bench_operations import (
     TRACED,
     Executed,
     Operations,
+    Pair,
     count_operations,
     executed,
     traced,
@@ -195,11 +196,15 @@ def test_what_the_simplification_gains_and_what_sharing_does(found):
 
 def test_tracing_shares_over_rows_and_execution_does_not():
     f, g, h, *arms = (Vec3(*np.random.default_rng(k).normal(size=3).tolist()) for k in range(5))
-    dots = conditions(f, g, h, *arms)[1].unsimplified("native")
+    condition = conditions(f, g, h, *arms)[1]
+    dots = condition.unsimplified("native")
     one, both = traced(dots[:1]), traced(dots)
     assert both.jacobian == 2 * one.jacobian - 15  # A_j h once
     assert traced([*dots, *dots]).gamma == both.gamma
-    assert executed.__doc__
+    tally = [0]
+    pair = Pair.of(lambda: Executed(tally))
+    alone, two = (executed(each, pair, tally) for each in (condition.printed(formed=True)[:1], condition.printed(formed=True)))
+    assert (two.jacobian, two.gamma) == (2 * alone.jacobian, 2 * alone.gamma)
 
 
 # Round-off
@@ -322,7 +327,8 @@ def test_command_writes_tables_json_and_page(tmp_path, capsys):
     assert "acceleration [m/s²]" in captured.err  # brackets are no markup
     assert "--paper:" in html  # the style sheet of the report
     assert "{%" not in html
-    assert "http" not in html
+    assert "http:" not in html
+    assert "https:" not in html
     assert html.count("<table>") == 4
 
 

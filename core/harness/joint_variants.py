@@ -18,7 +18,7 @@ from ..trajectory import Array
 from .joint_checks import AMPLIFIED, AMPLIFIED_WHY, ROUND_OFF, ROUND_OFF_WHY, Specimen, defects, times
 from .joint_report import Finding, Verdict, judged
 from .joint_specimens import moved, stretched
-from .manifold import min_norm, newton
+from .manifold import min_norm, newton, rank
 from .traced_joint import COLUMNS, POSES, Place, TracedJoint
 
 FACTORS = (1e-6, 1e-3, 1e3)
@@ -39,7 +39,7 @@ def exchange(s: Specimen) -> Iterator[Finding]:
 
     motion = exchanged(s.state, POSES // 2), exchanged(s.rate, COLUMNS), exchanged(s.acceleration, COLUMNS)
     yield _same(
-        "exchange", other, motion, "the joint is another one with its bodies exchanged: set symmetric = False, or repair it"
+        "exchange", s, other, motion, "the joint is another one with its bodies exchanged: set symmetric = False, or repair it"
     )
 
 
@@ -64,7 +64,7 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
         return np.concatenate([*(rotation @ a[3 * k : 3 * k + 3] for k in range(4)), a[2 * COLUMNS :]])
 
     remedy = "it must not matter where the two bodies are together: check which body each arm and axis belongs to"
-    yield _same("rigid motion", s.traced, (pose(s.state), rates(s.rate), rates(s.acceleration)), remedy)
+    yield _same("rigid motion", s, s.traced, (pose(s.state), rates(s.rate), rates(s.acceleration)), remedy)
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     here, there = s.traced.phi(off), s.traced.phi(pose(off))
     parts = s.traced.parts
@@ -76,7 +76,9 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
 def size_and_place(s: Specimen) -> Iterator[Finding]:
     """The same motion of the joint drawn larger and smaller, far away, and from longer directions."""
     long = TracedJoint(stretched(s.joint, 137.0), s.place)
-    yield _same("axis lengths", long, (s.state, s.rate, s.acceleration), "a direction may have any length: use unit() or triad()")
+    yield _same(
+        "axis lengths", s, long, (s.state, s.rate, s.acceleration), "a direction may have any length: use unit() or triad()"
+    )
     remedy = "a length that is not declared so is not scaled: declare it by position(), positions() or length()"
     worst: list[Finding] = []
     for factor in FACTORS:
@@ -87,12 +89,12 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
             numbers *= factor * s.place.unit
         state[POSES:][lengths] *= factor * s.place.unit
         units[2 * COLUMNS :][lengths] *= factor * s.place.unit
-        worst.append(_same("size", large, (state, s.rate, s.acceleration), remedy, units[:, None], f"worst at x {factor:g}"))
+        worst.append(_same("size", s, large, (state, s.rate, s.acceleration), remedy, units[:, None], f"worst at x {factor:g}"))
     yield max(worst, key=lambda each: each.badness)
     (a, b), unit = s.place.origins, s.place.unit
     away = Place((tuple(x + AWAY for x in a), tuple(x + AWAY for x in b)), unit)
     remedy = "take arms from the bodies' origins: i.arm(P), j.arm(P), never P itself"
-    yield _same("place", TracedJoint(moved(s.joint, AWAY), away), (s.state, s.rate, s.acceleration), remedy)
+    yield _same("place", s, TracedJoint(moved(s.joint, AWAY), away), (s.state, s.rate, s.acceleration), remedy)
 
 
 def named_coordinates(s: Specimen) -> Iterator[Finding]:
@@ -109,12 +111,21 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
     rate[own] = min_norm(jacobian, mixed.nu(state) - times(jacobian, rate), own)
     acceleration = np.concatenate([s.acceleration[: 2 * COLUMNS], np.zeros_like(state[POSES:])])
     acceleration[own] = min_norm(jacobian, mixed.gamma(state, rate) - times(jacobian, acceleration), own)
-    yield _same("mixed style", mixed, (state, rate, acceleration), "mixed() must say the same as primitives(): define both")
+    yield _same("mixed style", s, mixed, (state, rate, acceleration), "mixed() must say the same as primitives(): define both")
 
 
 def _same(
-    check: str, other: TracedJoint, motion: tuple[Array, Array, Array], remedy: str, units: Any = 1.0, message: str = ""
+    check: str,
+    s: Specimen,
+    other: TracedJoint,
+    motion: tuple[Array, Array, Array],
+    remedy: str,
+    units: Any = 1.0,
+    message: str = "",
 ) -> Finding:
-    """Whether a motion satisfies other equations too: position, velocity and acceleration."""
+    """Whether a motion of the specimen satisfies other equations too, and whether these leave as many freedoms."""
     worst = np.max(defects(other, *motion, units), axis=0)
-    return judged(check, worst, AMPLIFIED, AMPLIFIED_WHY, other.names, message, remedy)
+    mine = rank(s.exact) - len(s.traced.coordinates)
+    theirs = rank(other.rows(motion[0]) * np.reshape(units, (1, 1, -1))) - len(other.coordinates)
+    figures = np.vstack([worst, np.abs(theirs - mine)])
+    return judged(check, figures, AMPLIFIED, AMPLIFIED_WHY, [*other.names, "rank"], message, remedy)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from .. import primitives as p
 from ..algebra import vec
+from ..errors import MechanismError
 from .base import Attachment, Joint, direction, positions, unit
 
 
@@ -20,6 +21,13 @@ class RevoluteSpherical(Joint):
     symmetric = False
     points: tuple[tuple[float, float, float], tuple[float, float, float]] = positions()
     axis: tuple[float, float, float] = direction()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.points[0] == self.points[1]:
+            raise MechanismError(
+                f"{self}: the link has length 0, expected two different points; for a link of no length use inline"
+            )
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P_i, P_j = (vec(point) for point in self.points)
