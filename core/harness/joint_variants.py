@@ -73,12 +73,15 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
     yield judged("residual elsewhere", apart, ROUND_OFF, ROUND_OFF_WHY, names, remedy=remedy)
 
 
-def size_and_place(s: Specimen) -> Iterator[Finding]:
-    """The same motion of the joint drawn larger and smaller, far away, and from longer directions."""
+def axis_lengths(s: Specimen) -> Iterator[Finding]:
+    """The same motion with longer directions."""
     long = TracedJoint(stretched(s.joint, 137.0), s.place)
-    yield _same(
-        "axis lengths", s, long, (s.state, s.rate, s.acceleration), "a direction may have any length: use unit() or triad()"
-    )
+    remedy = "a direction may have any length: use unit() or triad()"
+    yield _same("axis lengths", s, long, (s.state, s.rate, s.acceleration), remedy)
+
+
+def size_and_place(s: Specimen) -> Iterator[Finding]:
+    """The same motion of the joint drawn larger and smaller, and far away."""
     remedy = "a length that is not declared so is not scaled: declare it by position(), positions() or length()"
     worst: list[Finding] = []
     for factor in FACTORS:

@@ -1,20 +1,27 @@
 """Gaussian elimination written into a program: the zeros and ones of the rows are used up before anything is computed.
 
 First the pivots that cost nothing in safety: literal constants of size one half and more (the +-I blocks of the simplified rows)
-and entries that are alone in their row or column (there is no other choice). What is left is a small dense core, eliminated with
-partial pivoting by compare-and-select, so that every lane pivots for itself without a branch. A fixed pivot order without this met
-an exact zero pivot within one crank turn of a four-bar.
+and entries that are alone in their row or column (there is no other choice). What is left falls into blocks that can be solved one
+after the other (block-triangular form: a chain of loops costs its number of loops). Each block is a small dense core, eliminated
+with partial pivoting by compare-and-select, so that every lane pivots for itself without a branch. A fixed pivot order without this
+met an exact zero pivot within one crank turn of a four-bar.
 """
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from graphlib import TopologicalSorter
+
+import numpy as np
 
 from ..algebra import Scalar
 from .trace import Traced, where_larger
 
 SAFE_LITERAL = 0.5
+# Up to this order looking for blocks costs more than it can save.
+ONE_CORE = 12
 
 
 @dataclass(frozen=True)
@@ -28,7 +35,7 @@ class _Pivot:
 
 @dataclass(frozen=True)
 class _CoreStep:
-    """One column of the core: exchanges (row against the pivot row, the two sizes compared) and then the multipliers."""
+    """One column of a core: exchanges (row against the pivot row, the two sizes compared) and then the multipliers."""
 
     exchanges: tuple[tuple[int, Scalar, Scalar], ...]
     multipliers: tuple[tuple[int, Scalar], ...]
@@ -52,18 +59,16 @@ class Elimination:
         self._sparse = self._eliminate_sparse(entries)
         done_rows = {pivot.row for pivot in self._sparse}
         done_columns = {pivot.column for pivot in self._sparse}
-        self._core_rows = [i for i in range(self.n) if i not in done_rows]
-        core_columns = [j for j in range(self.n) if j not in done_columns]
-        # columns with few entries first: fewer exchanges to decide
-        self._core_columns = sorted(core_columns, key=lambda j: sum(j in entries[i] for i in self._core_rows))
-        self._core = [[entries[i].get(j, 0.0) for j in self._core_columns] for i in self._core_rows]
-        self._core_steps = [self._eliminate_core_column(k) for k in range(len(self._core))]
-        self._core_inverse = [1.0 / self._core[k][k] for k in range(len(self._core))]
+        left_rows = [i for i in range(self.n) if i not in done_rows]
+        left_columns = [j for j in range(self.n) if j not in done_columns]
+        self._cores = [_Core(entries, *block) for block in _blocks(entries, left_rows, left_columns)]
+        for core in self._cores:
+            self.pivots += core.pivots
 
     @property
     def core_size(self) -> int:
-        """Order of the dense core that was left."""
-        return len(self._core)
+        """Order of the largest dense core."""
+        return max((len(core.rows) for core in self._cores), default=0)
 
     def _eliminate_sparse(self, entries: list[dict[int, Scalar]]) -> list[_Pivot]:
         rows, steps = set(range(self.n)), list[_Pivot]()
@@ -95,28 +100,6 @@ class Elimination:
             steps.append(_Pivot(i, j, inverse, tuple(multipliers), rest))
         return steps
 
-    def _eliminate_core_column(self, k: int) -> _CoreStep:
-        core, size = self._core, len(self._core)
-        exchanges, multipliers = list[tuple[int, Scalar, Scalar]](), list[tuple[int, Scalar]]()
-        for i in range(k + 1, size):
-            x, y = core[i][k], core[k][k]
-            if _is_zero(x):
-                continue
-            exchanges.append((i, x, y))
-            upper, lower = core[k], core[i]
-            core[k] = [*upper[:k], *(where_larger(x, y, b, a) for a, b in zip(upper[k:], lower[k:], strict=True))]
-            core[i] = [*lower[:k], *(where_larger(x, y, a, b) for a, b in zip(upper[k:], lower[k:], strict=True))]
-        self.pivots.append(core[k][k])
-        if _is_zero(core[k][k]):
-            raise ZeroDivisionError("the matrix is singular whatever the pose: a column of the core is empty")
-        inverse = 1.0 / core[k][k]
-        for i in range(k + 1, size):
-            if not _is_zero(core[i][k]):
-                factor = core[i][k] * inverse
-                multipliers.append((i, factor))
-                core[i] = [*core[i][: k + 1], *(core[i][c] - factor * core[k][c] for c in range(k + 1, size))]
-        return _CoreStep(tuple(exchanges), tuple(multipliers))
-
     def solve(self, b: Sequence[Scalar]) -> list[Scalar]:
         """The solution x for right-hand side b; zeros of b cost nothing."""
         b, x = list(b), [0.0] * self.n
@@ -124,9 +107,8 @@ class Elimination:
             if not _is_zero(b[pivot.row]):
                 for i, factor in pivot.multipliers:
                     b[i] = b[i] - factor * b[pivot.row]
-        core = self._solve_core([b[i] for i in self._core_rows])
-        for j, value in zip(self._core_columns, core, strict=True):
-            x[j] = value
+        for core in self._cores:
+            core.solve(b, x)
         for pivot in reversed(self._sparse):
             value = b[pivot.row]
             for j, entry in pivot.rest:
@@ -134,17 +116,90 @@ class Elimination:
             x[pivot.column] = value * pivot.inverse
         return x
 
-    def _solve_core(self, v: list[Scalar]) -> list[Scalar]:
-        for k, step in enumerate(self._core_steps):
-            for i, x, y in step.exchanges:
-                v[k], v[i] = where_larger(x, y, v[i], v[k]), where_larger(x, y, v[k], v[i])
+
+class _Core:
+    """A dense block of rows and columns; its other entries meet columns that are solved before it."""
+
+    def __init__(self, entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]) -> None:
+        self.rows = list(rows)
+        # columns with few entries first: fewer exchanges to decide
+        self.columns = sorted(columns, key=lambda j: sum(j in entries[i] for i in rows))
+        inside = set(columns)
+        self.before = [[(j, x) for j, x in entries[i].items() if j not in inside] for i in rows]
+        self.matrix: list[list[Scalar]] = [[entries[i].get(j, 0.0) for j in self.columns] for i in rows]
+        self.pivots: list[Scalar] = []
+        self.steps = [self._eliminate(k) for k in range(len(rows))]
+        self.inverses = [1.0 / self.matrix[k][k] for k in range(len(rows))]
+
+    def _eliminate(self, k: int) -> _CoreStep:
+        matrix, size = self.matrix, len(self.rows)
+        exchanges, multipliers = list[tuple[int, Scalar, Scalar]](), list[tuple[int, Scalar]]()
+        for i in range(k + 1, size):
+            x, y = matrix[i][k], matrix[k][k]
+            if _is_zero(x):
+                continue
+            exchanges.append((i, x, y))
+            upper, lower = matrix[k], matrix[i]
+            matrix[k] = [*upper[:k], *(where_larger(x, y, b, a) for a, b in zip(upper[k:], lower[k:], strict=True))]
+            matrix[i] = [*lower[:k], *(where_larger(x, y, a, b) for a, b in zip(upper[k:], lower[k:], strict=True))]
+        if _is_zero(matrix[k][k]):
+            raise ZeroDivisionError("the matrix is singular whatever the pose: a column of the core is empty")
+        self.pivots.append(matrix[k][k])
+        inverse = 1.0 / matrix[k][k]
+        for i in range(k + 1, size):
+            if not _is_zero(matrix[i][k]):
+                factor = matrix[i][k] * inverse
+                multipliers.append((i, factor))
+                matrix[i] = [*matrix[i][: k + 1], *(matrix[i][c] - factor * matrix[k][c] for c in range(k + 1, size))]
+        return _CoreStep(tuple(exchanges), tuple(multipliers))
+
+    def solve(self, b: Sequence[Scalar], x: list[Scalar]) -> None:
+        """Put the solution of this block into x."""
+        v = [b[i] for i in self.rows]
+        for k, known in enumerate(self.before):
+            for j, entry in known:
+                v[k] = v[k] - entry * x[j]
+        for k, step in enumerate(self.steps):
+            for i, larger, other in step.exchanges:
+                v[k], v[i] = where_larger(larger, other, v[i], v[k]), where_larger(larger, other, v[k], v[i])
             for i, factor in step.multipliers:
                 v[i] = v[i] - factor * v[k]
         for k in reversed(range(len(v))):
             for c in range(k + 1, len(v)):
-                v[k] = v[k] - self._core[k][c] * v[c]
-            v[k] = v[k] * self._core_inverse[k]
-        return v
+                v[k] = v[k] - self.matrix[k][c] * v[c]
+            v[k] = v[k] * self.inverses[k]
+        for j, value in zip(self.columns, v, strict=True):
+            x[j] = value
+
+
+def _blocks(
+    entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]
+) -> list[tuple[list[int], list[int]]]:
+    """Rows and columns of the blocks, in an order in which each needs only those before it."""
+    if len(rows) <= ONE_CORE:
+        return [(list(rows), list(columns))] if rows else []
+    # slow to import, and small mechanisms do not need it
+    sparse, graphs = (importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph"))
+    place = {j: k for k, j in enumerate(columns)}
+    at = [(k, place[j]) for k, i in enumerate(rows) for j in entries[i]]
+    shape = (len(rows), len(rows))
+    pattern = sparse.coo_array((np.ones(len(at)), tuple(np.array(at).T)), shape=shape).tocsr()
+    column_of: list[int] = graphs.maximum_bipartite_matching(pattern, perm_type="column").tolist()
+    if min(column_of) < 0:
+        raise ZeroDivisionError("the matrix is singular whatever the pose: its rows cannot be matched with its columns")
+    row_of = {column: k for k, column in enumerate(column_of)}
+    needs = [(k, row_of[c]) for k, c in at]
+    graph = sparse.coo_array((np.ones(len(needs)), tuple(np.array(needs).T)), shape=shape)
+    count, block_of = graphs.connected_components(graph, directed=True, connection="strong")
+    before: dict[int, set[int]] = {block: set() for block in range(count)}
+    for k, other in needs:
+        if block_of[k] != block_of[other]:
+            before[int(block_of[k])].add(int(block_of[other]))
+    members: dict[int, list[int]] = {block: [] for block in range(count)}
+    for k, block in enumerate(block_of.tolist()):
+        members[block].append(k)
+    order = TopologicalSorter(before).static_order()
+    return [([rows[k] for k in members[each]], [columns[column_of[k]] for k in members[each]]) for each in order]
 
 
 def _safe_pivot(entries: Sequence[Mapping[int, Scalar]], rows: set[int], columns: Mapping[int, set[int]]) -> tuple[int, int] | None:
