@@ -15,7 +15,7 @@ from ..core.trajectory import Trajectory
 
 
 class Native:
-    """Geometric constraints in global axes, traced, and run over lanes of samples: by machine code, or by numpy without llvmlite."""
+    """Geometric constraints in global axes, traced, run over lanes of samples by machine code, or by numpy without llvmlite."""
 
     name = "native"
     mode = "projection"

@@ -220,7 +220,11 @@ def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
 
 
 def _stopped(path: Path, reached: NDArray[np.intp], t: float, wanted: int) -> str:
-    last = f"last reachable sample at {path.where(float(path.times[reached[-1]]))}" if len(reached) else "no sample reached on this side"
+    last = (
+        f"last reachable sample at {path.where(float(path.times[reached[-1]]))}"
+        if len(reached)
+        else "no sample reached on this side"
+    )
     return (
         f"cannot be followed beyond {path.where(t)} (wanted {path.where(path.times[wanted])}): Newton does not converge or jumps "
         f"to another assembly; {last}; shorten the sweep or drive another coordinate"

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..core.errors import CaseError
 from ..core.harness.case import Case, Output, Series, Truth
-from ..core.harness.casefile import load_case
-from ..core.harness.document import remedy
+from ..core.harness.reading.casefile import load_case
+from ..core.harness.reading.document import remedy
 from .jet import Jet, Motion, steady
 
 FOLDER = Path(__file__).parent

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from kincheck.core.errors import CaseError
-from kincheck.core.harness.casefile import load_case
+from kincheck.core.harness.reading.casefile import load_case
 
 BASE = """
 schema = "kincheck-case/1"

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from kincheck.core.algebra import Mat3, Vec3, cross
 from kincheck.core.analysis.solve import solve
-from kincheck.core.harness import bench_formulation, bench_roundoff, bench_whole, cli
-from kincheck.core.harness.bench import Report, Section, page
-from kincheck.core.harness.bench_operations import (
+from kincheck.core.harness import cli
+from kincheck.core.harness.bench import formulation as bench_formulation
+from kincheck.core.harness.bench import roundoff as bench_roundoff
+from kincheck.core.harness.bench import whole as bench_whole
+from kincheck.core.harness.bench.operations import (
     DOTS,
     FROM_THE_LEFT,
     MULTIPLIED_OUT,
@@ -25,8 +27,9 @@ from kincheck.core.harness.bench_operations import (
     executed,
     traced,
 )
-from kincheck.core.harness.bench_whole import AT_DESIGN, AWAY, BACK, DIFFERENCE
-from kincheck.core.harness.textbook import PrintedDot11, PrintedDot12, PrintedDot21, chain, conditions, skew
+from kincheck.core.harness.bench.pages import Report, Section, page
+from kincheck.core.harness.bench.textbook import PrintedDot11, PrintedDot12, PrintedDot21, chain, conditions, skew
+from kincheck.core.harness.bench.whole import AT_DESIGN, AWAY, BACK, DIFFERENCE
 
 from .specimens import alike, body, frame, rotation, vector
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from kincheck.core.errors import CaseError
-from kincheck.core.harness import casefile
-from kincheck.core.harness.casefile import load_case
+from kincheck.core.harness.reading import casefile
+from kincheck.core.harness.reading.casefile import load_case
 
 from .case_texts import BASE, BY_FILE, INLINE, complains, edited, write
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.harness import casefile
 from kincheck.core.harness.case import Case, Truth
-from kincheck.core.harness.casefile import load_case
+from kincheck.core.harness.reading import casefile
+from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.joints import Distance, Gear, Joint, OrientationLock, RackPinion, Screw, Spherical
 from kincheck.core.joints.base import length, position
 from kincheck.core.motions import Absolute, Ramp, Sine, Table

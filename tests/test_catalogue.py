@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from kincheck.core.errors import MechanismError
 from kincheck.core.harness import cli
 from kincheck.core.harness.catalogue import catalogue, rows_of
-from kincheck.core.harness.driving import DRIVERS
-from kincheck.core.harness.schema import driver_keys, joint_keys, motion_keys
+from kincheck.core.harness.reading.driving import DRIVERS
+from kincheck.core.harness.reading.schema import driver_keys, joint_keys, motion_keys
 from kincheck.core.joints import Coupler, Joint, Spherical
 from kincheck.core.joints.base import directions
 from kincheck.core.motions import Motion

@@ -12,9 +12,9 @@ from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness import check_joint
-from kincheck.core.harness.check_joint import load_joint
 from kincheck.core.harness.cli import main
-from kincheck.core.harness.joint_report import Verdict
+from kincheck.core.harness.joint_check.check_joint import load_joint
+from kincheck.core.harness.joint_check.findings import Verdict
 from kincheck.core.joints import AxialJoint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row

@@ -184,7 +184,7 @@ def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
 def test_what_c_keeps_in_its_buffer_does_not_come_after_the_json():
     code = (
         "import ctypes\n"
-        "from kincheck.core.harness.deliver import json_only\n"
+        "from kincheck.core.harness.reporting.deliver import json_only\n"
         "with json_only():\n"
         "    ctypes.CDLL(None).puts(b'from C')\n"
         "print('json')\n"

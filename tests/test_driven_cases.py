@@ -7,11 +7,11 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core.harness import cli
 from kincheck.core.harness.case import Sweep
-from kincheck.core.harness.casefile import load_case
 from kincheck.core.harness.compare import pace
-from kincheck.core.harness.junit import to_junit
+from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.harness.record import Outcome, from_json, to_json
-from kincheck.core.harness.report import write_report
+from kincheck.core.harness.reporting.junit import to_junit
+from kincheck.core.harness.reporting.report import write_report
 from kincheck.core.harness.run import run
 from kincheck.core.motions import Absolute, Ramp, Sine, Table
 

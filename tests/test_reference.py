@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from kincheck.core.harness import reference
 from kincheck.core.harness.case import Truth
-from kincheck.core.harness.casefile import load_case
+from kincheck.core.harness.reading import reference
+from kincheck.core.harness.reading.casefile import load_case
 
 from .case_texts import BASE, BY_FILE, CSV, INLINE, complains, write
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import msgspec
 import pytest
-from kincheck.core.harness.figures import SAMPLES
 from kincheck.core.harness.record import Deviation, Deviations, Results
-from kincheck.core.harness.report import headline, number, write_report
+from kincheck.core.harness.reporting.figures import SAMPLES
+from kincheck.core.harness.reporting.report import headline, number, write_report
 
 from .made_up import CRANK, GRID, distances, judged, record, results, series
 

@@ -7,10 +7,10 @@ import xml.etree.ElementTree as ET
 
 import msgspec
 import pytest
-from kincheck.core.harness.junit import to_junit
 from kincheck.core.harness.record import from_json, to_json
+from kincheck.core.harness.reporting.junit import to_junit
+from kincheck.core.harness.reporting.table import print_table
 from kincheck.core.harness.run import run
-from kincheck.core.harness.table import print_table
 
 from .fakes import Fake, crank, exact, off, partial, raising
 

@@ -10,8 +10,8 @@ from ..drivers import Driver
 from ..errors import MechanismError
 from ..joints import Coupler, Joint, Kind
 from ..motions import Motion
-from .driving import DRIVERS
-from .schema import kind_of, own_fields
+from .reading.driving import DRIVERS
+from .reading.schema import kind_of, own_fields
 
 # Geometry that suits any joint. The two directions make a right angle up to the rounding of a table, as a cross wants it, and
 # point the same way on, as the shafts of a constant-velocity joint do.

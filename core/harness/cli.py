@@ -7,11 +7,10 @@ import difflib
 import importlib.metadata
 import math
 import os
-import re
 import shlex
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,8 +18,9 @@ from typing import Any
 
 from ..errors import KincheckError, SolveError
 from .case import Case
+from .console import how_to_install, lacking, progress
 from .engine import Engine
-from .record import Outcome, Record, Results
+from .record import Record
 
 WITHIN, DEVIATES, FAILED = 0, 1, 2
 """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work."""
@@ -113,8 +113,8 @@ def _complain(lines: Sequence[str]) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     """Solve every case with every engine, judge each, print a table and write what was asked for."""
-    from . import deliver as delivery
     from . import run as running
+    from .reporting import deliver as delivery
 
     problems: list[str] = []
     _return_cases(options)
@@ -133,7 +133,7 @@ def _run(options: argparse.Namespace) -> int:
                 cases,
                 engines,
                 tol=options.tol,
-                progress=_progress(records),
+                progress=progress(records),
                 baseline=baseline,
                 command=options.command,
             )
@@ -141,7 +141,7 @@ def _run(options: argparse.Namespace) -> int:
             problems.append(f"interrupted: {len(records)} of {len(cases) * len(engines)} records were made and are kept")
             results = running.results(cases, records, started=started, tol=options.tol, command=options.command)
     delivery.deliver(results, problems, matrix=options.joints, **files)
-    problems += _lacking(results, options.require)
+    problems += lacking(results, options.require)
     _complain(problems)
     if problems:
         return FAILED
@@ -162,8 +162,8 @@ def _cases(names: Sequence[str], problems: list[str], *, joints: bool) -> list[C
     """The cases asked for, after those of the joints if they are; what is wrong with any of them is added to the problems."""
     from ... import cases as builtin
     from ..analysis.freedom import require_driven
-    from .casefile import load_case
     from .probe import probes
+    from .reading.casefile import load_case
 
     found = {case.name: case for case in probes()} if joints else dict[str, Case]()
     known = list(builtin.names())
@@ -215,47 +215,12 @@ def _unknown(what: str, name: str, known: Sequence[str]) -> str:
     return f"there is no {what} {name!r}; " + (f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}")
 
 
-def _progress(records: list[Record]) -> Callable[[Record, int, int], None]:
-    """Collects records, and tells of them on standard error: one line that changes on a terminal, plain lines elsewhere."""
-    terminal = sys.stderr.isatty()
-
-    def tell(record: Record, done: int, total: int) -> None:
-        records.append(record)
-        line = f"[{done}/{total}] {record.case} {record.engine}: {record.outcome}"
-        if terminal:
-            line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
-        print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
-
-    return tell
-
-
-def _lacking(results: Results, required: Sequence[str]) -> list[str]:
-    """What a required engine could not do."""
-    lines = [
-        f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
-        if record.outcome is Outcome.UNAVAILABLE
-        else f"required engine {record.engine!r}: case {record.case!r} is unsupported: {record.message}"
-        for record in results.records
-        if record.engine in required and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
-    ]
-    return list(dict.fromkeys(lines))
-
-
-def how_to_install(engine: str) -> str:
-    """The command that installs an engine's simulator, from kincheck's own metadata."""
-    wanted = [
-        requirement.split(";")[0].strip()
-        for requirement in importlib.metadata.requires("kincheck") or []
-        if re.search(rf"""extra == ['"]{engine}['"]""", requirement)
-    ]
-    return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"
-
-
 def _bench_formulation(options: argparse.Namespace) -> int:
     """Measure the paper's claims: operation counts (Table 3), round-off of rows, errors of a whole sweep. Needs mpmath."""
     from ... import cases
-    from . import bench, bench_formulation
-    from . import deliver as delivery
+    from .bench import formulation as bench_formulation
+    from .bench import pages as bench
+    from .reporting import deliver as delivery
 
     problems: list[str] = []
     names = [f"{bench_formulation.NAME}.{kind}" for kind in ("json", "html")]
@@ -270,7 +235,7 @@ def _bench_formulation(options: argparse.Namespace) -> int:
 def _check_joint(options: argparse.Namespace) -> int:
     """Check a joint type: its equations against their derivatives, its branches, and a closed loop in every engine."""
     from ... import adapters
-    from .check_joint import check_joint, load_joint
+    from .joint_check.check_joint import check_joint, load_joint
 
     report = check_joint(load_joint(options.joint), seed=options.seed, engines=[*map(adapters.engine, adapters.ENGINES)])
     report.print(sys.stdout)

@@ -1,0 +1,100 @@
+"""Benchmarks: figures of the program itself, shown as tables on the terminal, as JSON and as a page."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+import msgspec
+from jinja2 import Environment, StrictUndefined
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ...errors import KincheckError
+from ..record import to_json
+from ..reporting.table import LOG_WIDTH
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of a benchmark, and what follows from it.
+
+    Attributes:
+        verdict: what the figures say, in sentences.
+        notes: how the figures were made.
+        columns: headings; the first `labels` of them are over words, the others over numbers.
+    """
+
+    title: str
+    verdict: Sequence[str]
+    notes: Sequence[str]
+    columns: Sequence[str]
+    labels: int
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Report:
+    """A benchmark's results for people. `name` is also that of its files."""
+
+    name: str
+    headline: str
+    facts: Sequence[str]
+    sections: Sequence[Section]
+
+
+def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: str | None) -> None:
+    """Print the tables and write what was asked for.
+
+    Args:
+        out: folder for NAME.json and NAME.html.
+        json: a file, or "-" for standard output, which then has nothing else.
+
+    Raises:
+        KincheckError: a file cannot be written.
+    """
+    print_report(report, sys.stderr if json == "-" else sys.stdout)
+    if json == "-":
+        sys.stdout.write(to_json(results).decode())
+    contents = {Path(json): to_json(results)} if json not in (None, "-") else {}
+    if out is not None:
+        contents |= {out / f"{report.name}.json": to_json(results), out / f"{report.name}.html": page(report).encode()}
+    for path, content in contents.items():
+        try:
+            path.write_bytes(content)
+        except OSError as error:
+            raise KincheckError(f"{path}: cannot be written ({error.strerror}); give a file in a writable folder") from None
+
+
+def print_report(report: Report, file: TextIO) -> None:
+    """Print the tables, each with its verdict and notes below."""
+    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    console.print(Text(report.headline, style="bold"))
+    console.print(Text(" · ".join(report.facts)), soft_wrap=True)
+    for section in report.sections:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for number, heading in enumerate(section.columns):
+            table.add_column(Text(heading), justify="left" if number < section.labels else "right")
+        for row in section.rows:
+            table.add_row(*(Text(cell) for cell in row))
+        console.print()
+        console.print(Text(section.title, style="bold"))
+        console.print(table)
+        for sentence in section.verdict:
+            console.print(Text(f"- {sentence}"), soft_wrap=True)
+        for note in section.notes:
+            console.print(Text(f"  {note}", style="dim"), soft_wrap=True)
+
+
+def page(report: Report) -> str:
+    """The report as one HTML file, in the look of a run's."""
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    here = Path(__file__).parent
+    # the style sheet of the run's report, so that there is one
+    _, style = (here.parent / "reporting" / "report.html").read_text("utf-8").split("<style>")
+    style = environment.from_string(style.partition("</style>")[0]).render()
+    return environment.from_string((here / "bench.html").read_text("utf-8")).render(report=report, style=style)

@@ -1,0 +1,47 @@
+"""What the command line says while it runs, and of engines that are not there."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import re
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+
+from .record import Outcome, Record, Results
+
+
+def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
+    """Collects records, and tells of them on standard error: one line that changes on a terminal, plain lines elsewhere."""
+    terminal = sys.stderr.isatty()
+
+    def tell(record: Record, done: int, total: int) -> None:
+        records.append(record)
+        line = f"[{done}/{total}] {record.case} {record.engine}: {record.outcome}"
+        if terminal:
+            line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
+        print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def lacking(results: Results, required: Sequence[str]) -> list[str]:
+    """What a required engine could not do."""
+    lines = [
+        f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
+        if record.outcome is Outcome.UNAVAILABLE
+        else f"required engine {record.engine!r}: case {record.case!r} is unsupported: {record.message}"
+        for record in results.records
+        if record.engine in required and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
+    ]
+    return list(dict.fromkeys(lines))
+
+
+def how_to_install(engine: str) -> str:
+    """The command that installs an engine's simulator, from kincheck's own metadata."""
+    wanted = [
+        requirement.split(";")[0].strip()
+        for requirement in importlib.metadata.requires("kincheck") or []
+        if re.search(rf"""extra == ['"]{engine}['"]""", requirement)
+    ]
+    return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"

@@ -1,0 +1,1 @@
+"""Checking a joint type: the battery behind `kincheck check-joint`."""

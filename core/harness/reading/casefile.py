@@ -1,0 +1,158 @@
+"""Case files, schema kincheck-case/1: TOML, or JSON with the same keys, to a `Case`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ...joints import Coupler, Joint, Kind
+from ...mechanism import Body, Mechanism, Point, Vector
+from ..case import Case, Output, Truth
+from .document import class_of, explained, fault, join, parse, read_text, remedy, shown, typed
+from .driving import read_drivers, read_sweep
+from .reference import Convert, ReferenceKeys, is_derivative, read_reference
+from .schema import (
+    SCHEMA,
+    BodyKeys,
+    CaseKeys,
+    OutputKeys,
+    PointKeys,
+    UnitsKeys,
+    joint_keys,
+    kind_of,
+    own_fields,
+)
+
+LARGEST_FILE = 4_000_000
+
+# Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized mechanisms at 1e-16 m.
+DEFAULT_ATOL = 1e-9
+DEFAULT_WHY = (
+    "the default of 1e-9 m: a thousandth of the micrometre that hardpoints are measured to, and millions of times the round-off "
+    "of metre-sized coordinates in double precision"
+)
+
+LENGTHS: Mapping[str, Convert] = {"m": float, "mm": lambda x: x / 1000.0}
+ANGLES: Mapping[str, Convert] = {"rad": float, "deg": math.radians}
+AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def load_case(path: str | Path) -> Case:
+    """The case in a file, in SI units. Without a [reference] it is consensus_only, whatever it claims.
+
+    Raises:
+        CaseError: the file, or its reference, cannot be read or does not make sense; the message names file, key and remedy.
+    """
+    file = Path(path)
+    tables = parse(file, read_text(file, LARGEST_FILE, "a case holds hardpoints; samples belong into a reference file"))
+    if tables.get("schema") != SCHEMA:
+        found = shown(tables["schema"]) if "schema" in tables else "none"
+        raise fault(file, "schema", f'found {found}, expected "{SCHEMA}"; write schema = "{SCHEMA}"')
+    keys = typed(file, "", tables, CaseKeys)
+    units = typed(file, "units", keys.units, UnitsKeys)
+    length, angle = LENGTHS[units.length], ANGLES[units.angle]
+    mechanism = _mechanism(file, keys, length)
+    sweep, driver_unit = read_sweep(file, keys, mechanism, length, angle)
+    outputs = _outputs(file, keys, mechanism, length)
+    case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
+    if keys.reference is None:
+        return case
+    if keys.truth in (None, Truth.CONSENSUS_ONLY):
+        found = "nothing" if keys.truth is None else shown(str(keys.truth))
+        kinds = ", ".join(kind for kind in Truth if kind is not Truth.CONSENSUS_ONLY)
+        raise fault(file, "truth", f"found {found} beside a [reference], expected where that comes from; give one of {kinds}")
+    columns = typed(file, "reference", keys.reference, ReferenceKeys)
+    series = read_reference(file, columns, driver_unit, length, sweep.values, [output.name for output in outputs])
+    return replace(case, truth=keys.truth, reference=series)
+
+
+def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:
+    """A field of a joint in SI; directions and plain numbers have no unit, and what may be left out is None then."""
+    if value is None:
+        return None
+    match kind:
+        case Kind.LENGTH:
+            return length(value)
+        case Kind.POSITION:
+            return tuple(map(length, value))
+        case Kind.POSITIONS:
+            return tuple(tuple(map(length, each)) for each in value)
+        case Kind.DIRECTION | Kind.DIRECTIONS | None:
+            return value
+
+
+def _mechanism(file: Path, keys: CaseKeys, length: Convert) -> Mechanism:
+    bodies: list[Body] = []
+    for name, value in keys.bodies.items():
+        body = typed(file, key := join("bodies", name), value, BodyKeys)
+        with explained(file, key):
+            bodies.append(Body(name, _scaled(Kind.POSITION, body.origin, length), body.euler_parameters, body.fixed))
+    points: list[Point] = []
+    for name, value in keys.points.items():
+        point = typed(file, join("points", name), value, PointKeys)
+        points.append(Point(name, point.body, _scaled(Kind.POSITION, point.position, length)))
+    joined = [_joint(file, join("joints", name), name, value, length) for name, value in keys.joints.items()]
+    joints = [each for each in joined if isinstance(each, Joint)]
+    couplers = [each for each in joined if isinstance(each, Coupler)]
+    drivers = read_drivers(file, keys.drivers)
+    with explained(file):
+        return Mechanism(keys.name, bodies, joints, points, drivers, couplers)
+
+
+def _joint(file: Path, key: str, name: str, value: object, length: Convert) -> Joint | Coupler:
+    cls = class_of(file, key, "joint", value, Joint.registry | Coupler.registry)
+    keys: Any = typed(file, key, value, joint_keys(cls))
+    given = {each.name: _scaled(kind_of(each), getattr(keys, each.name), length) for each in own_fields(cls)}
+    with explained(file, key):
+        return cls(name, keys.joints, **given) if issubclass(cls, Coupler) else cls(name, *keys.bodies, **given)
+
+
+def _unit(direction: Vector) -> Vector:
+    length = math.hypot(*direction)
+    x, y, z = direction
+    return x / length, y / length, z / length
+
+
+def _outputs(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Convert) -> tuple[Output, ...]:
+    if not keys.points:
+        raise fault(file, "points", "found no point, expected one whose motion is compared; add [points.NAME]")
+    if keys.outputs:
+        return tuple(_output(file, join("outputs", name), name, value, keys, length) for name, value in keys.outputs.items())
+    return tuple(
+        Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
+        for point in mechanism.points
+        for axis, along in AXES.items()
+    )
+
+
+def _output(file: Path, key: str, name: str, value: object, keys: CaseKeys, length: Convert) -> Output:
+    output = typed(file, key, value, OutputKeys)
+    if is_derivative(name):
+        raise fault(file, key, "a name with this ending is a derivative in reference tables; give the output another name")
+    if output.point not in keys.points:
+        raise fault(file, join(key, "point"), f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}")
+    match output.component, output.direction:
+        case str(axis), None:
+            direction = AXES[axis]
+        case None, (_, _, _) as found:
+            if not any(found):
+                raise fault(file, join(key, "direction"), "found zero, expected a direction; give one of any other length")
+            direction = _unit(found)
+        case component, _:
+            what = "neither component nor direction" if component is None else "both component and direction"
+            raise fault(file, key, f'found {what}, expected one of them; give component = "x" or direction = [x, y, z]')
+    return Output(name, output.point, direction, output.relative, *_tolerance(file, key, output, length))
+
+
+def _tolerance(file: Path, key: str, output: OutputKeys, length: Convert) -> tuple[float, float, str]:
+    """atol [m], rtol [-] and the reason for them."""
+    if output.atol is None and output.rtol is None:
+        if output.why is not None:
+            raise fault(file, join(key, "why"), "found a reason without a tolerance, expected both; add atol or rtol")
+        return DEFAULT_ATOL, 0.0, DEFAULT_WHY
+    if output.why is None:
+        raise fault(file, join(key, "why"), "missing, expected the reason for the tolerance; add the key 'why'")
+    return length(output.atol or 0.0), output.rtol or 0.0, output.why

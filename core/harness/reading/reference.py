@@ -1,0 +1,177 @@
+"""The reference of a case: samples of its outputs, from a CSV file beside the case file or from rows inside it.
+
+First column: driver values, on the grid of the sweep, for nothing is interpolated. Further columns: OUTPUT, OUTPUT.velocity,
+OUTPUT.acceleration, in the units of the case file. Outputs without a column have no reference, and the comparison says so.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from ...trajectory import Array
+from ..case import Series
+from .document import fault, read_text, remedy, shown
+
+LARGEST_FILE = 64_000_000
+DERIVATIVES = (".velocity", ".acceleration")
+# Twelve digits of a driver value: what is off by less moves no output by as much as a tolerance; a rounded table is off by more.
+SAME_GRID = 1e-12
+
+Convert: TypeAlias = Callable[[float], float]
+"""From the unit of a file to SI."""
+
+
+class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs in order)."""
+
+    file: Annotated[str, Meta(min_length=1, description="the name of a CSV file beside the case file")] | None = None
+    columns: Annotated[list[str], Meta(min_length=2, description="a list of column names, the driver first")] | None = None
+    rows: Annotated[list[list[float]], Meta(min_length=1, description="a list of rows of numbers")] | None = None
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Columns by name and rows with the place to name in messages."""
+
+    file: Path
+    header: str
+    columns: Sequence[str]
+    rows: Sequence[tuple[str, Sequence[float]]]
+
+
+def is_derivative(name: str) -> bool:
+    """Whether a column of that name holds a velocity or acceleration."""
+    return name.endswith(DERIVATIVES)
+
+
+def read_reference(
+    case_file: Path, keys: ReferenceKeys, driver: Convert, length: Convert, values: Array, outputs: Sequence[str]
+) -> dict[str, Series]:
+    """True values by output name, SI.
+
+    Args:
+        driver, length: from the unit of the driver and of lengths to SI.
+        values: the grid of the sweep [m or rad], shape (n,).
+        outputs: names of the outputs of the case.
+
+    Raises:
+        CaseError: the file cannot be read or lies elsewhere, a column is unknown, or the grid is not that of the sweep.
+    """
+    samples = _inline(case_file, keys, outputs) if keys.file is None else _from_csv(case_file, keys)
+    names = list(samples.columns[1:])
+    _check_columns(samples, names, outputs)
+    _check_grid(samples, [driver(row[0]) for _, row in samples.rows], values)
+    column = {name: np.array([length(row[k]) for _, row in samples.rows]) for k, name in enumerate(names, start=1)}
+    return {
+        name: Series(column[name], *(column.get(name + derivative) for derivative in DERIVATIVES))
+        for name in outputs
+        if name in column
+    }
+
+
+def _inline(file: Path, keys: ReferenceKeys, outputs: Sequence[str]) -> _Samples:
+    if keys.rows is None:
+        raise fault(file, "reference", "found neither file nor rows, expected one of them; name a CSV file or give the rows")
+    columns = keys.columns or ["driver", *outputs]
+    rows = [(f"reference.rows[{k}]", row) for k, row in enumerate(keys.rows)]
+    samples = _Samples(file, "reference.columns", columns, rows)
+    for where, row in rows:
+        _check_width(samples, where, len(row))
+    return samples
+
+
+def _from_csv(case_file: Path, keys: ReferenceKeys) -> _Samples:
+    if keys.rows is not None or keys.columns is not None:
+        raise fault(case_file, "reference", "found file and rows or columns, expected one source; remove one of them")
+    file = _beside(case_file, keys.file or "")
+    text = read_text(file, LARGEST_FILE, "thin out the samples")
+    # comment lines are blanked, not dropped, so that the reader's line numbers are those of the file
+    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
+    reader = csv.reader(lines, skipinitialspace=True, strict=True)
+    try:
+        table = [(f"line {reader.line_num}", [cell.strip() for cell in cells]) for cells in reader if cells]
+    except csv.Error as error:
+        raise fault(file, f"line {reader.line_num}", f"not valid CSV: {error}; correct the line") from None
+    if not table:
+        raise fault(file, "", "found no samples, expected a line of column names and rows of numbers; add them")
+    (header, columns), *body = table
+    samples = _Samples(file, header, columns, [])
+    rows: list[tuple[str, Sequence[float]]] = []
+    for where, cells in body:
+        _check_width(samples, where, len(cells))
+        rows.append((where, [_number(file, f"{where}, column {name}", cell) for name, cell in zip(columns, cells, strict=True)]))
+    return _Samples(file, header, columns, rows)
+
+
+def _beside(case_file: Path, name: str) -> Path:
+    """The file of that name in the folder of the case file or below; nothing else is ever opened."""
+    folder = case_file.parent.resolve()
+    try:
+        file = (folder / name).resolve()
+        inside = not Path(name).is_absolute() and file.is_relative_to(folder)
+    except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
+        inside = False
+        file = folder
+    if not inside:
+        raise fault(
+            case_file,
+            "reference.file",
+            f"found {shown(name)}, expected a file in the folder of the case file or below; put it there and give its name",
+        )
+    return file
+
+
+def _number(file: Path, where: str, cell: str) -> float:
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise fault(file, where, f"found {shown(cell)}, expected a finite number; correct it or leave the column out")
+    return number
+
+
+def _check_width(samples: _Samples, where: str, found: int) -> None:
+    if found != len(samples.columns):
+        expected = f"{len(samples.columns)} ({', '.join(samples.columns)})"
+        raise fault(samples.file, where, f"found {found} numbers, expected {expected}; complete the row")
+
+
+def _check_columns(samples: _Samples, names: Sequence[str], outputs: Sequence[str]) -> None:
+    known = [name + suffix for name in outputs for suffix in ("", *DERIVATIVES)]
+    if not names:
+        raise fault(samples.file, samples.header, f"found no column of an output, expected some of {', '.join(outputs)}; add one")
+    if samples.columns[0] in known:
+        problem = f"found {samples.columns[0]!r} first, expected the driver values; put their column first"
+        raise fault(samples.file, samples.header, problem)
+    for name in names:
+        if names.count(name) > 1:
+            raise fault(samples.file, samples.header, f"found the column {name!r} twice, expected it once; remove one")
+        if name not in known:
+            problem = f"found the column {shown(name)}, expected outputs of the case; {remedy(name, known)}"
+            raise fault(samples.file, samples.header, problem)
+        stem = name.removesuffix(".velocity").removesuffix(".acceleration")
+        if stem not in names:
+            problem = f"found {name!r} alone, expected its positions too; add the column {stem!r}"
+            raise fault(samples.file, samples.header, problem)
+
+
+def _check_grid(samples: _Samples, found: Sequence[float], values: Array) -> None:
+    allowed = SAME_GRID * float(np.max(np.abs(values)))
+    advice = "give a row for each sample of the sweep, driver values to 13 digits or more"
+    for k, ((where, _), here, there) in enumerate(zip(samples.rows, found, values.tolist(), strict=False)):
+        if abs(here - there) > allowed:
+            problem = f"driver value {here!r} of sample {k}, expected {there!r} as in the sweep (SI); {advice}"
+            raise fault(samples.file, where, problem)
+    if len(found) != len(values):
+        problem = f"found {len(found)} rows, expected {len(values)}, the steps of the sweep; {advice}"
+        raise fault(samples.file, "", problem)

@@ -1,0 +1,185 @@
+"""The keys of a case file, schema kincheck-case/1: which there are, what each holds, and what it is when left out.
+
+The keys of a joint's geometry, of a driver and of a motion are read off the fields of its class: a new type needs nothing here.
+
+Reference. A case file is TOML, or JSON with the same keys. Points and directions are global, at the design position, as in a
+table of hardpoints; directions have any length but zero. Numbers are in SI units and radians unless [units] says otherwise;
+results always are. Keys in brackets may be left out. `kincheck list --joints` prints all types there are, with their keys.
+
+    schema = "kincheck-case/1"
+    name, source         what it is called, and where the numbers come from
+    (truth)              with a reference only, where that comes from: closed_form, third_party_data or in_house_oracle
+
+    [units]              (length) "m" or "mm", (angle) "rad" or "deg"; seconds and hertz have no other unit
+    [bodies.NAME]        (origin) = [0, 0, 0], (euler_parameters) = [1, 0, 0, 0], e0..e3, body to global; (fixed) = false
+                         the body "ground" is there without being declared
+    [joints.NAME]        type, bodies = [first, second], and what the type asks for: point, axis, lengths, ...
+                         type, joints = [first, second], where it couples two other joints: gear (ratio), rack_pinion (radius)
+                         a joint's rotation and displacement are those of its second body relative to its first, about and
+                         along its axis by the right-hand rule, zero at design
+    [points.NAME]        body, position: a point that is compared, or driven
+    [drivers.NAME]       type = "point_coordinate": point, direction, (relative) = true
+                         type = "joint_angle" or "joint_displacement": joint, (relative) = true
+                         values are measured from the design position; relative = false: absolute, which for joints is the same
+    [drivers.NAME.motion]   how it goes with time; without, it holds its design value unless it is swept
+                         type = "ramp": rate, per second
+                         type = "sine": amplitude, frequency [Hz], (phase) = 0: amplitude sin(2 pi frequency t + phase)
+                         type = "table": times [s], values: the natural cubic spline through them, which must cover the sweep
+    [sweep]              (driver), start, stop, steps: samples with both ends; (rate) = 1, in driver units per second
+                         driver: it goes from start to stop at the rate; time is zero where it has its design value
+                         no driver, or "time": start and stop are times [s], there is no rate, and the motions move everything
+                         both are solved from the design position outwards, or from the first sample, to which all drivers go
+                         straight where their motions do not pass through the design at time zero
+    [outputs.NAME]       point, component = "x", "y" or "z", or direction; (relative) = false: measured from the design
+                         (atol), a length, (rtol), of the range of the true values: with either, (why), the reason for it
+                         no outputs: x, y and z of every point
+    [reference]          true values: file, the name of a CSV file beside the case file, or rows, with (columns)
+                         first column: what is swept, on its grid; others: OUTPUT, OUTPUT.velocity, OUTPUT.acceleration
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields
+from functools import cache
+from typing import Annotated, Any, Literal, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+from ...drivers import Driver
+from ...joints import Coupler, Joint, Kind
+from ...mechanism import Vector
+from ...motions import Motion
+from ..case import TIME, Truth
+
+SCHEMA = "kincheck-case/1"
+MOST_SAMPLES = 1_000_000
+
+Text = Annotated[str, Meta(min_length=1, description="a text that is not empty")]
+Flag = Annotated[bool, Meta(description="true or false")]
+Number = Annotated[float, Meta(description="a number")]
+Size = Annotated[float, Meta(ge=0.0, description="a number that is not negative")]
+Numbers3 = Annotated[Vector, Meta(description="three numbers [x, y, z]")]
+Numbers = Annotated[tuple[float, ...], Meta(description="a list of numbers")]
+Numbers4 = Annotated[tuple[float, float, float, float], Meta(description="four numbers [e0, e1, e2, e3]")]
+Table = Annotated[dict[str, Any], Meta(description="a table")]
+Bodies = Annotated[tuple[str, str], Meta(description='two names ["first body", "second body"]')]
+Joints = Annotated[tuple[str, str], Meta(description='two names ["first joint", "second joint"]')]
+Truths = Annotated[Truth, Meta(description=f"one of {', '.join(Truth)}")]
+
+_SHAPES: Mapping[Kind, Any] = {
+    Kind.POSITION: Vector,
+    Kind.DIRECTION: Vector,
+    Kind.POSITIONS: tuple[Vector, Vector],
+    Kind.DIRECTIONS: tuple[Vector, Vector],
+    Kind.LENGTH: float,
+}
+_OF_FIELDS: Mapping[Any, Any] = {str: Text, bool: Flag, float: Number, Vector: Numbers3, tuple[float, ...]: Numbers}
+
+
+class UnitsKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """[units] of everything in the file."""
+
+    length: Annotated[Literal["m", "mm"], Meta(description='"m" or "mm"')] = "m"
+    angle: Annotated[Literal["rad", "deg"], Meta(description='"rad" or "deg"')] = "rad"
+
+
+class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """The tables of the file."""
+
+    schema: Annotated[str, Meta(description=f'"{SCHEMA}"')]
+    name: Text
+    source: Annotated[str, Meta(min_length=1, description="a text that says where the numbers come from")]
+    bodies: Table
+    drivers: Table
+    sweep: Table
+    truth: Truths | None = None
+    units: Table = {}
+    joints: Table = {}
+    points: Table = {}
+    outputs: Table = {}
+    reference: Table | None = None
+
+
+class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """[bodies.NAME]; the frame is global and aligned unless given."""
+
+    origin: Numbers3 = (0.0, 0.0, 0.0)
+    euler_parameters: Numbers4 = (1.0, 0.0, 0.0, 0.0)
+    fixed: Flag = False
+
+
+class PointKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """[points.NAME]; global at design."""
+
+    body: Text
+    position: Numbers3
+
+
+class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[sweep]; start, stop and rate in the driver's unit, or seconds."""
+
+    driver: Text = TIME
+    start: Number
+    stop: Number
+    steps: Annotated[int, Meta(ge=1, le=MOST_SAMPLES, description=f"a whole number of samples, 1 to {MOST_SAMPLES}")]
+    rate: Number | None = None
+
+
+class OutputKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """[outputs.NAME]; component or direction, and a tolerance with its reason."""
+
+    point: Text
+    component: Annotated[Literal["x", "y", "z"], Meta(description='"x", "y" or "z"')] | None = None
+    direction: Numbers3 | None = None
+    relative: Flag = False
+    atol: Size | None = None
+    rtol: Size | None = None
+    why: Text | None = None
+
+
+_Keys = list[tuple[str, Any] | tuple[str, Any, Any]]
+_INHERITED = {each.name for base in (Joint, Coupler, Driver, Motion) for each in fields(base)}
+
+
+@cache
+def joint_keys(cls: type[Joint] | type[Coupler]) -> type[msgspec.Struct]:
+    """The keys of a joint of that class: type, the bodies or joints it joins, and its geometry."""
+    keys: _Keys = [("type", Text), ("joints", Joints) if issubclass(cls, Coupler) else ("bodies", Bodies)]
+    for each in own_fields(cls):
+        kind = kind_of(each)
+        keys.append(_key(each, Number if kind is None else Annotated[_SHAPES[kind], Meta(description=kind.value)]))
+    return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True)
+
+
+@cache
+def driver_keys(cls: type[Driver]) -> type[msgspec.Struct]:
+    """The keys of a driver of that class: type, its fields, and its motion."""
+    return _keys_of_fields(cls, ("motion", Table | None, None))
+
+
+@cache
+def motion_keys(cls: type[Motion]) -> type[msgspec.Struct]:
+    """The keys of a motion of that class: type and its fields."""
+    return _keys_of_fields(cls)
+
+
+def own_fields(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> list[Field[Any]]:
+    """The fields of a class beyond those of its kind: what a case file gives."""
+    return [each for each in fields(cls) if each.name not in _INHERITED]
+
+
+def kind_of(each: Field[Any]) -> Kind | None:
+    """What a field of a joint holds; None for a plain number."""
+    return each.metadata.get("kind")
+
+
+def _keys_of_fields(cls: type[Driver] | type[Motion], *more: tuple[str, Any, Any]) -> type[msgspec.Struct]:
+    hints = get_type_hints(cls)
+    keys: _Keys = [("type", Text), *(_key(each, _OF_FIELDS[hints[each.name]]) for each in own_fields(cls)), *more]
+    return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True)
+
+
+def _key(each: Field[Any], shape: Any) -> tuple[str, Any] | tuple[str, Any, Any]:
+    return (each.name, shape) if each.default is MISSING else (each.name, shape, each.default)

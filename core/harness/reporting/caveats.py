@@ -1,0 +1,66 @@
+"""What a run does not prove, read off the facts of its records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..case import Truth
+from ..record import Outcome, Record, Results
+from .figures import SAMPLES, engine_name
+
+COMPARED = (Outcome.PASS, Outcome.FAIL)
+
+
+def caveats(results: Results) -> list[tuple[str, str]]:
+    """Each limit of the run as a title and a sentence."""
+    records = results.records
+    said: list[tuple[str, str]] = []
+
+    def say(title: str, text: str) -> None:
+        said.append((title, text))
+
+    def cases(holds: Callable[[Record], bool]) -> str:
+        return ", ".join(dict.fromkeys(record.case for record in records if holds(record)))
+
+    say(
+        "One description for all",
+        "Every engine was given the same case files. A wrong hardpoint, axis or driver in a file is wrong in all of them and "
+        "shows in no comparison.",
+    )
+    if names := cases(lambda record: record.truth == Truth.IN_HOUSE_ORACLE):
+        say(f"In-house oracle: {names}", "This project computed the reference. Agreement with our own oracle is not validation.")
+    if names := cases(lambda record: record.truth == Truth.CONSENSUS_ONLY):
+        say(f"Consensus only: {names}", "There is no reference. Engines that agree with the native one may be wrong together.")
+    for outcome in Outcome:
+        pairs = [_pair(record) for record in records if record.outcome is outcome]
+        if pairs and outcome not in COMPARED:
+            say(f"{outcome.value.capitalize()}: {len(pairs)}", f"Nothing is said about {'; '.join(pairs)}.")
+    for record in records:
+        if record.solved is not None and record.samples is not None and record.solved < record.samples:
+            say(_pair(record), f"{record.solved} of {record.samples} samples were solved; nothing is said about the others.")
+    for reason, pairs in _uncompared(results).items():
+        say(f"Not compared: {', '.join(pairs)}", reason)
+    if len({record.mode for record in records if record.outcome in COMPARED}) > 1:
+        say("Modes", "Projection and simulate are different products; their times and errors are no ranking.")
+    if len({record.loop for record in records if record.us_per_step is not None}) > 1:
+        say("Times", "The loops over the samples run in different places (see loop): a time is that of engine and loop together.")
+    if names := cases(lambda record: any(len(values) > SAMPLES for values in record.driver.values())):
+        say(
+            f"Thinned figures: {names}",
+            f"About {SAMPLES} samples of each curve are drawn, the worst ones among them; tables and verdicts used all.",
+        )
+    return said
+
+
+def _pair(record: Record) -> str:
+    return f"{engine_name(record)} on {record.case}"
+
+
+def _uncompared(results: Results) -> dict[str, list[str]]:
+    reasons: dict[str, list[str]] = {}
+    for record in results.records:
+        if record.outcome not in COMPARED:
+            continue
+        for reason in dict.fromkeys(errors.reason for errors in record.errors.values() if errors.reason):
+            reasons.setdefault(reason, []).append(_pair(record))
+    return reasons

@@ -1,0 +1,54 @@
+"""Results as JUnit XML, for continuous integration: one test case per case, engine and output."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+from ..compare import describe
+from ..record import Deviations, Outcome, Record, Results
+
+# What XML 1.0 cannot hold, not even escaped; a simulator's message may.
+_FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def to_junit(results: Results) -> bytes:
+    """The results as JUnit XML; a missing engine or feature is a skip with its reason."""
+    root = ElementTree.Element("testsuites", name="kincheck")
+    for case in dict.fromkeys(record.case for record in results.records):
+        suite = ElementTree.SubElement(root, "testsuite", name=case)
+        for record in results.records:
+            if record.case == case:
+                for output, deviations in record.errors.items():
+                    _test(suite, record, output, deviations)
+        for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            suite.set(count, str(sum(1 for _ in suite.iter(tag))))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _test(suite: ElementTree.Element, record: Record, output: str, deviations: Deviations) -> None:
+    seconds = record.seconds.warm if record.seconds and record.seconds.warm is not None else 0.0
+    test = ElementTree.SubElement(
+        suite,
+        "testcase",
+        classname=f"{record.case}.{record.engine}.{record.mode}",
+        name=output,
+        time=f"{seconds:.6f}",
+    )
+    verdict, message = _verdict(record, output, deviations)
+    if verdict:
+        ElementTree.SubElement(test, verdict, message=_FORBIDDEN.sub("\ufffd", message))
+
+
+def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
+    """The element a test case needs, none where it passed, and its message."""
+    if record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
+        return "skipped", f"{record.outcome}: {record.message}"
+    if record.outcome is Outcome.FAIL:
+        (driver, values), *_ = record.driver.items()
+        off = [describe(output, quantity, each, driver, values) for quantity, each in deviations.items() if not each.within]
+        # samples that are missing are missing from every output
+        missing = [record.message] if record.solved != record.samples and not off else []
+        return ("failure", "; ".join(off + missing)) if off or missing else ("", "")
+    return ("error", f"{record.outcome}: {record.message}") if record.outcome.bad else ("", "")

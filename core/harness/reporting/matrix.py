@@ -1,0 +1,76 @@
+"""Every case against every engine, a cell each: the largest position, velocity and acceleration error, or why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TextIO
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..record import Outcome, Record, Results
+from .table import COLOURS, LOG_WIDTH, QUANTITIES, messages, print_messages, worst
+
+
+def print_matrix(results: Results, file: TextIO) -> None:
+    """Print a row per case and a column per engine, then every message, then a count of outcomes."""
+    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    table = Table(box=None, pad_edge=False, header_style="bold", caption=Text(_reading(results)), caption_justify="left")
+    table.add_column("case", overflow="fold")
+    engines, rows = _laid_out(results)
+    for engine in engines:
+        table.add_column(engine, no_wrap=True)
+    for case, records in rows.items():
+        cells = (Text(cell(records[engine]), COLOURS.get(records[engine].outcome, "bold red")) for engine in engines)
+        table.add_row(Text(case), *cells)
+    console.print(table)
+    print_messages(results, console)
+
+
+def to_markdown(results: Results) -> str:
+    """The same as a Markdown table, the engines with their versions, and a line for every message but those of what passed."""
+    engines, rows = _laid_out(results)
+    versions = {record.engine: record.version for record in results.records if record.version}
+    head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
+    lines = [_row(head), _row(["---"] * len(head))]
+    lines += [_row([f"`{case}`", *(cell(records[engine]) for engine in engines)]) for case, records in rows.items()]
+    lines += ["", f"{_reading(results)}."]
+    lines += [
+        f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}."
+        for (engine, outcome, message), cases in messages(results).items()
+        if outcome is not Outcome.PASS
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def cell(record: Record) -> str:
+    """What an engine made of a case, in a few signs."""
+    errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
+    if errors:
+        verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome}: "
+        return verdict + " · ".join(f"{each.max_abs:.0e}" for each in errors)
+    if record.outcome is Outcome.PASS and record.residual_max is not None:
+        return f"residual {record.residual_max:.0e}"
+    return str(record.outcome)
+
+
+def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]]:
+    """The engines, and the records by case and engine."""
+    rows: dict[str, dict[str, Record]] = {}
+    for record in results.records:
+        rows.setdefault(record.case, {})[record.engine] = record
+    return list(dict.fromkeys(record.engine for record in results.records)), rows
+
+
+def _reading(results: Results) -> str:
+    """How to read the cells."""
+    standards = sorted(
+        {each.against for record in results.records for errors in record.errors.values() for _, each in errors.items()}
+    )
+    units = " · ".join(f"{quantity} [{unit}]" for quantity, unit in QUANTITIES.items())
+    return f"Largest errors against {', '.join(standards).replace('_', ' ') or 'nothing'}: {units}"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(each.replace('|', '/') for each in cells)} |"

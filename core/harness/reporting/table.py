@@ -1,0 +1,72 @@
+"""The records of a run as a table for people."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TextIO
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..record import Deviation, Outcome, Record, Results
+
+COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
+QUANTITIES = {"position": "m", "velocity": "m/s", "acceleration": "m/s²"}
+# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
+LOG_WIDTH = 200
+
+
+def print_table(results: Results, file: TextIO) -> None:
+    """Print one line per record, then every message, then a count of outcomes."""
+    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("case", overflow="fold")
+    for name in ("engine", "outcome"):
+        table.add_column(name, no_wrap=True)
+    for unit in QUANTITIES.values():
+        table.add_column(f"error\n{unit}", justify="right", no_wrap=True)
+    table.add_column("truth", overflow="fold")
+    table.add_column("us/step", justify="right", no_wrap=True)
+    several = len({record.mode for record in results.records}) > 1
+    for record in results.records:
+        outcome = Text(record.outcome, style=COLOURS.get(record.outcome, "bold red"))
+        errors = [_error(record, quantity) for quantity in QUANTITIES]
+        time = "–" if record.us_per_step is None else f"{record.us_per_step:.3g}"
+        engine = f"{record.engine} · {record.mode}" if several else record.engine
+        table.add_row(Text(record.case), engine, outcome, *errors, truth(record), time)
+    console.print(table)
+    print_messages(results, console)
+
+
+def print_messages(results: Results, console: Console) -> None:
+    """Print every message, then a count of outcomes."""
+    for (engine, outcome, message), cases in messages(results).items():
+        console.print(Text(f"{outcome}: {', '.join(cases)} · {engine}: {message}"), soft_wrap=True)
+    counts = Counter(record.outcome for record in results.records)
+    console.print(", ".join(f"{count} {outcome}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
+
+
+def truth(record: Record) -> str:
+    """What a record was judged by; the word for more than agreement is kept for truths from elsewhere that were met."""
+    return record.truth.replace("_", " ") + (" (validated)" if record.validated else "")
+
+
+def _error(record: Record, quantity: str) -> Text:
+    found = worst(record, quantity)
+    return Text("–") if found is None else Text(f"{found.max_abs:.1e}", style="" if found.within else "bold red")
+
+
+def worst(record: Record, quantity: str) -> Deviation | None:
+    """The largest error of a quantity over the outputs, those out of tolerance first; None where nothing was compared."""
+    found = [each for errors in record.errors.values() for name, each in errors.items() if name == quantity]
+    return max(found, key=lambda each: (not each.within, each.max_abs), default=None)
+
+
+def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
+    """Messages, and the cases they are about; a missing engine says so once."""
+    said: dict[tuple[str, Outcome, str], list[str]] = {}
+    for record in results.records:
+        if record.message:
+            said.setdefault((record.engine, record.outcome, record.message), []).append(record.case)
+    return said
