@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import kincheck.adapters
+import kincheck.cases
 import pytest
 from kincheck.core.harness import cli
 from kincheck.core.joints import Coupler, Joint
