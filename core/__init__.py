@@ -1,5 +1,6 @@
 """kincheck.core: describe a mechanism, solve it, compare engines."""
 
+from .analysis.assemble import assemble
 from .analysis.solve import solve
 from .drivers import JointAngle, JointDisplacement, PointCoordinate
 from .errors import CaseError, KincheckError, MechanismError, SolveError
@@ -61,5 +62,6 @@ __all__ = [
     "Table",
     "Translational",
     "Universal",
+    "assemble",
     "solve",
 ]
