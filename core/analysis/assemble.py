@@ -118,7 +118,7 @@ def _state(tracer: Tracer, estimates: Mapping[str, tuple[Array, Array]], values:
         relative = i.q.conjugate() * j.q
         s_i, s_j = (tracer.frame.arm(body, joint.point) for body in joint.bodies)
         apart = (j.u - i.u) + (j.swing(s_j) - i.swing(s_i))
-        angle = 2.0 * np.arctan2(h @ relative.e, relative.e0)
+        angle: Array = 2.0 * np.arctan2(h @ relative.e, relative.e0)
         # Euler parameters know an angle up to two turns: the one nearest to what the joint is driven to
         angle = angle + 4.0 * np.pi * np.round((driven.get(joint.name, 0.0) - angle) / (4.0 * np.pi))
         for freedom, value in (("rotation", angle), ("translation", i.turn(h) @ apart)):
