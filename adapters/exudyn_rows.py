@@ -28,27 +28,9 @@ from typing import Any
 
 import numpy as np
 
+from ..core import joints
+from ..core.analysis.equations import joint_points
 from ..core.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
-from ..core.joints import (
-    AxialJoint,
-    ConstantVelocity,
-    Cylindrical,
-    Distance,
-    Fixed,
-    Inline,
-    InPlane,
-    Joint,
-    OrientationLock,
-    ParallelAxes,
-    PerpendicularAxes,
-    Planar,
-    Revolute,
-    RevoluteSpherical,
-    Screw,
-    Spherical,
-    Translational,
-    Universal,
-)
 from ..core.joints.base import triad, unit
 from ..core.mechanism import GROUND, Mechanism
 from ..core.trajectory import Array
@@ -100,7 +82,7 @@ class Rows:
         self._add_bodies()
         for joint in mechanism.joints:
             JOINTS[type(joint)](self, joint)
-            for relation in joint.relations if isinstance(joint, AxialJoint) else ():
+            for relation in joint.relations if isinstance(joint, joints.AxialJoint) else ():
                 self._relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
         for coupler in mechanism.couplers:
             self._relate(list(zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)))
@@ -112,11 +94,14 @@ class Rows:
             if body.fixed:
                 self.bodies[body.name] = self.bodies[GROUND]
                 continue
-            # Points and axes are given in global coordinates, so every node starts parallel to the global axes.
-            node = self.mbs.AddNode(self.items.NodeRigidBodyEP(referenceCoordinates=[*body.origin, *NO_ROTATION]))
+            # Points and axes are given in global coordinates, so every node starts parallel to the global axes. It stands amid
+            # the body's joints: case files may leave the origin far away, and long arms cost digits of the differences.
+            points = [q for joint in self.mechanism.joints if body.name in joint.bodies for q in joint_points(joint, body.name)]
+            origin = np.mean(points, axis=0) if points else np.array(body.origin)
+            node = self.mbs.AddNode(self.items.NodeRigidBodyEP(referenceCoordinates=[*origin, *NO_ROTATION]))
             # Exudyn asks for a mass and inertias; kinematics does not depend on them.
             rigid = self.items.ObjectRigidBody(mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0], nodeNumber=node)
-            self.bodies[body.name] = int(self.mbs.AddObject(rigid)), np.array(body.origin)
+            self.bodies[body.name] = int(self.mbs.AddObject(rigid)), origin
             self.nodes.append(node)
 
     def marker(self, body: str, position: Sequence[float] | Array, rotation: Array | None = None) -> int:
@@ -128,7 +113,7 @@ class Rows:
             frame[:3, :3] = rotation
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=number, localHT=frame))
 
-    def markers(self, joint: Joint, position: Sequence[float] | Array, rotation: Array | None = None) -> list[int]:
+    def markers(self, joint: joints.Joint, position: Sequence[float] | Array, rotation: Array | None = None) -> list[int]:
         """The same frame on both bodies of a joint."""
         return [self.marker(body, position, rotation) for body in joint.bodies]
 
@@ -194,36 +179,36 @@ def _generic(*axes: int, along: int = 2) -> Callable[[Rows, Any], None]:
     return add
 
 
-def _spherical(rows: Rows, joint: Spherical | ConstantVelocity) -> None:
+def _spherical(rows: Rows, joint: joints.Spherical | joints.ConstantVelocity) -> None:
     rows.connect(rows.items.ObjectJointSpherical(markerNumbers=rows.markers(joint, joint.point)), range(3))
 
 
-def _revolute(rows: Rows, joint: Revolute) -> None:
+def _revolute(rows: Rows, joint: joints.Revolute) -> None:
     markers = rows.markers(joint, joint.point, _frame(joint.axis, 2))
     rows.connect(rows.items.ObjectJointRevoluteZ(markerNumbers=markers), range(5))
 
 
-def _translational(rows: Rows, joint: Translational) -> None:
+def _translational(rows: Rows, joint: joints.Translational) -> None:
     markers = rows.markers(joint, joint.point, _frame(joint.axis, 0))
     rows.connect(rows.items.ObjectJointPrismaticX(markerNumbers=markers), range(5))
 
 
-def _universal(rows: Rows, joint: Universal) -> None:
+def _universal(rows: Rows, joint: joints.Universal) -> None:
     _cross(rows, joint, joint.point, (X, Y, Z, ABOUT_Z))
 
 
-def _perpendicular_axes(rows: Rows, joint: PerpendicularAxes) -> None:
+def _perpendicular_axes(rows: Rows, joint: joints.PerpendicularAxes) -> None:
     _cross(rows, joint, (0.0, 0.0, 0.0), (ABOUT_Z,))
 
 
-def _cross(rows: Rows, joint: Universal | PerpendicularAxes, point: Sequence[float], axes: Sequence[int]) -> None:
+def _cross(rows: Rows, joint: joints.Universal | joints.PerpendicularAxes, point: Sequence[float], axes: Sequence[int]) -> None:
     # The last row is x0 . y1, the cosine of the cross: an angle the table has rounded stays as it is.
     first, second = joint.axes
     markers = [rows.marker(joint.i, point, _frame(first, 0)), rows.marker(joint.j, point, _frame(second, 1))]
     rows.connect_generic(markers, axes, keeps=unit(first) @ unit(second))
 
 
-def _constant_velocity(rows: Rows, joint: ConstantVelocity) -> None:
+def _constant_velocity(rows: Rows, joint: joints.ConstantVelocity) -> None:
     _spherical(rows, joint)
     h, k = (np.array(tuple(unit(axis))) for axis in joint.axes)
     first = _frame(joint.axes[0], 2)
@@ -238,11 +223,11 @@ def _constant_velocity(rows: Rows, joint: ConstantVelocity) -> None:
         rows.follow(rows.connect_generic(markers, (ABOUT_Z,), keeps=product), common)
 
 
-def _distance(rows: Rows, joint: Distance) -> None:
+def _distance(rows: Rows, joint: joints.Distance) -> None:
     _rod(rows, joint, joint.rod_length)
 
 
-def _revolute_spherical(rows: Rows, joint: RevoluteSpherical) -> None:
+def _revolute_spherical(rows: Rows, joint: joints.RevoluteSpherical) -> None:
     link = np.subtract(joint.points[1], joint.points[0])
     _rod(rows, joint, float(np.linalg.norm(link)))
     frame = _frame(joint.axis, 0)
@@ -250,17 +235,17 @@ def _revolute_spherical(rows: Rows, joint: RevoluteSpherical) -> None:
     rows.connect_generic(markers, (X,), keeps=float(frame[:, 0] @ link))
 
 
-def _rod(rows: Rows, joint: Distance | RevoluteSpherical, length: float) -> None:
+def _rod(rows: Rows, joint: joints.Distance | joints.RevoluteSpherical, length: float) -> None:
     markers = [rows.marker(body, point) for body, point in zip(joint.bodies, joint.points, strict=True)]
     rows.connect(rows.items.ObjectConnectorDistance(markerNumbers=markers, distance=length), range(1))
 
 
-def _fixed(rows: Rows, joint: Fixed) -> None:
+def _fixed(rows: Rows, joint: joints.Fixed) -> None:
     point = rows.bodies[joint.j][1] if joint.point is None else joint.point
     rows.connect_generic(rows.markers(joint, point), range(6))
 
 
-def _orientation_lock(rows: Rows, joint: OrientationLock) -> None:
+def _orientation_lock(rows: Rows, joint: joints.OrientationLock) -> None:
     rows.connect_generic(rows.markers(joint, (0.0, 0.0, 0.0)), (ABOUT_X, ABOUT_Y, ABOUT_Z))
 
 
@@ -274,23 +259,23 @@ def _joint_driver(rows: Rows, driver: JointDriver) -> int:
 
 
 # By exact type: a subclass may mean something else.
-JOINTS: Mapping[type[Joint], Callable[[Rows, Any], None]] = {
-    ConstantVelocity: _constant_velocity,
-    Cylindrical: _generic(X, Y, ABOUT_X, ABOUT_Y),
-    Distance: _distance,
-    Fixed: _fixed,
-    InPlane: _generic(X, along=0),
-    Inline: _generic(X, Y),
-    OrientationLock: _orientation_lock,
-    ParallelAxes: _generic(ABOUT_X, ABOUT_Y),
-    PerpendicularAxes: _perpendicular_axes,
-    Planar: _generic(Z, ABOUT_X, ABOUT_Y),
-    Revolute: _revolute,
-    RevoluteSpherical: _revolute_spherical,
-    Screw: _generic(X, Y, ABOUT_X, ABOUT_Y),  # and its relation
-    Spherical: _spherical,
-    Translational: _translational,
-    Universal: _universal,
+JOINTS: Mapping[type[joints.Joint], Callable[[Rows, Any], None]] = {
+    joints.ConstantVelocity: _constant_velocity,
+    joints.Cylindrical: _generic(X, Y, ABOUT_X, ABOUT_Y),
+    joints.Distance: _distance,
+    joints.Fixed: _fixed,
+    joints.InPlane: _generic(X, along=0),
+    joints.Inline: _generic(X, Y),
+    joints.OrientationLock: _orientation_lock,
+    joints.ParallelAxes: _generic(ABOUT_X, ABOUT_Y),
+    joints.PerpendicularAxes: _perpendicular_axes,
+    joints.Planar: _generic(Z, ABOUT_X, ABOUT_Y),
+    joints.Revolute: _revolute,
+    joints.RevoluteSpherical: _revolute_spherical,
+    joints.Screw: _generic(X, Y, ABOUT_X, ABOUT_Y),  # and its relation
+    joints.Spherical: _spherical,
+    joints.Translational: _translational,
+    joints.Universal: _universal,
 }
 DRIVERS: Mapping[type[Driver], Callable[[Rows, Any], int]] = {
     JointAngle: _joint_driver,
