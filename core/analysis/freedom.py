@@ -6,7 +6,7 @@ the solution; they stay as a diagnostic, evaluated at every sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -153,7 +153,11 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -
             f"at the design position (rank {len(kept)} of {formulation.unknowns}): a driver does not move it there (lock-up or "
             "dead centre), or repeats what a joint or another driver prescribes; drive another coordinate or shift the design"
         )
-    return Selection(found, tuple(kept), tuple(k for k in range(len(matrix)) if k not in set(kept)))
+    dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))
+    names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
+    # taken with the drivers first, and in this formulation, the rows that are left out may be others
+    found = replace(found, redundant_rows=tuple(names[k] for k in dropped))
+    return Selection(found, tuple(kept), dropped)
 
 
 def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:

@@ -66,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
     run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     run.add_argument("--markdown", type=Path, metavar="FILE", help="write the table of cases and engines as Markdown")
+    run.add_argument("--explain", action="store_true", help="print what the native engine computes for each case, and leaves out")
     run.add_argument(
         "--require",
         nargs="+",
@@ -141,6 +142,10 @@ def _run(options: argparse.Namespace) -> int:
             problems.append(f"interrupted: {len(records)} of {len(cases) * len(engines)} records were made and are kept")
             results = running.results(cases, records, started=started, tol=options.tol, command=options.command)
     delivery.deliver(results, problems, matrix=options.joints, **files)
+    if options.explain:
+        from .explain import explain
+
+        print(*(line for case in cases for line in explain(case)), sep="\n", file=sys.stderr if options.json == "-" else sys.stdout)
     problems += lacking(results, options.require)
     _complain(problems)
     if problems:
