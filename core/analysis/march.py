@@ -33,12 +33,14 @@ class March:
     """What a march found, sample by sample in the order given.
 
     Attributes:
-        lanes: the slots of every sample, shape (slots, n); NaN where it was not reached.
+        lanes: the kept slots of every sample (`Model.kept`), shape (kept, n); NaN where it was not reached.
+        last: all slots of the pose where the last direction ended.
         solved, iterations: shape (n,).
         messages: one for each direction that ended before its last sample.
     """
 
     lanes: Array
+    last: Array
     solved: NDArray[np.bool_]
     iterations: NDArray[np.int64]
     messages: tuple[str, ...]
@@ -74,10 +76,9 @@ def march(model: Model, path: Path, tol: float) -> March:
     if not found.solved.all():
         n = len(path.times)
         nothing = np.full((len(found.lanes), n), np.nan)
-        return March(
-            nothing, np.zeros(n, np.bool_), np.zeros(n, np.int64), (f"on the way to the first sample: {found.messages[0]}",)
-        )
-    first = model.moving(found.lanes[:, 0], path.drive(model.request.drivers, path.times[:1]))
+        message = f"on the way to the first sample: {found.messages[0]}"
+        return March(nothing, found.last, np.zeros(n, np.bool_), np.zeros(n, np.int64), (message,))
+    first = model.moving(found.last, path.drive(model.request.drivers, path.times[:1]))
     return _Marcher(model, path, tol, first, float(path.times[0])).run()
 
 
@@ -89,7 +90,7 @@ class _Marcher:
         self.executor = model.executor(min(LANES, len(path.times)) + 2 * HALVINGS)
         self.block = self.executor.block
         n = len(path.times)
-        self.lanes = np.full((len(self.block), n), np.nan)
+        self.lanes = np.full((len(model.kept), n), np.nan)
         self.solved, self.iterations = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
 
     def run(self) -> March:
@@ -98,7 +99,9 @@ class _Marcher:
         fronts = [_Front(side, self.anchor, self.at) for side in (outward[ahead], outward[~ahead]) if len(side)]
         while active := [front for front in fronts if len(front.ahead) and not front.message]:
             self._round(active)
-        return March(self.lanes, self.solved, self.iterations, tuple(front.message for front in fronts if front.message))
+        messages = tuple(front.message for front in fronts if front.message)
+        last = fronts[-1].anchor if fronts else self.anchor
+        return March(self.lanes, last, self.solved, self.iterations, messages)
 
     def _round(self, active: Sequence[_Front]) -> None:
         """Try the next samples of every front as lanes of one block, and move each front as far as it holds."""
@@ -115,7 +118,8 @@ class _Marcher:
             used = front.lanes.stop
             self.block[:, front.lanes] = front.anchor[:, None]
             self.block[self.slots["h"], front.lanes] = front.aims - front.at
-            self.model.drive(self.block[:, front.lanes], self.path.drive(self.model.request.drivers, front.aims))
+        aims = np.concatenate([front.aims for front in reversed(active)])  # in the order of the lanes
+        self.model.drive(self.block[:, :used], self.path.drive(self.model.request.drivers, aims))
         self.executor.attempt(used)
         iterations = self.block[self.slots["iterations"], :used]
         done = (self.block[self.slots["done"], :used] > 0.0) & self._closed()[:used]
@@ -139,7 +143,7 @@ class _Marcher:
         accepted = count if good[:count].all() else int(good[:count].argmin())
         if accepted:
             taken = front.ahead[:accepted]
-            self.lanes[:, taken] = self.block[:, first : first + accepted]
+            self.lanes[:, taken] = self.block[self.model.kept, first : first + accepted]
             self.solved[taken], self.iterations[taken] = True, iterations[first : first + accepted]
             front.ahead, front.reach, front.dividing, front.rounds = front.ahead[accepted:], 2 * accepted, False, 0
             return self._go_to(front, accepted - 1)

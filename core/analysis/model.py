@@ -39,6 +39,8 @@ class Model:
         slots: name of a scalar -> its place in a lane.
         vectors: name of a vector -> the places of its components.
         state: the places of everything that fixes the configuration.
+        kept: the places of what a sample is asked for, and of the tests it has passed.
+        place: slot -> its place among the kept ones.
     """
 
     def __init__(self, tracer: Tracer, programs: Sequence[Program]) -> None:
@@ -55,6 +57,9 @@ class Model:
         self._at_design = tracer.formulation.design
         self.state = np.array([slot for name in self._at_design for slot in self.vectors[name]])
         self.predicted = np.array([slot for name in self._at_design for slot in self.vectors[f"predicted {name}"]])
+        wanted = set(self.programs["outputs"].outputs) | {self.slots["pivot"]}
+        self.kept = np.array(sorted(wanted))
+        self.place = {slot: k for k, slot in enumerate(self.kept.tolist())}
         after = ["motion", "outputs"] if self.request.order else ["outputs"]
         self._plan = Plan(self.programs, self.slots, after, LAST_ITERATION, MAX_ITERATIONS)
         compiled = self.request.compiled and available()

@@ -99,7 +99,7 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 
 def _row(model: Model, found: March, name: str) -> Array:
     """One slot over the samples that were reached."""
-    return found.lanes[model.slots[name], found.solved]
+    return found.lanes[model.place[model.slots[name]], found.solved]
 
 
 def _details(model: Model) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def _details(model: Model) -> dict[str, Any]:
 
 def _slots(model: Model, found: March, *names: str) -> Array:
     """Vectors of the samples by slot name, side by side, shape (n, ...)."""
-    return found.lanes[[slot for name in names for slot in model.vectors[name]]].T.copy()
+    return found.lanes[[model.place[slot] for name in names for slot in model.vectors[name]]].T.copy()
 
 
 def _point(model: Model, found: March, name: str) -> PointMotion:
