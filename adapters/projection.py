@@ -79,6 +79,7 @@ class _Sample:
     x: Array
     v: Array
     rows: tuple[Array, Array, Array]
+    corrected: Array
     iterations: int
     residual: float
 
@@ -113,16 +114,16 @@ class _Walk:
             return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
         return np.asarray(np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0], dtype=np.float64)
 
-    def newton(self, c: Array) -> tuple[int, float] | None:
-        """Iterations and final residual at driver values c, or None."""
-        met = False
+    def newton(self, c: Array) -> tuple[Array, int, float] | None:
+        """Sum of all steps, iterations and final residual at driver values c, or None."""
+        met, corrected = False, np.zeros(self.unknowns)
         for iteration in range(1, MAX_ITERATIONS + 1):
             r = self.model.residual(c)
             worst = float(np.abs(r).max()) if np.isfinite(r).all() else math.inf
             if not math.isfinite(worst):
                 return None
             if met:  # one step after meeting the tolerance: quadratic convergence makes it exact to round-off
-                return (iteration - 1, worst) if worst <= self.tol else None
+                return (corrected, iteration - 1, worst) if worst <= self.tol else None
             met = worst <= self.tol
             try:
                 step = self.linear(self.model.jacobian(), -r)
@@ -131,6 +132,7 @@ class _Walk:
             if not np.isfinite(step).all():
                 return None
             self.model.move(step)
+            corrected += step
         return None
 
     def solve(self, path: Path, t: float) -> _Sample | None:
@@ -162,15 +164,19 @@ class _Walk:
             self.model.restore(at.saved)
             self.model.move(dt * at.v)
             new = self.solve(path, to)
-            if new is not None and bool(
-                continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), np.float64(dt), self.size)
-            ):
+            if new is not None and self.connected(at, new):
                 at, h = new, 2.0 * h
             else:
                 h = 0.5 * min(abs(h), abs(t - at.t)) * math.copysign(1.0, h)
                 if abs(h) < SMALLEST_STEP * step:
                     return at, False
         return at, True
+
+    def connected(self, at: _Sample, new: _Sample) -> bool:
+        """Whether the points that are watched, and all coordinates, went from one pose to the other as their rates say."""
+        dt = np.float64(new.t - at.t)
+        watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
+        return bool(watched & continuous(dt * at.v + new.corrected, new.v, at.v, dt, self.size))
 
     def start(self, path: Path) -> tuple[_Sample | None, str]:
         """The pose the samples are reached from: the design, or the first sample where the design is not on the path."""

@@ -1,0 +1,85 @@
+"""The walk that the simulators share: what it must not accept."""
+
+import numpy as np
+import pytest
+from kincheck.adapters.projection import solve_by_projection
+from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, SolveError
+from kincheck.core.harness.case import Case, Output, Sweep, Truth
+
+CASE = Case(
+    name="crank",
+    source="made up",
+    truth=Truth.CONSENSUS_ONLY,
+    mechanism=Mechanism(
+        "crank",
+        [Body("crank")],
+        [Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+        [Point("pin", "crank", (1.0, 0.0, 0.0))],
+        [JointAngle("turn", "pivot")],
+    ),
+    sweep=Sweep("turn", np.linspace(0.0, 1.0, 21)),
+    outputs=(Output("x", "pin", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "made up"),),
+)
+
+
+class Crank:
+    """A crank and a second coordinate that no output sees; it is where `hidden` says, at a driver value."""
+
+    def __init__(self, hidden):
+        self.hidden, self.q, self.c = hidden, np.zeros(2), 0.0
+
+    def reset(self):
+        self.q = np.array([0.0, self.hidden(0.0)])
+
+    def save(self):
+        return self.q.copy()
+
+    def restore(self, saved):
+        self.q = saved.copy()
+
+    def move(self, dx):
+        self.q = self.q + dx
+
+    def residual(self, c):
+        return np.array([self.q[0] - c[0], self.q[1] - self.hidden(c[0])])
+
+    def jacobian(self):
+        return np.eye(2)
+
+    def driver_columns(self):
+        return np.array([[1.0], [0.0]])
+
+    def bias(self, v):
+        return np.zeros(2)
+
+    def points(self, v, a):
+        c, s = np.cos(self.q[0]), np.sin(self.q[0])
+        return [(np.array([c, s, 0.0]), v[0] * np.array([-s, c, 0.0]), v[0] ** 2 * np.array([-c, -s, 0.0]))]
+
+
+def test_a_steady_motion_is_followed_to_its_end():
+    found = solve_by_projection(Crank(lambda c: 1.0), CASE, 1e-12)
+    assert found.solved.all()
+    assert found.message == ""
+    assert np.abs(found.points["pin"].position[:, 0] - np.cos(CASE.sweep.values)).max() <= 1e-15
+
+
+def test_a_jump_that_no_output_sees_ends_the_motion():
+    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else -1.0), CASE, 1e-12)
+    assert found.solved.tolist() == [value < 0.52 for value in CASE.sweep.values]
+    assert "jumps to another assembly; last reachable sample at turn = 0.5" in found.message
+    assert np.isnan(found.points["pin"].position[~found.solved]).all()
+
+
+def test_residuals_that_are_not_numbers_end_the_motion():
+    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else np.nan), CASE, 1e-12)
+    assert found.solved.sum() == 11
+
+
+def test_freedom_that_is_left_is_refused():
+    class Loose(Crank):
+        def jacobian(self):
+            return np.diag([1.0, 0.0])
+
+    with pytest.raises(SolveError, match=r"1 of the 2 coordinates .* left free"):
+        solve_by_projection(Loose(lambda c: 1.0), CASE, 1e-12)
