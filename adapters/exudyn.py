@@ -16,7 +16,7 @@ from ..core.errors import SolveError
 from ..core.harness.case import Case
 from ..core.trajectory import Array, Trajectory
 from .exudyn_rows import DRIVERS, JOINTS, NO_ROTATION, Rows, turned
-from .projection import solve_by_projection
+from .projection import solve_by_projection, without_counterpart
 
 # Largest change of a coordinate per step of the differences of the Jacobian [m or -]. Round-off, 1e-16 / 1e-3, and truncation,
 # (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
@@ -48,13 +48,7 @@ class Exudyn:
 
     def unsupported(self, case: Case) -> str | None:
         """None, or the joint or driver that has no counterpart here."""
-        for joint in case.mechanism.joints:
-            if type(joint) not in JOINTS:  # a subclass may mean something else
-                return f"{joint}: no joint of Exudyn is known for this type"
-        for driver in case.mechanism.drivers:
-            if type(driver) not in DRIVERS:
-                return f"driver {driver.name!r} ({driver.type}): no way to drive this in Exudyn is known"
-        return None
+        return without_counterpart(case, "Exudyn", JOINTS, DRIVERS)
 
     def build(self, case: Case) -> ExudynModel:
         """Exudyn's system of the case, at the design position."""

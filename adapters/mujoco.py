@@ -22,7 +22,7 @@ from ..core.drivers import JointAngle, JointDisplacement, JointDriver, PointCoor
 from ..core.harness.case import Case
 from ..core.trajectory import Array, Trajectory
 from .mujoco_spec import JOINTS, Closure, Sketch, coordinate
-from .projection import solve_by_projection
+from .projection import solve_by_projection, without_counterpart
 
 DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 ROWS = {"connect": 3, "weld": 6, "tendon": 1, "joint": 1}
@@ -54,14 +54,7 @@ class MuJoCo:
 
     def unsupported(self, case: Case) -> str | None:
         """None, or the joint or driver that has no counterpart here."""
-        for joint in case.mechanism.joints:
-            if type(joint) not in JOINTS:
-                return f"{joint} has no counterpart in MuJoCo here; known: {', '.join(each.type for each in JOINTS)}"
-        for driver in case.mechanism.drivers:
-            if type(driver) not in DRIVERS:
-                known = ", ".join(each.type for each in DRIVERS)
-                return f"driver {driver.name!r} ({driver.type}) has no counterpart in MuJoCo here; known: {known}"
-        return None
+        return without_counterpart(case, "MuJoCo", JOINTS, DRIVERS)
 
     def build(self, case: Case) -> _Model:
         """The compiled model and its rows."""

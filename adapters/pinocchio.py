@@ -36,7 +36,7 @@ from ..core.topology import spanning_tree
 from ..core.trajectory import Array, Trajectory
 from .closures import CLOSURES, ends_of, twistless
 from .conditions import Condition
-from .projection import solve_by_projection
+from .projection import solve_by_projection, without_counterpart
 
 
 class Pinocchio:
@@ -62,15 +62,7 @@ class Pinocchio:
 
     def unsupported(self, case: Case) -> str | None:
         """None, or which joint or driver has no counterpart here."""
-        for joint in case.mechanism.joints:
-            if type(joint) not in CLOSURES:
-                known = ", ".join(each.type for each in CLOSURES)
-                return f"{joint}: the pinocchio adapter cannot express this type; it knows {known}"
-        for driver in case.mechanism.drivers:
-            if type(driver) not in (PointCoordinate, JointAngle, JointDisplacement):
-                who = f"driver {driver.name!r} ({driver.type})"
-                return f"{who}: the pinocchio adapter drives point coordinates, joint angles and joint displacements only"
-        return None
+        return without_counterpart(case, "Pinocchio", CLOSURES, (PointCoordinate, JointAngle, JointDisplacement))
 
     def build(self, case: Case) -> _Model:
         """Tree, frames and conditions of the case, at the design position."""

@@ -7,7 +7,7 @@ finiteness, never by a simulator's own word; a step that does not converge, or c
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.analysis.continuity import continuous
+from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
+from ..core.joints import Joint
 from ..core.motions import Path
 from ..core.trajectory import Array, PointMotion, Trajectory
 
@@ -82,6 +84,17 @@ class _Sample:
     corrected: Array
     iterations: int
     residual: float
+
+
+def without_counterpart(
+    case: Case, simulator: str, joints: Collection[type[Joint]], drivers: Collection[type[Driver]]
+) -> str | None:
+    """None, or the joint or driver of the case whose exact type is not among these; a subclass may mean something else."""
+    for what, known in (*((joint, joints) for joint in case.mechanism.joints), *((d, drivers) for d in case.mechanism.drivers)):
+        if type(what) not in known:
+            who = str(what) if isinstance(what, Joint) else f"driver {what.name!r} ({what.type})"
+            return f"{who} has no counterpart in {simulator} here; known: {', '.join(each.type for each in known)}"
+    return None
 
 
 def solve_by_projection(model: ProjectionModel, case: Case, tol: float, details: Mapping[str, Any] | None = None) -> Trajectory:

@@ -11,11 +11,7 @@ from .joints.base import Joint
 
 @dataclass(frozen=True)
 class Driver:
-    """Base of the drivers.
-
-    Attributes:
-        relative: the driver's value is measured from the design position (else it is the absolute value).
-    """
+    """Base of the drivers."""
 
     type: ClassVar[str]
     name: str

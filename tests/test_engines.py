@@ -11,6 +11,8 @@ from kincheck.core import Distance
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
+from .mechanisms import placed
+
 # What each engine reaches on the strut, per unit stroke rate [m, m/s, m/s^2]: round-off of metre-sized coordinates through its own
 # arithmetic; Exudyn's accelerations come from differences of its Jacobian.
 STRUT = {
@@ -80,3 +82,26 @@ def test_a_stroke_out_of_reach_gives_the_last_sample_and_no_numbers_beyond(name)
         for values in (series.position, series.velocity, series.acceleration):
             assert all(value is not None for value in values[:30])
             assert all(value is None for value in values[30:])
+
+
+@pytest.mark.parametrize("name", adapters.ENGINES)
+def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
+    """Bodies without an origin of their own, as case files leave them: no engine may hang them on arms of a hundred metres."""
+    case = cases.load("mcpherson_strut")
+    turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    far = np.array([100.0, -50.0, 20.0])
+    moved = placed(case.mechanism, lambda q: tuple(turn @ np.array(q) + far), lambda a: tuple(turn @ np.array(a)))
+    (stroke,) = moved.drivers
+    moved = replace(
+        moved,
+        bodies=[replace(body, origin=(0.0, 0.0, 0.0)) for body in moved.bodies],
+        drivers=[replace(stroke, direction=tuple(turn @ np.array(stroke.direction)))],
+    )
+    outputs = tuple(replace(output, direction=tuple(turn @ np.array(output.direction))) for output in case.outputs)
+    found = record(replace(case, mechanism=moved, outputs=outputs), name)
+    # coordinates of a hundred metres are rounded at 1e-14 m; the limits leave ten times that, and Exudyn's its differences
+    limits = (5e-13, 5e-12, 1e-9)
+    for deviations in found.errors.values():
+        worst = [deviation.max_abs for _, deviation in deviations.items()]
+        assert all(error <= limit for error, limit in zip(worst, limits, strict=True)), worst
+    assert found.outcome is Outcome.PASS

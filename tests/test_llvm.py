@@ -84,6 +84,7 @@ def test_models_give_numpys_results(style):
             found.append(sweep(compile_model(mechanism, request), path, 1e-12))
         for name in found[0].points:
             a, b = (each.points[name] for each in found)
+            # ten units in the last place of one, each derivative losing the mechanisms' condition (about ten) once more
             assert np.abs(a.position - b.position).max() <= 2e-15
             assert np.abs(a.velocity - b.velocity).max() <= 2e-14
             assert np.abs(a.acceleration - b.acceleration).max() <= 2e-13

@@ -44,7 +44,8 @@ def solve(
         order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for is not computed.
         tol: largest accepted constraint residual, relative to the mechanism's size.
         style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes), "conventional" (full
-            products) or "mixed" (joint coordinates as further unknowns); the solutions are the same.
+            products), "mixed" (joint coordinates as further unknowns) or "relative" (joint coordinates of a tree as the only
+            ones); the solutions are the same.
         motions: of further drivers, over the time in which the swept one goes from zero at the rate; the others hold.
 
     Returns:

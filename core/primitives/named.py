@@ -9,6 +9,9 @@ with Q the rotation of theta about h as Euler parameters [cos theta/2, h sin the
            rows  = [ -I | skew(S_i + d h_i) | I | -skew(S_j) ]          nu = h_i d_t
            gamma = w_i x (w_i x (S_i + d h_i)) - w_j x (w_j x S_j) + 2 d_t (w_i x h_i) + h_i d_tt
 
+In section 4 TraX carries body j's arm by body i and theta, so that body j's rotation has no column; here body j carries it, as in
+the spherical rows, which are the same where RotX holds and need no theta.
+
 RotX has no spurious zero and no counter of turns; its rows are exact where phi = 0, and lead from any misalignment to it.
 """
 

@@ -86,8 +86,9 @@ def _write(entry: Path, code: bytes) -> None:
     """Keep an object; a place that cannot be written only costs the next process a compilation."""
     try:
         entry.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=entry.parent, delete=False) as file:
-            file.write(hashlib.sha256(code).digest() + code)
-        Path(file.name).replace(entry)  # whole or not at all, whoever else is writing it
+        with tempfile.TemporaryDirectory(dir=entry.parent) as folder:
+            whole = Path(folder) / entry.name
+            whole.write_bytes(hashlib.sha256(code).digest() + code)
+            whole.replace(entry)  # whole or not at all, whoever else is writing it
     except OSError:
         return

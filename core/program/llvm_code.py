@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from .trace import Node, Program
 
-# Taylor to this order is below 1e-17 at a quarter of a right angle's double, the largest argument after reduction.
-SINE_TERMS, COSINE_TERMS = 8, 9
+# The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after reduction.
+SINE_TERMS, COSINE_TERMS = 9, 9
 # pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
 HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 BINARY = {"+": "fadd contract", "-": "fsub contract", "*": "fmul contract", "/": "fdiv contract"}
