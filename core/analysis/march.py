@@ -18,7 +18,7 @@ from ..trajectory import Array
 from .continuity import LARGEST_DEVIATION, NEGLIGIBLE
 from .model import Model
 
-# More lanes than this leave the processor's cache, fewer leave numpy idle.
+# Samples tried at once: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once.
 HALVINGS = 16
