@@ -13,6 +13,7 @@ import pytest
 from kincheck.core.errors import CaseError
 from kincheck.core.harness import cli
 from kincheck.core.harness.case import Truth
+from kincheck.core.harness.console import how_to_install
 from kincheck.core.harness.record import from_json
 
 from .fakes import Fake, crank, off, partial, raising
@@ -163,8 +164,8 @@ def test_a_required_engine_is_run_even_if_others_were_asked_for(kincheck_main, c
 
 
 def test_how_to_install_comes_from_the_metadata():
-    assert cli.how_to_install("pinocchio").startswith("pip install 'pin>=")
-    assert cli.how_to_install("mujoco").startswith("pip install 'mujoco>=")
+    assert how_to_install("pinocchio").startswith("pip install 'pin>=")
+    assert how_to_install("mujoco").startswith("pip install 'mujoco>=")
 
 
 def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):

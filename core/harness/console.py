@@ -6,9 +6,15 @@ import importlib.metadata
 import re
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from .record import Outcome, Record, Results
+
+
+def complain(lines: Iterable[str]) -> None:
+    """Say what is wrong on standard error, a line each, as the tool."""
+    for line in lines:
+        print(f"kincheck: {line}", file=sys.stderr)
 
 
 def progress(records: list[Record]) -> Callable[[Record, int, int], None]:

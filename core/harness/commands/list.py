@@ -1,0 +1,38 @@
+"""kincheck list: what there is, cases and engines, or the types a case file can name."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..console import how_to_install
+from .house import House, Status
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    listing: argparse.ArgumentParser = commands.add_parser("list", help="list cases and engines", description=_list.__doc__)
+    listing.set_defaults(do=_list)
+    listing.add_argument("--joints", action="store_true", help="list the types a case file can name: joints, drivers, motions")
+
+
+def _list(options: argparse.Namespace, house: House) -> int:
+    """List the built-in cases with their truth and source, and the engines with their versions; or the types of joints."""
+    from ..catalogue import catalogue
+    from ..circumstances import truth_of
+
+    if options.joints:
+        print(*catalogue(), sep="\n")
+        return Status.WITHIN
+    print("cases:")
+    names = house.cases()
+    for name in names:
+        case = house.case(name)
+        print(f"  {name:{max(map(len, names))}}  {str(truth_of(case)).replace('_', ' '):16}  {case.source}")
+    print("engines:")
+    for name in house.engines:
+        engine = house.engine(name)
+        version = engine.version()
+        state = f"not installed: {how_to_install(name)}" if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
+        print(f"  {name:{max(map(len, house.engines))}}  {state}")
+    return Status.WITHIN
