@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..core.analysis.model import LAST_ITERATION, Model, compile_model
+from ..core.analysis.march import Route
+from ..core.analysis.model import LAST_ITERATION, compile_model
 from ..core.analysis.programs import Request
-from ..core.analysis.solve import sweep
+from ..core.analysis.solve import follow
 from ..core.harness.case import Case
 from ..core.program.compiled import available
 from ..core.trajectory import Trajectory
@@ -42,10 +43,11 @@ class Native:
         """Never: a joint is supported by being composed of primitives."""
         return None
 
-    def build(self, case: Case) -> Model:
-        """Select the rows and trace the programs for the points that the outputs read."""
-        return compile_model(case.mechanism, Request(tuple(case.sweep.path.motions), case.points))
+    def build(self, case: Case) -> Route:
+        """Select the rows, trace the programs for the points that the outputs read, and lay out the samples."""
+        path = case.sweep.path
+        return Route(compile_model(case.mechanism, Request(tuple(path.motions), case.points)), path)
 
-    def solve(self, model: Model, case: Case, tol: float) -> Trajectory:
+    def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""
-        return sweep(model, case.sweep.path, tol)
+        return follow(model, tol)

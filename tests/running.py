@@ -7,8 +7,8 @@ from kincheck.core.program import NumpyExecutor, Plan
 def numpy_executor(programs, block):
     """The programs bound to a copy of the block, shape (slots, lanes)."""
     slots = {str(k): k for k in range(len(block))}
-    executor = NumpyExecutor(Plan({each.name: each for each in programs}, slots, (), 0.0, 0), block.shape[1])
-    executor.block[:] = block
+    executor = NumpyExecutor(Plan({each.name: each for each in programs}, slots), block.shape[1])
+    executor.put(range(len(block)), block)
     return executor
 
 
@@ -16,4 +16,4 @@ def run_on(programs, block, name="p"):
     """Run one of the programs on the block in place."""
     executor = numpy_executor(programs, np.asarray(block, dtype=float))
     executor.run(name)
-    block[:] = executor.block
+    block[:] = executor.get(range(len(block)))

@@ -253,7 +253,7 @@ def test_programs_share_a_block():
     executor = numpy_executor([program("sum", tape, {0: x + y}), program("product", tape, {1: x * y})], block)
     for name in ("sum", "product", "sum"):
         executor.run(name)
-    assert executor.block[:, 0].tolist() == [9.0, 6.0]
+    assert executor.get([0, 1])[:, 0].tolist() == [9.0, 6.0]
 
 
 def test_lanes_choose_for_themselves():

@@ -71,22 +71,24 @@ def assemble(
     programs = {each.name: each for each in (tracer.newton(longest_turn=LONGEST_TURN), tracer.outputs())}
     slots, vectors = tracer.layout.slots, tracer.layout.vectors
     n = len(next(iter(estimates.values()))[0])
-    executor = NumpyExecutor(Plan(programs, slots, (), tol, MAX_ITERATIONS), n)
-    block = executor.block
+    executor = NumpyExecutor(Plan(programs, slots), n)
     for name, value in _state(tracer, estimates, values or {}).items():
-        block[vectors[name]] = value
+        executor.put(vectors[name], value)
     for name, value in (values or {}).items():
         angle = mechanism.driver(name).type == "joint_angle"
         c = value if angle else value / tracer.frame.unit
-        block[vectors[f"drive {name}"]] = np.array([[c], [0.0], [0.0], [np.cos(0.5 * value)], [np.sin(0.5 * value)]])
+        drive = np.array([[c], [0.0], [0.0], [np.cos(0.5 * value)], [np.sin(0.5 * value)]])
+        executor.put(vectors[f"drive {name}"], drive)
     iterations, done = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     for _ in range(MAX_ITERATIONS):
         executor.run("newton")
         iterations += ~done
-        done |= block[slots["residual"]] < tol
-        if (done | ~np.isfinite(block[slots["residual"]])).all():
+        (residual,) = executor.get([slots["residual"]])
+        done |= residual < tol
+        if (done | ~np.isfinite(residual)).all():
             break
     executor.run("outputs")
+    block = executor.get(range(len(slots)))
     converged = done & (block[slots["closure"]] <= tol) & (block[slots["branch"]] > 0.0)
     found = np.where(converged, block, np.nan)
     bodies = {name: BodyMotion(found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None) for name in moving}

@@ -1,28 +1,29 @@
-"""March the lanes of a model outwards from the design position.
+"""March from the design position outwards, along the samples of a path on both sides of it.
 
-Many samples are solved at once as lanes, predicted from the last accepted pose; those are accepted that connect to it without a
-gap, and the march goes on from the last of them. A step that fails is divided, so a coarse grid costs steps; where no part of a
-step succeeds the motion ends, and a message says where and why.
+The executor follows each side as far as sample after sample continues the motion. A step that fails is divided, so a coarse grid
+costs steps; where no part of a step succeeds the motion ends, and a message says where and why.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..motions import Path
+from ..program import MARGIN
 from ..trajectory import Array
-from .continuity import LARGEST_DEVIATION, NEGLIGIBLE
 from .model import Model
+from .programs import FROM, TIME
 
-# Samples tried at once: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
+# Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once.
 HALVINGS = 16
-# A front that needs more rounds than this without reaching a sample makes no headway.
+# A side that needs more rounds than this without reaching a sample makes no headway.
 MAX_ROUNDS = 200
 # Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.
 CONSISTENT = 1e-9
@@ -33,167 +34,190 @@ class March:
     """What a march found, sample by sample in the order given.
 
     Attributes:
-        lanes: the kept slots of every sample (`Model.kept`), shape (kept, n); NaN where it was not reached.
-        last: all slots of the pose where the last direction ended.
-        solved, iterations: shape (n,).
-        messages: one for each direction that ended before its last sample.
+        kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not reached.
+        last: all slots of where the last side ended.
+        solved: shape (n,).
+        messages: one for each side that ended before its last sample.
     """
 
-    lanes: Array
+    kept: Array
     last: Array
     solved: NDArray[np.bool_]
-    iterations: NDArray[np.int64]
     messages: tuple[str, ...]
 
 
-@dataclass
-class _Front:
-    """One direction of the march: the samples still ahead, and the pose it stands at."""
+@dataclass(frozen=True, eq=False)
+class Side:
+    """The samples on one side of where a march starts, outwards. first, step: their columns among all samples by time."""
 
-    ahead: NDArray[np.intp]
-    anchor: Array
-    at: float
-    reach: int = LANES
-    dividing: bool = False
-    rounds: int = 0
-    message: str = ""
-    lanes: slice = field(default_factory=lambda: slice(0))
-    aims: Array = field(default_factory=lambda: np.empty(0))
+    times: Array
+    samples: Array
+    first: int
+    step: int
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A path made ready for a model: everything about the samples that does not depend on the motion."""
+
+    model: Model
+    path: Path
+
+    @cached_property
+    def from_design(self) -> bool:
+        """Whether it starts at the design position, at time zero."""
+        return self.path.from_design
+
+    @cached_property
+    def start(self) -> float:
+        """The time it starts at: zero, where the mechanism is at its design position, or else the first sample."""
+        return 0.0 if self.from_design else float(self.path.times[0])
+
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """The samples by time."""
+        return np.argsort(self.path.times, kind="stable")
+
+    @cached_property
+    def back(self) -> NDArray[np.intp] | slice:
+        """From the samples by time to the order wanted."""
+        n = len(self.path.times)
+        for simple in (slice(None), slice(None, None, -1)):
+            if (self.order == np.arange(n)[simple]).all():
+                return simple
+        return np.argsort(self.order, kind="stable")
+
+    @cached_property
+    def origin(self) -> Array:
+        """What is given at the start, shape (sampled,)."""
+        return self.sampled(np.array([self.start]))[:, 0]
+
+    @cached_property
+    def departure(self) -> Array:
+        """All slots of a lane that stands at the design position and moves as the start says."""
+        return self.model.moving(self.model.design, self.origin)
+
+    @cached_property
+    def sides(self) -> tuple[Side, ...]:
+        """The side after the start and the side before it, as far as there are samples."""
+        times = self.path.times[self.order]
+        n, below = len(times), int(np.searchsorted(times, self.start, side="left"))
+        pad = self.model.executor(self.lanes).margin
+        found: list[Side] = []
+        for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
+            if len(columns):
+                ahead = times[columns]
+                samples = self.sampled(ahead)
+                padded = np.concatenate([samples, np.repeat(samples[:, -1:], pad, axis=1)], axis=1)
+                found.append(Side(ahead, padded, int(columns[0]), step))
+        return tuple(found)
 
     @property
-    def samples(self) -> int:
-        """How many of its lanes are samples; the others are parts of the step to the first of them."""
-        return len(self.aims) - HALVINGS * self.dividing
+    def lanes(self) -> int:
+        """How many samples are tried at once."""
+        return min(LANES, max(1, len(self.path.times)))
+
+    def sampled(self, times: Array) -> Array:
+        """What is given at the times, shape (sampled, n)."""
+        return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
 
 
-def march(model: Model, path: Path, tol: float) -> March:
+def march(route: Route, tol: float) -> March:
     """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance."""
-    if path.from_design:
-        return _Marcher(model, path, tol, model.design(path.drive(model.request.drivers, np.zeros(1))), 0.0).run()
-    way = path.lead_in()
-    lead_in = _Marcher(model, way, tol, model.design(way.drive(model.request.drivers, np.zeros(1))), 0.0)
-    found = lead_in.run()
+    model, path = route.model, route.path
+    tolerances = {"tolerance": tol, "consistent": max(CONSISTENT, tol)}
+    if route.from_design:
+        return _Marcher(route, route.departure, tolerances).run()
+    way = Route(model, path.lead_in())
+    found = _Marcher(way, way.departure, tolerances).run()
     if not found.solved.all():
         n = len(path.times)
-        nothing = np.full((len(found.lanes), n), np.nan)
         message = f"on the way to the first sample: {found.messages[0]}"
-        return March(nothing, found.last, np.zeros(n, np.bool_), np.zeros(n, np.int64), (message,))
-    first = model.moving(found.last, path.drive(model.request.drivers, path.times[:1]))
-    return _Marcher(model, path, tol, first, float(path.times[0])).run()
+        return March(np.full((len(found.kept), n), np.nan), found.last, np.zeros(n, np.bool_), (message,))
+    arrived = found.last.copy()
+    for name in model.state:  # what the lanes were predicted from is where they stand
+        arrived[model.vectors[name]] = arrived[model.vectors[FROM + name]]
+    return _Marcher(route, model.moving(arrived, route.origin), tolerances).run()
 
 
 class _Marcher:
-    def __init__(self, model: Model, path: Path, tol: float, anchor: Array, at: float) -> None:
-        self.model, self.path, self.values, self.tol = model, path, path.times, tol
-        self.anchor, self.at = anchor, at
-        self.slots = model.slots
-        self.executor = model.executor(min(LANES, len(path.times)) + 2 * HALVINGS)
-        self.block = self.executor.block
-        n = len(path.times)
-        self.lanes = np.full((len(model.kept), n), np.nan)
-        self.solved, self.iterations = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
+    def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float]) -> None:
+        self.route, self.model, self.slots = route, route.model, route.model.slots
+        self.start = start.copy()
+        for name, value in tolerances.items():
+            self.start[self.slots[name]] = value
+        self.executor = self.model.executor(route.lanes)
+        self.n = len(route.path.times)
+        # `follow` may write beyond the samples on either side
+        self.whole = np.empty((self.model.kept, self.n + 2 * self.executor.margin))
+        self.kept = self.whole[:, self.executor.margin : self.executor.margin + self.n]
+        self.solved = np.ones(self.n, dtype=np.bool_)
 
     def run(self) -> March:
-        outward = np.argsort(np.abs(self.values - self.at), kind="stable")
-        ahead = self.values[outward] >= self.at
-        fronts = [_Front(side, self.anchor, self.at) for side in (outward[ahead], outward[~ahead]) if len(side)]
-        while active := [front for front in fronts if len(front.ahead) and not front.message]:
-            self._round(active)
-        messages = tuple(front.message for front in fronts if front.message)
-        last = fronts[-1].anchor if fronts else self.anchor
-        return March(self.lanes, last, self.solved, self.iterations, messages)
+        messages: list[str] = []
+        last = self.start
+        for side in self.route.sides:
+            last = self.start.copy()
+            message = self._side(side, last)
+            if message:
+                messages.append(message)
+        back = self.route.back
+        return March(self.kept[:, back], last, self.solved[back], tuple(messages))
 
-    def _round(self, active: Sequence[_Front]) -> None:
-        """Try the next samples of every front as lanes of one block, and move each front as far as it holds."""
-        used = 0
-        for waiting, front in zip(range(len(active), 0, -1), reversed(active), strict=True):
-            # what is left, less the parts that each front still to be laid out may need
-            free = self.block.shape[1] - used - HALVINGS * waiting
-            share = free // waiting
-            front.aims = self.values[front.ahead[: min(front.reach, share)]]
-            if front.dividing:
-                parts = front.at + (front.aims[0] - front.at) * 0.5 ** np.arange(1, HALVINGS + 1)
-                front.aims = np.concatenate([front.aims, parts])
-            front.lanes = slice(used, used + len(front.aims))
-            used = front.lanes.stop
-            self.block[:, front.lanes] = front.anchor[:, None]
-            self.block[self.slots["h"], front.lanes] = front.aims - front.at
-        aims = np.concatenate([front.aims for front in reversed(active)])  # in the order of the lanes
-        self.model.drive(self.block[:, :used], self.path.drive(self.model.request.drivers, aims))
-        self.executor.attempt(used)
-        iterations = self.block[self.slots["iterations"], :used]
-        done = (self.block[self.slots["done"], :used] > 0.0) & self._closed()[:used]
-        drift = self.block[self.model.state, :used] - self.block[self.model.predicted, :used]
-        moves = [self._accept(front, done, drift, iterations) for front in active]
-        if self.model.request.order < 2 and any(len(front.ahead) for front in active):
-            self.executor.run("tangent")
-        for front, lane in zip(active, moves, strict=True):
-            if lane is not None:
-                front.anchor = self.block[:, lane].copy()
+    def _side(self, side: Side, anchor: Array) -> str:
+        """Follow one side to its end, the anchor going along; empty, or why it ends before."""
+        n, at, rounds = len(side.times), 0, 0
+        while True:
+            first = side.first + side.step * at + self.executor.margin
+            went = self.executor.follow(anchor, side.samples[:, at:], self.whole, first, side.step)
+            at += went
+            if at == n:
+                return ""
+            rounds = 0 if went else rounds + 1
+            failed = self._divide(anchor, float(side.times[at]))
+            if failed or rounds > MAX_ROUNDS:
+                columns = side.first + side.step * np.arange(at, n)
+                self.kept[:, columns], self.solved[columns] = np.nan, False
+                return self._end(side, at, anchor, failed or "the parts of the step get smaller and smaller")
 
-    def _closed(self) -> NDArray[np.bool_]:
-        """Lanes that close within the tolerance, on the intended branch, and agree with the redundant rows."""
-        closure, branch, leftover = (self.block[self.slots[name]] for name in ("closure", "branch", "leftover"))
-        return (closure <= self.tol) & (branch > 0.0) & (leftover <= max(CONSISTENT, self.tol))
+    def _divide(self, anchor: Array, aim: float) -> str:
+        """Go a part of the step to a sample that could not be reached; empty, or why there is none."""
+        here = float(anchor[self.slots[FROM + TIME]])
+        times = here + (aim - here) * 0.5 ** np.arange(1, HALVINGS + 1)
+        parts = self.model.executor(HALVINGS)
+        every = range(len(self.slots))
+        parts.put(every, anchor[:, None])
+        parts.put(self.model.sampled, self.route.sampled(times))
+        parts.attempt()
+        lanes = parts.get(every)
+        good = np.flatnonzero(lanes[self.slots[MARGIN]] > 0.0)
+        if not len(good):
+            return self._reason(lanes[:, -1])
+        anchor[:] = self.model.moving(lanes[:, good[0]], lanes[self.model.sampled, good[0]])
+        return ""
 
-    def _accept(self, front: _Front, done: NDArray[np.bool_], drift: Array, iterations: Array) -> int | None:
-        """Keep the samples that connect to the front; the lane to go on from, or None where the front stays or ends."""
-        first, count = front.lanes.start, front.samples
-        good = done[front.lanes] & self._connected(front, drift[:, front.lanes])
-        accepted = count if good[:count].all() else int(good[:count].argmin())
-        if accepted:
-            taken = front.ahead[:accepted]
-            self.lanes[:, taken] = self.block[self.model.kept, first : first + accepted]
-            self.solved[taken], self.iterations[taken] = True, iterations[first : first + accepted]
-            front.ahead, front.reach, front.dividing, front.rounds = front.ahead[accepted:], 2 * accepted, False, 0
-            return self._go_to(front, accepted - 1)
-        front.rounds += 1
-        parts = np.flatnonzero(good[count:])
-        if front.dividing and len(parts) and front.rounds < MAX_ROUNDS:
-            return self._go_to(front, count + int(parts[0]))
-        if front.dividing:
-            front.message = self._end(front)
-        # few samples while the way to the first of them is sought
-        front.dividing, front.reach = True, 4
-        return None
-
-    def _connected(self, front: _Front, drift: Array) -> NDArray[np.bool_]:
-        """Whether each lane continues its neighbour: the correction changes by much less than the pose does.
-
-        The neighbour of a sample is the one before it, that of the first one and of the parts of its step is the front itself.
-        """
-        x, here = self.block[self.model.state, front.lanes], front.anchor[self.model.state][:, None]
-        before = np.repeat(here, x.shape[1], axis=1)
-        drift_before = np.zeros_like(drift)
-        before[:, 1 : front.samples], drift_before[:, 1 : front.samples] = (a[:, : front.samples - 1] for a in (x, drift))
-        gap, moved = np.abs(drift - drift_before).max(axis=0), np.abs(x - before).max(axis=0)
-        return gap <= LARGEST_DEVIATION * moved + NEGLIGIBLE
-
-    def _go_to(self, front: _Front, k: int) -> int:
-        front.at = float(front.aims[k])
-        return front.lanes.start + k
-
-    def _end(self, front: _Front) -> str:
-        wanted, where = float(front.aims[0]), self.path.where
-        side = self.solved & ((self.values >= self.at) == (wanted >= self.at))
-        farthest = self.values[side][np.abs(self.values[side] - self.at).argmax()] if side.any() else None
-        last = f"last reachable sample at {where(farthest)}" if farthest is not None else "no sample reached on this side"
+    def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
+        where = self.route.path.where
+        here, wanted = float(anchor[self.slots[FROM + TIME]]), float(side.times[at])
+        last = f"last reachable sample at {where(float(side.times[at - 1]))}" if at else "no sample reached on this side"
         return (
-            f"cannot be followed beyond {where(front.at)} (wanted {where(wanted)}): {self._reason(front.lanes.stop - 1)}; smallest "
-            f"pivot there {front.anchor[self.slots['pivot']]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or "
+            f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest "
+            f"pivot there {anchor[self.slots[FROM + 'pivot']]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or "
             "drive another coordinate"
         )
 
-    def _reason(self, lane: int) -> str:
+    def _reason(self, lane: Array) -> str:
         """Why a lane was not accepted, with the number found."""
-        closure, branch, leftover = (self.block[self.slots[name], lane] for name in ("closure", "branch", "leftover"))
+        closure, branch, leftover, tol, consistent = (
+            lane[self.slots[name]] for name in ("closure", "branch", "leftover", "tolerance", "consistent")
+        )
         if not np.isfinite(closure):
             return "Newton diverges to numbers that are not finite"
         if not branch > 0.0:
             return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
-        if closure <= self.tol and leftover > max(CONSISTENT, self.tol):
+        if closure <= tol and leftover > consistent:
             names = ", ".join(self.model.selection.account.redundant_rows)
             return f"the redundant rows ({names}) contradict the others by {leftover:.3g}"
-        if closure > self.tol:
+        if closure > tol:
             return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
         return "Newton jumps to another assembly"

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
+from ..program import ITERATIONS, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
 from ..program.compiled import available
 from ..trajectory import Array
-from .programs import Request, Tracer
+from .programs import TIME, Request, Tracer
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
 LAST_ITERATION = 1e-9
 MAX_ITERATIONS = 12
+TESTS = ("closure", "leftover", "branch", "pivot", ITERATIONS)
+"""Scalars that are kept of every sample, after the motions."""
 
 
 def compile_model(mechanism: Mechanism, request: Request) -> Model:
@@ -25,22 +29,26 @@ def compile_model(mechanism: Mechanism, request: Request) -> Model:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     tracer = Tracer(mechanism, request)
-    # a march needs v and a where it goes on; the outputs need them only up to the order asked for
-    programs = [tracer.newton(), tracer.predict(), tracer.motion("tangent", 2)]
+    programs = [tracer.newton(), tracer.predict()]
     if request.order:
         programs.append(tracer.motion("motion", request.order))
-    return Model(tracer, [*programs, tracer.outputs()])
+    if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
+        programs.append(tracer.motion("tangent", 2))
+    programs += [tracer.outputs(), tracer.test("alone", neighbours=False), tracer.test("joined", neighbours=True)]
+    return Model(tracer, programs)
 
 
 class Model:
-    """The programs of a mechanism and the blocks of lanes they run on.
+    """The programs of a mechanism and the lanes they run on.
 
     Attributes:
         slots: name of a scalar -> its place in a lane.
         vectors: name of a vector -> the places of its components.
-        state: the places of everything that fixes the configuration.
-        kept: the places of what a sample is asked for, and of the tests it has passed.
-        place: slot -> its place among the kept ones.
+        state: name of a vector of the state -> its value at design.
+        sampled: the places of what is given at every sample: the time, and five numbers of each moving driver.
+        design: all slots of a lane that stands at the design position.
+        rows: name of a motion or test -> its rows among what is kept of a sample.
+        kept: how many rows there are.
     """
 
     def __init__(self, tracer: Tracer, programs: Sequence[Program]) -> None:
@@ -51,21 +59,73 @@ class Model:
             tracer.frame,
         )
         self.programs: Mapping[str, Program] = {program.name: program for program in programs}
-        for name in ("iterations", "done"):
-            tracer.layout.scalar(name)
+        carried = tracer.carried
+        tracer.layout.scalar(ITERATIONS)
         self.slots, self.vectors = tracer.layout.slots, tracer.layout.vectors
-        self._at_design = tracer.formulation.design
-        self.state = np.array([slot for name in self._at_design for slot in self.vectors[name]])
-        self.predicted = np.array([slot for name in self._at_design for slot in self.vectors[f"predicted {name}"]])
-        wanted = set(self.programs["outputs"].outputs) | {self.slots["pivot"]}
-        self.kept = np.array(sorted(wanted))
-        self.place = {slot: k for k, slot in enumerate(self.kept.tolist())}
-        after = ["motion", "outputs"] if self.request.order else ["outputs"]
-        self._plan = Plan(self.programs, self.slots, after, LAST_ITERATION, MAX_ITERATIONS)
+        self.state = tracer.formulation.design
+        self.sampled = [self.slots[TIME]]
+        self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
+        self._tangent = "motion" if self.request.order == 2 else "tangent"
+        kept = [slot for name in self._wanted() for slot in self.vectors[name]]
+        self.rows = self._rows()
+        self.kept = len(kept) + len(TESTS)
+        self._plan = Plan(
+            self.programs,
+            self.slots,
+            after=("motion", "outputs") if self.request.order else ("outputs",),
+            onward=() if self.request.order == 2 else ("tangent",),
+            sampled=self.sampled,
+            carried=carried,
+            kept=[*kept, *(self.slots[name] for name in TESTS)],
+            tolerance=LAST_ITERATION,
+            most=MAX_ITERATIONS,
+        )
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self._plan) if compiled else None
         self._executors: dict[int, Executor] = {}
-        self._design = self._solve_design()
+        self.design = self._solve_design()
+
+    def _wanted(self) -> list[str]:
+        """Names of the vectors asked for, those of one motion side by side."""
+        order = self.request.order + 1
+        found = [f"{label} {name}" for name in self.request.points for label in ("position", "velocity", "acceleration")[:order]]
+        labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
+        return found + [f"{label} {name}" for name in self.request.bodies for group in labels for label in group]
+
+    def _rows(self) -> dict[str, slice]:
+        rows: dict[str, slice] = {}
+        row = 0
+        for name in self._wanted():
+            rows[name] = slice(row, row := row + len(self.vectors[name]))
+        for name in TESTS:
+            rows[name] = slice(row, row := row + 1)
+        return rows
+
+    @property
+    def orders(self) -> int:
+        """How many of position, velocity and acceleration are wanted."""
+        return self.request.order + 1
+
+    @cached_property
+    def details(self) -> dict[str, Any]:
+        """What the record of every solution says of the model."""
+        account = self.selection.account
+        return {
+            "rank": account.rank,
+            "dof": account.dof,
+            "dof_account": {
+                "bodies": account.bodies,
+                "coordinates": account.coordinates,
+                "equations": account.equations,
+                "paper": account.counted,
+                "moving_coordinates": account.moving_coordinates,
+                "rows": account.rows,
+                "rank": account.rank,
+                "dof": account.dof,
+                "redundant_rows": list(account.redundant_rows),
+            },
+            "program": self.sizes,
+        }
 
     @property
     def sizes(self) -> dict[str, dict[str, int]]:
@@ -73,51 +133,55 @@ class Model:
         return {name: {"operations": len(each.nodes), "flops": each.flops} for name, each in self.programs.items()}
 
     def executor(self, lanes: int) -> Executor:
-        """The programs bound to a block of that many lanes; kept, because binding costs as much as running."""
+        """The programs bound to that many lanes; kept, because binding costs as much as running."""
         if lanes not in self._executors:
             self._executors[lanes] = LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes)
         return self._executors[lanes]
 
-    def drive(self, block: Array, drive: Array) -> None:
-        """Set the moving drivers in the lanes of a block, shape (slots, lanes).
+    def samples(self, times: Array, drive: Array) -> Array:
+        """What `sampled` holds at the times, shape (sampled, n).
 
         Args:
-            drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, lanes).
+            drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, n).
         """
+        found = np.empty((len(self.sampled), len(times)))
+        found[0] = times
         for k, name in enumerate(self.request.drivers):
-            places, angle = self.vectors[f"drive {name}"], self.mechanism.driver(name).type == "joint_angle"
-            block[places[:3]] = drive[:, k] * (1.0 if angle else 1.0 / self.frame.unit)
-            block[places[3]], block[places[4]] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
+            angle = self.mechanism.driver(name).type == "joint_angle"
+            rows = found[5 * k + 1 : 5 * k + 6]
+            rows[:3] = drive[:, k] * (1.0 if angle else 1.0 / self.frame.unit)
+            rows[3], rows[4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
+        return found
 
-    def design(self, drive: Array) -> Array:
-        """The lane of the design position, moving as the drive says, shape (slots,); drive as for `drive`, one lane."""
-        return self.moving(self._design, drive)
-
-    def moving(self, lane: Array, drive: Array) -> Array:
-        """A solved lane with the rates that the drive gives it there, shape (slots,)."""
+    def moving(self, lane: Array, sample: Array) -> Array:
+        """A lane that goes on from where a solved lane stands, with the rates that a sample of the drives gives it there."""
         executor = self.executor(1)
-        executor.block[:, 0] = lane
-        self.drive(executor.block, drive)
-        executor.run("tangent")
-        return executor.block[:, 0].copy()
+        every = range(len(self.slots))
+        executor.put(every, lane[:, None])
+        executor.put(self.sampled, sample[:, None])
+        executor.run(self._tangent)
+        found = executor.get(every)[:, 0]
+        source, target = np.array(self._plan.carried).T
+        found[target] = found[source]
+        return found
 
     def _solve_design(self) -> Array:
         """The pose with all drivers at their design value; normally the design itself."""
         executor = self.executor(1)
-        block = executor.block
-        for name, value in self._at_design.items():
-            block[self.vectors[name], 0] = value
-        self.drive(block, np.zeros((3, len(self.request.drivers), 1)))
-        residual = block[self.slots["residual"]]
+        for name, value in self.state.items():
+            executor.put(self.vectors[name], np.array(value)[:, None])
+        executor.put(self.sampled, self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))))
         for _ in range(50):  # a rod given longer or shorter than its design distance is taken up here
             executor.run("newton")
-            if not residual[0] > 1e-12 or not np.isfinite(block).all():
+            residual = float(executor.get([self.slots["residual"]])[0, 0])
+            if not residual > 1e-12 or not np.isfinite(residual):
                 break
         executor.run("outputs")
-        closure = float(block[self.slots["closure"], 0])
-        if not (closure <= 1e-12 and block[self.slots["branch"], 0] > 0.0):
+        found = executor.get(range(len(self.slots)))[:, 0]
+        closure = found[self.slots["closure"]]
+        if not (closure <= 1e-12 and found[self.slots["branch"]] > 0.0):
             raise SolveError(
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual "
                 f"{closure * self.frame.unit:.3g} m after Newton's iteration, expected 0; check points, axes and lengths"
             )
-        return block[:, 0].copy()
+        return found

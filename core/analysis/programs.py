@@ -1,9 +1,10 @@
-"""The programs of a sweep, traced from the equations: predict, newton, motion and outputs share one block of lanes.
+"""The programs of a sweep, traced from the equations: they share one layout of slots.
 
-    predict   state, v, a, h             -> state           Taylor step of second order over the time h
-    newton    state, drives              -> state, residual, pivot        one Newton-Raphson iteration; residual is that before it
-    motion    state, drives' rates       -> v, a            one factorisation at the converged pose, solved for nu and gamma
-    outputs   state, v, a                -> wanted motions, leftover, branch
+    predict   from state, v, a and time; time    -> state          Taylor step of second order
+    newton    state, drives                      -> state, residual, pivot       one Newton-Raphson iteration; residual is that before
+    motion    state, drives' rates               -> v, a           one factorisation at the converged pose, solved for nu and gamma
+    outputs   state, v, a                        -> wanted motions, closure, leftover, branch
+    alone, joined   all that, and the tolerance  -> margin         positive where a lane may be accepted
 
 Each is traced for what is asked: no acceleration, no gamma; no velocity, no factorisation after the last iteration.
 """
@@ -18,8 +19,9 @@ from typing import Any
 from ..algebra import ZERO, Quat, Scalar, cross, rotation_less_identity, vec
 from ..mechanism import Mechanism, Vector
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion
-from ..program import Elimination, Program, Tape, absolute, maximum, minimum, program
+from ..program import DONE, ITERATIONS, MARGIN, Elimination, Program, Tape, absolute, before, maximum, minimum, program
 from .cartesian import Cartesian
+from .continuity import LARGEST_DEVIATION, NEGLIGIBLE
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
@@ -48,6 +50,9 @@ class Request:
 
 RATE, RATE_T = "rate", "rate_t"
 """The vectors that hold the rates and accelerations of the unknowns."""
+TIME = "time"
+FROM = "from "
+"""Before the name of what a lane is predicted from."""
 
 
 class Layout:
@@ -131,17 +136,54 @@ class Tracer:
             self._store(out, RATE_T, factor.solve(self._kept(self.formulation.gamma(self.at, v))))
         return program(name, self.tape, out)
 
+    @property
+    def carried(self) -> list[tuple[int, int]]:
+        """Slots of a solved lane, and of what the lanes after it are predicted from."""
+        sizes = {name: len(value) for name, value in self.formulation.design.items()}
+        sizes |= {RATE: self.unknowns, RATE_T: self.unknowns}
+        pairs = [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, "pivot")]
+        pairs += [(self.layout.scalar(name), self.layout.scalar(name)) for name in ("tolerance", "consistent")]
+        for name, count in sizes.items():
+            pairs += zip(self.layout.vector(name, count), self.layout.vector(FROM + name, count), strict=True)
+        return pairs
+
     def predict(self) -> Program:
-        """The state after the time h by a Taylor step of second order."""
-        h = self._in("h")
-        v, a = self._vector(RATE, self.unknowns), self._vector(RATE_T, self.unknowns)
+        """The state at the time by a Taylor step of second order."""
+        h = self._in(TIME) - self._in(FROM + TIME)
+        v, a = self._vector(FROM + RATE, self.unknowns), self._vector(FROM + RATE_T, self.unknowns)
         step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
+        start = {name: self._vector(FROM + name, len(value)) for name, value in self.formulation.design.items()}
         out: dict[int, Scalar] = {}
-        predicted = self.formulation.retract(self.at, step)
+        predicted = self.formulation.retract(self.formulation.configuration(start), step)
         self._store_state(out, predicted)
         for name, value in predicted.items():  # kept, to see what the iteration makes of it
             self._store(out, f"predicted {name}", value)
         return program("predict", self.tape, out)
+
+    def test(self, name: str, *, neighbours: bool) -> Program:
+        """By how much a lane passes all tests of a solution: it has converged, closes, is on its branch, agrees with the
+        redundant rows, and continues the motion it is predicted from.
+
+        The last is seen from the correction that Newton made of the prediction: it changes from the lane before, or where lanes
+        are no neighbours from nothing at the start, by much less than the pose does.
+        """
+        gap: Scalar = 0.0
+        moved: Scalar = 0.0
+        for each, value in self.formulation.design.items():
+            vectors = (self._vector(label, len(value)) for label in (each, f"predicted {each}", FROM + each))
+            for x, predicted, start in zip(*vectors, strict=True):
+                x_before, predicted_before = (before(x, start), before(predicted, start)) if neighbours else (start, start)
+                gap = maximum(gap, absolute((x - predicted) - (x_before - predicted_before)))
+                moved = maximum(moved, absolute(x - x_before))
+        tol, consistent = self._in("tolerance"), self._in("consistent")
+        margins = (
+            self._in(DONE) - 0.5,
+            tol - self._in("closure"),
+            consistent - self._in("leftover"),
+            self._in("branch"),
+            LARGEST_DEVIATION * moved + NEGLIGIBLE - gap,
+        )
+        return program(name, self.tape, {self.layout.scalar(MARGIN): reduce(minimum, margins)})
 
     def outputs(self) -> Program:
         """The wanted motions, and the tests of a solution: closure, redundant rows, branch."""

@@ -14,7 +14,7 @@ from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .equations import Style
 from .freedom import require_driven
-from .march import March, march
+from .march import March, Route, march
 from .model import Model, compile_model
 from .programs import Request
 
@@ -81,67 +81,37 @@ def _require(holds: bool, otherwise: str) -> None:
 
 def sweep(model: Model, path: Path, tol: float) -> Trajectory:
     """Run a compiled model over the samples of a path; see `solve`."""
-    found = march(model, path, tol)
-    worst = {
-        "closure": _row(model, found, "closure").max(initial=0.0),
-        "redundant_residual": _row(model, found, "leftover").max(initial=0.0) * model.frame.unit,
-        "smallest_pivot": _row(model, found, "pivot").min(initial=1.0),
-    }
+    return follow(Route(model, path), tol)
+
+
+def follow(route: Route, tol: float) -> Trajectory:
+    """Run a compiled model along a route; see `solve`."""
+    model, found = route.model, march(route, tol)
+    tests = found.kept[model.rows["closure"].start : model.rows["pivot"].stop]
+    solved = tests if not found.messages else tests[:, found.solved]
+    closure, leftover = solved[:2].max(axis=1, initial=0.0).tolist()
+    iterations = found.kept[model.rows["iterations"].start]
     return Trajectory(
         points={name: _point(model, found, name) for name in model.request.points},
         solved=found.solved,
-        iterations=found.iterations,
-        residual=float(worst.pop("closure")) * model.frame.unit,
+        iterations=(np.where(found.solved, iterations, 0.0) if found.messages else iterations).astype(np.int64),
+        residual=closure * model.frame.unit,
         message="; ".join(found.messages),
-        details=_details(model) | {name: float(value) for name, value in worst.items()},
+        details=model.details
+        | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": float(solved[3].min(initial=1.0))},
         bodies={name: _body(model, found, name) for name in model.request.bodies},
     )
 
 
-def _row(model: Model, found: March, name: str) -> Array:
-    """One slot over the samples that were reached."""
-    return found.lanes[model.place[model.slots[name]], found.solved]
-
-
-def _details(model: Model) -> dict[str, Any]:
-    account = model.selection.account
-    return {
-        "rank": account.rank,
-        "dof": account.dof,
-        "dof_account": {
-            "bodies": account.bodies,
-            "coordinates": account.coordinates,
-            "equations": account.equations,
-            "paper": account.counted,
-            "moving_coordinates": account.moving_coordinates,
-            "rows": account.rows,
-            "rank": account.rank,
-            "dof": account.dof,
-            "redundant_rows": list(account.redundant_rows),
-        },
-        "program": model.sizes,
-    }
-
-
-def _slots(model: Model, found: March, *names: str) -> Array:
-    """Vectors of the samples by slot name, side by side, shape (n, ...)."""
-    return found.lanes[[model.place[slot] for name in names for slot in model.vectors[name]]].T.copy()
-
-
 def _point(model: Model, found: March, name: str) -> PointMotion:
-    order = model.request.order
-    return PointMotion(
-        position=_slots(model, found, f"position {name}"),
-        velocity=_slots(model, found, f"velocity {name}") if order >= 1 else None,
-        acceleration=_slots(model, found, f"acceleration {name}") if order == 2 else None,
-    )
+    motions = [found.kept[model.rows[f"{label} {name}"]].T for label in ("position", "velocity", "acceleration")[: model.orders]]
+    return PointMotion(*motions, *[None] * (3 - len(motions)))
 
 
 def _body(model: Model, found: March, name: str) -> BodyMotion:
-    order = model.request.order
-    return BodyMotion(
-        r=_slots(model, found, f"r {name}"),
-        p=_slots(model, found, f"p {name}"),
-        v=_slots(model, found, f"rdot {name}", f"omega {name}") if order >= 1 else None,
-        a=_slots(model, found, f"rddot {name}", f"omega_t {name}") if order == 2 else None,
-    )
+    """Rates of place and of rotation stand side by side, so that both are one view."""
+    rows = model.rows
+    motions = [found.kept[rows[f"{label} {name}"]].T for label in ("r", "p")]
+    for first, last in (("rdot", "omega"), ("rddot", "omega_t"))[: model.orders - 1]:
+        motions.append(found.kept[rows[f"{first} {name}"].start : rows[f"{last} {name}"].stop].T)
+    return BodyMotion(*motions, *[None] * (4 - len(motions)))

@@ -1,12 +1,15 @@
 """Programs: equations traced to lists of operations, and what runs them."""
 
 from .elimination import Elimination
-from .executor import Executor, Plan
+from .executor import DONE, ITERATIONS, MARGIN, Executor, Plan
 from .llvm_executor import LlvmCode, LlvmExecutor
 from .numpy_executor import NumpyExecutor
-from .trace import Program, Tape, Traced, absolute, cos, maximum, minimum, program, sin, sqrt, where_larger
+from .trace import Program, Tape, Traced, absolute, before, cos, maximum, minimum, program, sin, sqrt, where_larger
 
 __all__ = [
+    "DONE",
+    "ITERATIONS",
+    "MARGIN",
     "Elimination",
     "Executor",
     "LlvmCode",
@@ -17,6 +20,7 @@ __all__ = [
     "Tape",
     "Traced",
     "absolute",
+    "before",
     "cos",
     "maximum",
     "minimum",

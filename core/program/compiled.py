@@ -8,7 +8,7 @@ import importlib
 import importlib.util
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -47,10 +47,11 @@ def vector_width() -> int:
     return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 
 
-def load(text: str, functions: Sequence[str]) -> tuple[Any, dict[str, Callable[[int, int], None]]]:
-    """Compile, or fetch from the cache, and load; (what owns the code, the functions of block address and groups).
+def load(text: str, signatures: Mapping[str, str]) -> tuple[Any, dict[str, Callable[..., int]]]:
+    """Compile, or fetch from the cache, and load; (what owns the code, the functions by name).
 
-    The functions release Python's lock while they run.
+    A signature has a letter for each argument: p for an address, i for a whole number; all return a whole number, or nothing of
+    sense. The functions release Python's lock while they run.
     """
     llvm = _llvm()
     machine, identity = _target()
@@ -63,8 +64,9 @@ def load(text: str, functions: Sequence[str]) -> tuple[Any, dict[str, Callable[[
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    signature = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)
-    return engine, {name: signature(engine.get_function_address(name)) for name in functions}
+    kinds = {"p": ctypes.c_void_p, "i": ctypes.c_int64}
+    types = {name: ctypes.CFUNCTYPE(ctypes.c_int64, *(kinds[letter] for letter in each)) for name, each in signatures.items()}
+    return engine, {name: kind(engine.get_function_address(name)) for name, kind in types.items()}
 
 
 def _folder() -> Path:

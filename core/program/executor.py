@@ -1,4 +1,4 @@
-"""What runs programs: a block of lanes that programs read and write in place, and the loop of Newton's iteration over them."""
+"""What runs programs: lanes that programs read and write in place, and the loops over them that follow a motion."""
 
 from __future__ import annotations
 
@@ -9,39 +9,86 @@ from typing import Protocol
 from ..trajectory import Array
 from .trace import Program
 
+DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
+"""Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
+
 
 @dataclass(frozen=True)
 class Plan:
-    """The programs of a model and what an attempt at its samples is made of.
+    """The programs of a model, and what the loops over its lanes are made of.
 
     An attempt runs `predict`, then `newton` until the slot `residual` of every lane is below the tolerance or not finite, then the
-    programs in `after`. It leaves in the slots `iterations` and `done` how often each lane was iterated and whether it got there.
+    programs in `after`, and at last the test whose margin is positive where the lane may be accepted: `alone` for lanes that know
+    nothing of each other, `joined` for lanes that are neighbours on one way.
 
     Attributes:
         programs: by name; they share one layout of slots.
         slots: place of every scalar in a lane, by name.
         after: names of the programs that end an attempt.
+        onward: names of the programs that make a solved lane ready to be predicted from.
+        sampled: slots that are given anew at every sample.
+        carried: slots of a solved lane, and the slots it is predicted from that take them over.
+        kept: slots that are stored of every sample.
         tolerance: of the residual before an iteration; that iteration is the last.
         most: iterations at most.
     """
 
     programs: Mapping[str, Program]
     slots: Mapping[str, int]
-    after: Sequence[str]
-    tolerance: float
-    most: int
+    after: Sequence[str] = ()
+    onward: Sequence[str] = ()
+    sampled: Sequence[int] = ()
+    carried: Sequence[tuple[int, int]] = ()
+    kept: Sequence[int] = ()
+    tolerance: float = 0.0
+    most: int = 0
 
 
 class Executor(Protocol):
-    """A plan bound to a block of lanes, shape (slots, lanes)."""
+    """A plan bound to a number of lanes. Lanes that divide by zero hold inf or nan afterwards; nothing is raised."""
 
     @property
-    def block(self) -> Array: ...
-
-    def run(self, name: str) -> None:
-        """Run one program over all lanes. Lanes that divide by zero hold inf or nan afterwards; nothing is raised."""
+    def lanes(self) -> int: ...
+    @property
+    def margin(self) -> int:
+        """Samples that `follow` may overwrite beyond either end of its output."""
         ...
 
-    def attempt(self, lanes: int) -> None:
-        """Make an attempt at the first lanes."""
+    def put(self, slots: Sequence[int], values: Array) -> None:
+        """Set slots of all lanes, shape (slots, lanes) or (slots, 1)."""
+        ...
+
+    def get(self, slots: Sequence[int]) -> Array:
+        """A copy of slots of all lanes, shape (slots, lanes)."""
+        ...
+
+    def run(self, name: str) -> None:
+        """Run one program over all lanes."""
+        ...
+
+    def attempt(self) -> None:
+        """Make an attempt at all lanes, each alone."""
+        ...
+
+    def follow(self, anchor: Array, samples: Array, out: Array, first: int, step: int) -> int:
+        """Follow one motion: attempt its next samples as neighbouring lanes, go on from the last one accepted, until none is.
+
+        Args:
+            anchor: slots of where the motion stands, shape (slots,); goes along.
+            samples: `Plan.sampled` of the samples ahead, shape (sampled, n + margin); the last column repeated at the end.
+            out: takes `Plan.kept` of the samples, shape (kept, columns), rows contiguous.
+            first, step: column of the first sample, and from each to the next: 1 or -1.
+
+        Returns:
+            How many samples were accepted.
+        """
+        ...
+
+    def fan(self, samples: Array, out: Array) -> None:
+        """Follow as many motions as there are lanes through the same samples, each lane alone.
+
+        Args:
+            samples: `Plan.sampled`, shape (sampled, n).
+            out: takes `Plan.kept`, shape (kept, n, lanes); NaN from where a lane was not accepted.
+        """
         ...

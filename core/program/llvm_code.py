@@ -1,13 +1,14 @@
-"""Programs as LLVM code: straight lines over vectors of lanes, and the loop of an attempt around them.
+"""Programs as LLVM code: straight lines over a vector of lanes; the loops around them are in llvm_loops.
 
-The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are reduced and summed in place.
+The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are reduced and summed in place. The W
+lanes of a vector stand together in memory, slot by slot: what a program touches is one stretch of a few kilobytes.
 """
 
 from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 
 from .trace import Node, Program
 
@@ -22,17 +23,56 @@ CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
 class Lines:
     """The body of a function over vectors of W lanes, written line by line in single assignment."""
 
-    def __init__(self, width: int) -> None:
-        self.width, self.lines = width, list[str]()
+    def __init__(self, width: int, prefix: str = "x") -> None:
+        self.width, self.prefix, self.lines = width, prefix, list[str]()
         self.vector = f"<{width} x double>"
         self._known: dict[str, str] = {}
 
     def let(self, text: str) -> str:
         """The name of the value of an expression, computed once."""
         if text not in self._known:
-            self._known[text] = f"%x{len(self._known)}"
+            self._known[text] = f"%{self.prefix}{len(self._known)}"
             self.lines.append(f"{self._known[text]} = {text}")
         return self._known[text]
+
+    @property
+    def text(self) -> str:
+        """The lines, indented."""
+        return "\n  ".join(self.lines)
+
+    def sum(self, a: str | int, b: str | int) -> str:
+        """Of two whole numbers."""
+        return self.let(f"add i64 {a}, {b}")
+
+    def product(self, a: str | int, b: str | int) -> str:
+        """Of two whole numbers."""
+        return self.let(f"mul i64 {a}, {b}")
+
+    def number(self, pointer: str, index: str | int) -> str:
+        """Where a number of an array stands."""
+        return self.let(f"getelementptr double, ptr {pointer}, i64 {index}")
+
+    def spread(self, x: str) -> str:
+        """A vector of W times the same number."""
+        one = self.let(f"insertelement {self.vector} poison, double {x}, i64 0")
+        return self.let(f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.width} x i32> zeroinitializer")
+
+    def turned(self, x: str) -> str:
+        """The lanes in the opposite order."""
+        order = ", ".join(f"i32 {k}" for k in reversed(range(self.width)))
+        return self.let(f"shufflevector {self.vector} {x}, {self.vector} poison, <{self.width} x i32> <{order}>")
+
+    def slot(self, number: int) -> str:
+        """Where a slot of the lanes stands."""
+        return self.let(f"getelementptr {self.vector}, ptr %lane, i64 {number}")
+
+    def read(self, number: int) -> str:
+        """A slot of the lanes."""
+        return self.let(f"load {self.vector}, ptr {self.slot(number)}, align 8")
+
+    def write(self, number: int, value: str) -> None:
+        """Set a slot of the lanes."""
+        self.lines.append(f"store {self.vector} {value}, ptr {self.slot(number)}, align 8")
 
     def constant(self, x: float) -> str:
         """A vector of equal numbers, exact to the last bit."""
@@ -92,98 +132,26 @@ class Lines:
             return self.let(f"fcmp ogt {self.vector} {self.call('fabs', operands[0])}, {self.call('fabs', operands[1])}")
         if op == "where":
             return self.choose(*operands)
+        if op == "before":
+            order = ", ".join(f"i32 {k}" for k in (self.width, *range(self.width - 1)))
+            return self.let(f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]}, <{self.width} x i32> <{order}>")
         return self.trigonometric(operands[0], {"sin": 0.0, "cos": 1.0}[op])
 
 
-def function(program: Program, width: int, stride: int) -> str:
-    """A program as a function of the first of its W lanes; slots are `stride` numbers apart."""
+def function(program: Program, width: int) -> str:
+    """A program as a function of its W lanes."""
     body = Lines(width)
-
-    def slot(number: int) -> str:
-        return body.let(f"getelementptr double, ptr %lane, i64 {number * stride}")
-
     values: list[str] = []
     for node in program.nodes:
         if node[0] == "input":
-            values.append(body.let(f"load {body.vector}, ptr {slot(int(node[1]))}, align 8"))
+            values.append(body.read(int(node[1])))
         elif node[0] == "const":
             values.append(body.constant(float(node[1])))
         else:
             values.append(body.operation(node, [values[int(k)] for k in node[1:]]))
     for number, position in program.outputs.items():
-        pointer = slot(number)
-        body.lines.append(f"store {body.vector} {values[position]}, ptr {pointer}, align 8")
-    text = "\n  ".join(body.lines)
-    return f"define internal void @{program.name}(ptr %lane) {{\n  {text}\n  ret void\n}}\n"
-
-
-def entry(name: str, width: int) -> str:
-    """A function that runs a program over groups of W lanes."""
-    return f"""define void @run_{name}(ptr %block, i64 %groups) {{
-entry:
-  br label %group
-group:
-  %g = phi i64 [0, %entry], [%next, %group]
-  %offset = mul i64 %g, {width}
-  %lane = getelementptr double, ptr %block, i64 %offset
-  call void @{name}(ptr %lane)
-  %next = add i64 %g, 1
-  %more = icmp slt i64 %next, %groups
-  br i1 %more, label %group, label %end
-end:
-  ret void
-}}
-"""
-
-
-def attempt(slots: Mapping[str, int], after: Iterable[str], width: int, stride: int, tolerance: float, most: int) -> str:
-    """Predict, iterate until every lane has met the tolerance or is lost, then run what comes after; group by group."""
-    vector, mask = f"<{width} x double>", f"<{width} x i1>"
-    numbers = Lines(width)
-    finish = "\n  ".join(f"call void @{name}(ptr %lane)" for name in after)
-    return f"""declare i1 @llvm.vector.reduce.and.v{width}i1({mask})
-define void @attempt(ptr %block, i64 %groups) {{
-entry:
-  br label %group
-group:
-  %g = phi i64 [0, %entry], [%next, %end_group]
-  %offset = mul i64 %g, {width}
-  %lane = getelementptr double, ptr %block, i64 %offset
-  call void @predict(ptr %lane)
-  %at_residual = getelementptr double, ptr %lane, i64 {slots["residual"] * stride}
-  %at_iterations = getelementptr double, ptr %lane, i64 {slots["iterations"] * stride}
-  %at_done = getelementptr double, ptr %lane, i64 {slots["done"] * stride}
-  br label %iterate
-iterate:
-  %pass = phi i64 [1, %group], [%next_pass, %iterate]
-  %done = phi {mask} [zeroinitializer, %group], [%now_done, %iterate]
-  %count = phi {vector} [zeroinitializer, %group], [%now_count, %iterate]
-  call void @newton(ptr %lane)
-  %residual = load {vector}, ptr %at_residual, align 8
-  %more_count = fadd {vector} %count, {numbers.constant(1.0)}
-  %now_count = select {mask} %done, {vector} %count, {vector} %more_count
-  %met = fcmp olt {vector} %residual, {numbers.constant(tolerance)}
-  %now_done = or {mask} %done, %met
-  %finite = fcmp olt {vector} %residual, {numbers.constant(math.inf)}
-  %lost = xor {mask} %finite, <{", ".join(["i1 true"] * width)}>
-  %settled = or {mask} %now_done, %lost
-  %all = call i1 @llvm.vector.reduce.and.v{width}i1({mask} %settled)
-  %next_pass = add i64 %pass, 1
-  %spent = icmp sgt i64 %next_pass, {most}
-  %stop = or i1 %all, %spent
-  br i1 %stop, label %end_group, label %iterate
-end_group:
-  {finish}
-  store {vector} %now_count, ptr %at_iterations, align 8
-  %done_number = select {mask} %now_done, {vector} {numbers.constant(1.0)}, {vector} zeroinitializer
-  store {vector} %done_number, ptr %at_done, align 8
-  %next = add i64 %g, 1
-  %more = icmp slt i64 %next, %groups
-  br i1 %more, label %group, label %end
-end:
-  ret void
-}}
-"""
+        body.write(number, values[position])
+    return f"define internal void @{program.name}(ptr %lane) {{\n  {body.text}\n  ret void\n}}\n"
 
 
 def declarations(width: int) -> str:

@@ -1,54 +1,86 @@
-"""Run programs as machine code over vectors of lanes: one call for a whole attempt, without Python's lock."""
+"""Run programs as machine code over vectors of lanes: one call for a whole motion, without Python's lock."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..trajectory import Array
-from . import compiled, llvm_code
+from . import compiled, llvm_code, llvm_loops
 from .executor import Plan
-
-STRIDE = 296
-"""Numbers between two slots of a lane: room for the lanes of a march, and an odd number of cache lines, so that the slots of a lane
-do not compete for the same places in the cache."""
 
 
 class LlvmCode:
     """A plan compiled for this processor. Raises ImportError where llvmlite is missing."""
 
     def __init__(self, plan: Plan) -> None:
-        self.width = compiled.vector_width()
-        functions = [llvm_code.function(program, self.width, STRIDE) for program in plan.programs.values()]
-        entries = [llvm_code.entry(name, self.width) for name in plan.programs]
-        attempt = llvm_code.attempt(plan.slots, plan.after, self.width, STRIDE, plan.tolerance, plan.most)
-        text = "\n".join([*functions, *entries, attempt, llvm_code.declarations(self.width)])
-        names = [*(f"run_{name}" for name in plan.programs), "attempt"]
-        self._owner, self.functions = compiled.load(text, names)
-        self.slots = len(plan.slots)
+        self.width, self.slots = compiled.vector_width(), len(plan.slots)
+        self.sampled, self.kept = len(plan.sampled), len(plan.kept)
+        width = self.width
+        text = [llvm_code.function(program, width) for program in plan.programs.values()]
+        text += [llvm_loops.over_groups(f"run_{name}", [name], self.slots, width) for name in plan.programs]
+        signatures = {f"run_{name}": "pi" for name in plan.programs}
+        if plan.after:  # a plan that is only run has no loops
+            text += [llvm_loops.settle(plan, width), llvm_loops.over_groups("attempt", ["settle", "alone"], self.slots, width)]
+            text += [llvm_loops.follow(plan, width), llvm_loops.fan(plan, width)]
+            signatures |= {"attempt": "pi", "follow": "pppiipiii", "fan": "pipiipi"}
+        self._owner, self.functions = compiled.load("\n".join([*text, llvm_code.declarations(width)]), signatures)
 
 
 class LlvmExecutor:
-    """Compiled code bound to a block of lanes.
+    """Compiled code bound to lanes: groups of a vector's width W, memory of shape (groups, slots, W).
 
-    Args:
-        code: of the plan; shared by all blocks.
-        lanes: at most STRIDE.
+    The last group is filled up with copies of the last lane.
     """
 
     def __init__(self, code: LlvmCode, lanes: int) -> None:
-        if lanes > STRIDE:
-            raise ValueError(f"{lanes} lanes do not fit into a block of {STRIDE}")
-        self._code, self._lanes = code, lanes
-        self._memory: Array = np.zeros((code.slots, STRIDE))
-        self.block = self._memory[:, :lanes]
+        self.lanes, self.margin = lanes, code.width
+        self._code, self._groups = code, -(-lanes // code.width)
+        self._memory = _aligned(self._groups, code.slots, code.width)
+        self._address = self._memory.ctypes.data
+
+    def put(self, slots: Sequence[int], values: Array) -> None:
+        """See `Executor`."""
+        padded = np.empty((len(slots), self._groups * self.margin))
+        padded[:, : self.lanes] = values
+        padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
+        self._memory[:, slots] = padded.reshape(len(slots), self._groups, self.margin).transpose(1, 0, 2)
+
+    def get(self, slots: Sequence[int]) -> Array:
+        """See `Executor`."""
+        return self._memory[:, slots].transpose(1, 0, 2).reshape(len(slots), -1)[:, : self.lanes]
 
     def run(self, name: str) -> None:
         """See `Executor`."""
-        self._call(f"run_{name}", self._lanes)
+        self._code.functions[f"run_{name}"](self._address, self._groups)
 
-    def attempt(self, lanes: int) -> None:
+    def attempt(self) -> None:
         """See `Executor`."""
-        self._call("attempt", lanes)
+        self._code.functions["attempt"](self._address, self._groups)
 
-    def _call(self, name: str, lanes: int) -> None:
-        self._code.functions[name](self._memory.ctypes.data, -(-lanes // self._code.width))
+    def follow(self, anchor: Array, samples: Array, out: Array, first: int, step: int) -> int:
+        """See `Executor`."""
+        stride, row = samples.strides[0] // samples.itemsize, out.strides[0] // out.itemsize
+        addresses = anchor.ctypes.data, samples.ctypes.data
+        wanted = samples.shape[1] - self.margin
+        return self._code.functions["follow"](self._address, *addresses, stride, wanted, out.ctypes.data, row, first, step)
+
+    def fan(self, samples: Array, out: Array) -> None:
+        """See `Executor`."""
+        stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
+        whole = np.empty((self._code.kept, wanted, self._groups * self.margin)) if self.lanes % self.margin else out
+        lanes = whole.shape[2]
+        self._code.functions["fan"](self._address, self._groups, samples.ctypes.data, stride, wanted, whole.ctypes.data, lanes)
+        if whole is not out:
+            out[:] = whole[:, :, : self.lanes]
+
+
+def _aligned(*shape: int) -> Array:
+    """Zeros that begin with a cache line, so that no vector is in two of them."""
+    line = 64
+    size = 8 * math.prod(shape)
+    room = np.zeros(size + line, dtype=np.uint8)
+    start = -room.ctypes.data % line
+    return room[start : start + size].view(np.float64).reshape(shape)

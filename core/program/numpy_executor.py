@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..trajectory import Array
-from .executor import Plan
+from .executor import DONE, ITERATIONS, MARGIN, Plan
 from .trace import Program, operands
 
 
@@ -18,6 +18,10 @@ def _min(a: Array, b: Array, out: Array) -> None:
 
 def _max(a: Array, b: Array, out: Array) -> None:
     np.maximum(a, b, out=out)
+
+
+def _before(x: Array, first: Array, out: Array) -> None:
+    out[0], out[1:] = first[0], x[:-1]
 
 
 _UFUNCS: dict[str, Callable[..., Any]] = {
@@ -32,6 +36,7 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "abs": np.absolute,
     "min": _min,
     "max": _max,
+    "before": _before,
 }
 
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
@@ -47,13 +52,24 @@ def _where(m: Array, p: Array, q: Array, out: Array) -> None:
 
 
 class NumpyExecutor:
-    """A plan bound to a block of lanes."""
+    """A plan bound to a block of lanes, shape (slots, lanes)."""
+
+    margin = 0
 
     def __init__(self, plan: Plan, lanes: int) -> None:
-        self.block: Array = np.zeros((len(plan.slots), lanes))
+        self.lanes = lanes
+        self._block: Array = np.zeros((len(plan.slots), lanes))
         self._plan = plan
         self._scratch = np.empty((2, lanes))
         self._calls: dict[str, list[Call]] = {}
+
+    def put(self, slots: Sequence[int], values: Array) -> None:
+        """See `Executor`."""
+        self._block[slots] = values
+
+    def get(self, slots: Sequence[int]) -> Array:
+        """See `Executor`."""
+        return self._block[slots]
 
     def run(self, name: str) -> None:
         """See `Executor`."""
@@ -63,11 +79,11 @@ class NumpyExecutor:
             for call, arguments in self._calls[name]:
                 call(*arguments)
 
-    def attempt(self, lanes: int) -> None:
+    def attempt(self, test: str = "alone") -> None:
         """See `Executor`."""
         slots = self._plan.slots
-        residual, iterations = (self.block[slots[name], :lanes] for name in ("residual", "iterations"))
-        done = np.zeros(lanes, dtype=np.bool_)
+        residual, iterations = (self._block[slots[name]] for name in ("residual", ITERATIONS))
+        done = np.zeros(self.lanes, dtype=np.bool_)
         iterations[:] = 0.0
         self.run("predict")
         for _ in range(self._plan.most):
@@ -78,11 +94,48 @@ class NumpyExecutor:
                 break
         for name in self._plan.after:
             self.run(name)
-        self.block[slots["done"], :lanes] = done
+        self._block[slots[DONE]] = done
+        self.run(test)
+
+    def follow(self, anchor: Array, samples: Array, out: Array, first: int, step: int) -> int:
+        """See `Executor`."""
+        plan, block = self._plan, self._block
+        source, target = np.array(plan.carried).T
+        wanted, kept = samples.shape[1], list(plan.kept)
+        at = 0
+        while at < wanted:
+            count = min(self.lanes, wanted - at)
+            block[target] = anchor[target, None]
+            block[list(plan.sampled), :count] = samples[:, at : at + count]
+            block[list(plan.sampled), count:] = samples[:, -1:]
+            self.attempt("joined")
+            good = block[plan.slots[MARGIN], :count] > 0.0
+            accepted = count if good.all() else int(good.argmin())
+            if not accepted:
+                break
+            out[:, first + step * np.arange(at, at + accepted)] = block[kept, :accepted]
+            for name in plan.onward:
+                self.run(name)
+            anchor[target] = block[source, accepted - 1]
+            at += accepted
+        return at
+
+    def fan(self, samples: Array, out: Array) -> None:
+        """See `Executor`."""
+        plan, block = self._plan, self._block
+        source, target = np.array(plan.carried).T
+        alive = np.ones(self.lanes, dtype=np.bool_)
+        for k, sample in enumerate(samples.T):
+            block[list(plan.sampled)] = sample[:, None]
+            self.attempt("alone")
+            alive &= block[plan.slots[MARGIN]] > 0.0
+            out[:, k] = np.where(alive, block[list(plan.kept)], np.nan)
+            for name in plan.onward:
+                self.run(name)
+            block[target] = block[source]
 
     def _bind(self, program: Program) -> list[Call]:
         """Give every operation a register; a register is free again after its last reader."""
-        lanes = self.block.shape[1]
         last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
         kept = set(program.outputs.values())
         place: list[Any] = []
@@ -90,14 +143,14 @@ class NumpyExecutor:
         calls: list[Call] = []
         for k, (op, *rest) in enumerate(program.nodes):
             if op == "input":
-                place.append(self.block[int(rest[0])])
+                place.append(self._block[int(rest[0])])
                 continue
             if op == "const":
                 place.append(np.float64(rest[0]))
                 continue
             arguments = [int(x) for x in rest]
             kind = np.bool_ if op == "larger" else np.float64
-            out = free[kind].pop() if free[kind] else np.empty(lanes, kind)
+            out = free[kind].pop() if free[kind] else np.empty(self.lanes, kind)
             place.append(out)
             read = [place[x] for x in arguments]
             if op == "larger":
@@ -109,8 +162,8 @@ class NumpyExecutor:
                     free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
         for node in kept:  # an input that is put out elsewhere must survive the output that overwrites its slot
             if program.nodes[node][0] == "input":
-                copy = np.empty(lanes)
+                copy = np.empty(self.lanes)
                 calls.append((np.copyto, (copy, place[node])))
                 place[node] = copy
-        calls += [(np.copyto, (self.block[slot], place[node])) for slot, node in program.outputs.items()]
+        calls += [(np.copyto, (self._block[slot], place[node])) for slot, node in program.outputs.items()]
         return calls

@@ -19,7 +19,7 @@ Node: TypeAlias = tuple[str, *tuple[float, ...]]
 """An operation and its operands: node numbers, or for "input" a slot, or for "const" a value.
 
 "+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max" propagate NaN); "larger" a b is
-true where |a| > |b|; "where" m p q is p where m is true, else q.
+true where |a| > |b|; "where" m p q is p where m is true, else q; "before" x a is the x of the lane before, and a in the first lane.
 """
 
 FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"})
@@ -207,6 +207,11 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
         return p if abs(a) > abs(b) else q
     larger = tape.node("larger", tape.number(a), tape.number(b))
     return tape.node("where", larger.number, tape.number(p), tape.number(q))
+
+
+def before(x: Traced, first: Traced) -> Scalar:
+    """The x of the lane before; in the first lane, `first`."""
+    return x.tape.node("before", x.number, first.number)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,180 @@
+"""The loops of a plan as LLVM code: Newton's iteration, following one motion with lanes as samples, and many with lanes as motions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from .executor import DONE, ITERATIONS, MARGIN, Plan
+from .llvm_code import Lines
+
+
+def settle(plan: Plan, width: int) -> str:
+    """One attempt at W lanes but for the test: predict, iterate until every lane has met the tolerance or is lost, finish."""
+    vector, mask, lines = f"<{width} x double>", f"<{width} x i1>", Lines(width)
+    at = {name: lines.slot(plan.slots[name]) for name in ("residual", ITERATIONS, DONE)}
+    places = "\n  ".join(lines.lines)
+    return f"""declare i1 @llvm.vector.reduce.and.v{width}i1({mask})
+define internal void @settle(ptr %lane) {{
+entry:
+  {places}
+  call void @predict(ptr %lane)
+  br label %iterate
+iterate:
+  %pass = phi i64 [1, %entry], [%next_pass, %iterate]
+  %done = phi {mask} [zeroinitializer, %entry], [%now_done, %iterate]
+  %count = phi {vector} [zeroinitializer, %entry], [%now_count, %iterate]
+  call void @newton(ptr %lane)
+  %residual = load {vector}, ptr {at["residual"]}, align 8
+  %more_count = fadd {vector} %count, {lines.constant(1.0)}
+  %now_count = select {mask} %done, {vector} %count, {vector} %more_count
+  %met = fcmp olt {vector} %residual, {lines.constant(plan.tolerance)}
+  %now_done = or {mask} %done, %met
+  %finite = fcmp olt {vector} %residual, {lines.constant(math.inf)}
+  %lost = xor {mask} %finite, <{", ".join(["i1 true"] * width)}>
+  %settled = or {mask} %now_done, %lost
+  %all = call i1 @llvm.vector.reduce.and.v{width}i1({mask} %settled)
+  %next_pass = add i64 %pass, 1
+  %spent = icmp sgt i64 %next_pass, {plan.most}
+  %stop = or i1 %all, %spent
+  br i1 %stop, label %finish, label %iterate
+finish:
+  {_calls(plan.after)}
+  store {vector} %now_count, ptr {at[ITERATIONS]}, align 8
+  %done_number = select {mask} %now_done, {vector} {lines.constant(1.0)}, {vector} zeroinitializer
+  store {vector} %done_number, ptr {at[DONE]}, align 8
+  ret void
+}}
+"""
+
+
+def over_groups(name: str, calls: Iterable[str], slots: int, width: int) -> str:
+    """A function that calls others on every group of W lanes."""
+    return f"""define void @{name}(ptr %memory, i64 %groups) {{
+entry:
+  br label %group
+group:
+  %g = phi i64 [0, %entry], [%next, %group]
+  %offset = mul i64 %g, {slots * width}
+  %lane = getelementptr double, ptr %memory, i64 %offset
+  {_calls(calls)}
+  %next = add i64 %g, 1
+  %more = icmp slt i64 %next, %groups
+  br i1 %more, label %group, label %end
+end:
+  ret void
+}}
+"""
+
+
+def follow(plan: Plan, width: int) -> str:
+    """See `Executor.follow`: W samples at a time, and on from the last one accepted."""
+    vector, begin, test, up, down, move = (f"<{width} x double>", *(Lines(width, prefix) for prefix in "btudm"))
+    for _, slot in plan.carried:
+        begin.write(slot, begin.spread(begin.let(f"load double, ptr {begin.number('%anchor', slot)}, align 8")))
+    for row, slot in enumerate(plan.sampled):
+        place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%at"))
+        begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
+    accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
+    last_column = down.let(f"sub i64 {down.let('sub i64 %first, %at')}, {width - 1}")
+    for row, slot in enumerate(plan.kept):
+        place = up.number("%out", up.sum(up.product("%row", row), up.sum("%first", "%at")))
+        up.lines.append(f"store {vector} {up.read(slot)}, ptr {place}, align 8")
+        place = down.number("%out", down.sum(down.product("%row", row), last_column))
+        down.lines.append(f"store {vector} {down.turned(down.read(slot))}, ptr {place}, align 8")
+    for source, target in plan.carried:
+        x = move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")
+        move.lines.append(f"store double {x}, ptr {move.number('%anchor', target)}, align 8")
+    return f"""declare i64 @llvm.cttz.i64(i64, i1)
+declare i64 @llvm.smin.i64(i64, i64)
+define i64 @follow(ptr %lane, ptr %anchor, ptr %samples, i64 %stride, i64 %wanted, ptr %out, i64 %row, i64 %first, i64 %step) {{
+entry:
+  %descending = icmp slt i64 %step, 0
+  br label %head
+head:
+  %at = phi i64 [0, %entry], [%next, %move]
+  %more = icmp slt i64 %at, %wanted
+  br i1 %more, label %begin, label %end
+begin:
+  {begin.text}
+  call void @settle(ptr %lane)
+  call void @joined(ptr %lane)
+  {test.text}
+  %bits = bitcast <{width} x i1> {accepted} to i{width}
+  %wide = zext i{width} %bits to i64
+  %rejected = xor i64 %wide, {2 ** (width + 1) - 1}
+  %leading = call i64 @llvm.cttz.i64(i64 %rejected, i1 true)
+  %left = sub i64 %wanted, %at
+  %accepted = call i64 @llvm.smin.i64(i64 %leading, i64 %left)
+  %none = icmp eq i64 %accepted, 0
+  br i1 %none, label %end, label %keep
+keep:
+  br i1 %descending, label %down, label %up
+up:
+  {up.text}
+  br label %move
+down:
+  {down.text}
+  br label %move
+move:
+  {_calls(plan.onward)}
+  %last = sub i64 %accepted, 1
+  {move.text}
+  %next = add i64 %at, %accepted
+  br label %head
+end:
+  ret i64 %at
+}}
+"""
+
+
+def fan(plan: Plan, width: int) -> str:
+    """See `Executor.fan`: every group of W motions goes through all samples while its slots are in the nearest cache."""
+    vector, mask = f"<{width} x double>", f"<{width} x i1>"
+    begin, test, keep, move = (Lines(width, prefix) for prefix in "btkm")
+    for row, slot in enumerate(plan.sampled):
+        place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%k"))
+        begin.write(slot, begin.spread(begin.let(f"load double, ptr {place}, align 8")))
+    accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
+    column = keep.sum(keep.product("%k", "%lanes"), keep.product("%g", width))
+    plane = keep.product("%wanted", "%lanes")
+    for row, slot in enumerate(plan.kept):
+        place = keep.number("%out", keep.sum(keep.product(plane, row), column))
+        keep.lines.append(f"store {vector} {keep.choose('%still', keep.read(slot), keep.constant(math.nan))}, ptr {place}, align 8")
+    carried = [(move.read(source), target) for source, target in plan.carried]
+    for value, target in carried:
+        move.write(target, value)
+    return f"""define void @fan(ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted, ptr %out, i64 %lanes) {{
+entry:
+  br label %group
+group:
+  %g = phi i64 [0, %entry], [%next_group, %end_group]
+  %offset = mul i64 %g, {len(plan.slots) * width}
+  %lane = getelementptr double, ptr %memory, i64 %offset
+  br label %sample
+sample:
+  %k = phi i64 [0, %group], [%next, %sample]
+  %alive = phi {mask} [<{", ".join(["i1 true"] * width)}>, %group], [%still, %sample]
+  {begin.text}
+  call void @settle(ptr %lane)
+  call void @alone(ptr %lane)
+  {test.text}
+  %still = and {mask} %alive, {accepted}
+  {keep.text}
+  {_calls(plan.onward)}
+  {move.text}
+  %next = add i64 %k, 1
+  %more = icmp slt i64 %next, %wanted
+  br i1 %more, label %sample, label %end_group
+end_group:
+  %next_group = add i64 %g, 1
+  %more_groups = icmp slt i64 %next_group, %groups
+  br i1 %more_groups, label %group, label %end
+end:
+  ret void
+}}
+"""
+
+
+def _calls(names: Iterable[str]) -> str:
+    return "\n  ".join(f"call void @{name}(ptr %lane)" for name in names)
