@@ -12,6 +12,9 @@ from ..trajectory import Array
 LARGEST_DEVIATION = 0.25
 # Changes below this part of the mechanism's size are not another assembly.
 NEGLIGIBLE = 1e-6
+# A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or
+# parts of the mechanism's size, says nothing of what is between: a whole turn ends where it began, on whatever assembly.
+LONGEST_STEP = 0.5
 
 
 def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float | Array, size: float) -> NDArray[np.bool_]:

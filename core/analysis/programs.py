@@ -21,7 +21,7 @@ from ..mechanism import Mechanism, Vector
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion
 from ..program import DONE, ITERATIONS, MARGIN, Elimination, Program, Tape, absolute, before, maximum, minimum, program
 from .cartesian import Cartesian
-from .continuity import LARGEST_DEVIATION, NEGLIGIBLE
+from .continuity import LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
@@ -165,16 +165,18 @@ class Tracer:
         redundant rows, and continues the motion it is predicted from.
 
         The last is seen from the correction that Newton made of the prediction: it changes from the lane before, or where lanes
-        are no neighbours from nothing at the start, by much less than the pose does.
+        are no neighbours from nothing at the start, by much less than the pose does. No lane is taken that is far from there.
         """
         gap: Scalar = 0.0
         moved: Scalar = 0.0
+        reach: Scalar = 0.0
         for each, value in self.formulation.design.items():
             vectors = (self._vector(label, len(value)) for label in (each, f"predicted {each}", FROM + each))
             for x, predicted, start in zip(*vectors, strict=True):
                 x_before, predicted_before = (before(x, start), before(predicted, start)) if neighbours else (start, start)
                 gap = maximum(gap, absolute((x - predicted) - (x_before - predicted_before)))
                 moved = maximum(moved, absolute(x - x_before))
+                reach = maximum(reach, absolute(x - start))
         tol, consistent = self._in("tolerance"), self._in("consistent")
         margins = (
             self._in(DONE) - 0.5,
@@ -182,6 +184,7 @@ class Tracer:
             consistent - self._in("leftover"),
             self._in("branch"),
             LARGEST_DEVIATION * moved + NEGLIGIBLE - gap,
+            LONGEST_STEP - reach,
         )
         return program(name, self.tape, {self.layout.scalar(MARGIN): reduce(minimum, margins)})
 
