@@ -6,12 +6,18 @@ or branches on a value: a traced scalar has none.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
 
 Scalar: TypeAlias = Any
 """A number of any kind that knows + - * / and unary minus."""
+
+
+def root(a: Scalar) -> Scalar:
+    """The square root of a number that is known when a mechanism is described: a float, or a number that knows its own root."""
+    return a.sqrt() if hasattr(a, "sqrt") else math.sqrt(a)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from typing import Any, ClassVar, Self
 
-from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, vec
+from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec
 from ..errors import MechanismError
 from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
@@ -231,7 +231,7 @@ def _times(factor: float, value: float | Sequence[Any]) -> Any:
 def unit(a: Sequence[Scalar]) -> Vec3:
     """The direction of a, length one."""
     v = vec(a)
-    return (1.0 / math.sqrt(v @ v)) * v
+    return (1.0 / root(v @ v)) * v
 
 
 # Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more is a mistake in the table.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .. import primitives as p
-from ..algebra import vec
+from ..algebra import root, vec
 from ..errors import MechanismError
 from .base import Attachment, Joint, length, positions
 
@@ -43,6 +43,6 @@ class Distance(Joint):
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P_i, P_j = (vec(point) for point in self.points)
         d0 = P_j - P_i
-        design_length = math.sqrt(d0 @ d0)
+        design_length = root(d0 @ d0)
         L = design_length if self.length is None else self.length
         return (p.Distance(i.arm(P_i), j.arm(P_j), d0, L, design_length),)

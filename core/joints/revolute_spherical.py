@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .. import primitives as p
-from ..algebra import vec
+from ..algebra import root, vec
 from ..errors import MechanismError
 from .base import Attachment, Joint, direction, positions, unit
 
@@ -32,5 +31,5 @@ class RevoluteSpherical(Joint):
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P_i, P_j = (vec(point) for point in self.points)
         d0 = P_j - P_i
-        L = math.sqrt(d0 @ d0)
+        L = root(d0 @ d0)
         return p.Distance(i.arm(P_i), j.arm(P_j), d0, L, L), p.Dot20(unit(self.axis), i.arm(P_i), j.arm(P_j), d0)
