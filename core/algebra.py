@@ -20,6 +20,14 @@ def root(a: Scalar) -> Scalar:
     return a.sqrt() if hasattr(a, "sqrt") else math.sqrt(a)
 
 
+def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
+    """p where |a| > |b|, else q; a number that is known only later decides then."""
+    later = next((x for x in (a, b) if hasattr(x, "where_larger")), None)
+    if later is not None:
+        return later.where_larger(a, b, p, q)
+    return p if abs(a) > abs(b) else q
+
+
 @dataclass(frozen=True, slots=True)
 class Vec3:
     """A vector of three scalars, in whatever axes the context says."""

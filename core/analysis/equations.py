@@ -61,11 +61,12 @@ class Frames:
         return (1.0 / self.unit) * vec(position) - self.origins[body]
 
 
-def frames(mechanism: Mechanism) -> Frames:
-    """The length unit and the internal origins: at the joint by which the spanning tree reaches a body."""
-    points = [point for joint in mechanism.joints for point in joint_points(joint)]
-    extent = max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=1.0)
-    length_unit = 2.0 ** round(math.log2(extent)) if extent > 0.0 else 1.0
+def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
+    """The length unit, unless it is given, and the internal origins: at the joint by which the spanning tree reaches a body."""
+    if length_unit is None:
+        points = [point for joint in mechanism.joints for point in joint_points(joint)]
+        extent = max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=1.0)
+        length_unit = 2.0 ** round(math.log2(extent)) if extent > 0.0 else 1.0
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
     for branch in spanning_tree(mechanism).branches:
         at = joint_points(branch.joint) if branch.joint is not None else []

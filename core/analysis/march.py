@@ -58,10 +58,15 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A path made ready for a model: everything about the samples that does not depend on the motion."""
+    """A path made ready for a model: everything about the samples that does not depend on the motion.
+
+    Attributes:
+        design: all slots of a lane at the design position of a variant; the model's own unless given.
+    """
 
     model: Model
     path: Path
+    design: Array | None = None
 
     @cached_property
     def from_design(self) -> bool:
@@ -95,7 +100,7 @@ class Route:
     @cached_property
     def departure(self) -> Array:
         """All slots of a lane that stands at the design position and moves as the start says."""
-        return self.model.moving(self.model.design, self.origin)
+        return self.model.moving(self.model.design if self.design is None else self.design, self.origin)
 
     @cached_property
     def sides(self) -> tuple[Side, ...]:
@@ -128,7 +133,7 @@ def march(route: Route, tol: float) -> March:
     tolerances = {"tolerance": tol, "consistent": max(CONSISTENT, tol)}
     if route.from_design:
         return _Marcher(route, route.departure, tolerances).run()
-    way = Route(model, path.lead_in())
+    way = Route(model, path.lead_in(), route.design)
     found = _Marcher(way, way.departure, tolerances).run()
     if not found.solved.all():
         n = len(path.times)
@@ -147,6 +152,8 @@ class _Marcher:
         for name, value in tolerances.items():
             self.start[self.slots[name]] = value
         self.executor = self.model.executor(route.lanes)
+        if self.model.geometry:  # the lanes know their variant
+            self.executor.put(range(len(self.start)), self.start[:, None])
         self.n = len(route.path.times)
         # `follow` may write beyond the samples on either side
         self.whole = np.empty((self.model.kept, self.n + 2 * self.executor.margin))
@@ -183,7 +190,7 @@ class _Marcher:
     def _divide(self, anchor: Array, aim: float) -> str:
         """Go a part of the step to a sample that could not be reached; empty, or why there is none."""
         here = float(anchor[self.slots[FROM + TIME]])
-        times = here + (aim - here) * 0.5 ** np.arange(1, HALVINGS + 1)
+        times: Array = here + (aim - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
         parts = self.model.executor(HALVINGS)
         every = range(len(self.slots))
         parts.put(every, anchor[:, None])
@@ -201,9 +208,9 @@ class _Marcher:
         here, wanted = float(anchor[self.slots[FROM + TIME]]), float(side.times[at])
         last = f"last reachable sample at {where(float(side.times[at - 1]))}" if at else "no sample reached on this side"
         return (
-            f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest "
-            f"pivot there {anchor[self.slots[FROM + 'pivot']]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or "
-            "drive another coordinate"
+            f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest pivot there "
+            f"{anchor[self.slots[FROM + 'pivot']]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "
+            "another coordinate"
         )
 
     def _reason(self, lane: Array) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -13,11 +14,13 @@ from ..mechanism import Mechanism
 from ..program import ITERATIONS, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
 from ..program.compiled import available
 from ..trajectory import Array
-from .programs import TIME, Request, Tracer
+from .programs import EARLIER, FROM, TIME, Request, Tracer
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
 LAST_ITERATION = 1e-9
 MAX_ITERATIONS = 12
+# A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
+CLOSED = 1e-12
 TESTS = ("closure", "leftover", "branch", "pivot", ITERATIONS)
 """Scalars that are kept of every sample, after the motions."""
 
@@ -35,6 +38,8 @@ def compile_model(mechanism: Mechanism, request: Request) -> Model:
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
         programs.append(tracer.motion("tangent", 2))
     programs += [tracer.outputs(), tracer.test("alone", neighbours=False), tracer.test("joined", neighbours=True)]
+    if request.varied:
+        programs.append(tracer.prepared.program())
     return Model(tracer, programs)
 
 
@@ -46,6 +51,7 @@ class Model:
         vectors: name of a vector -> the places of its components.
         state: name of a vector of the state -> its value at design.
         sampled: the places of what is given at every sample: the time, and five numbers of each moving driver.
+        geometry: the places of the numbers of all varied places.
         design: all slots of a lane that stands at the design position.
         rows: name of a motion or test -> its rows among what is kept of a sample.
         kept: how many rows there are.
@@ -63,6 +69,8 @@ class Model:
         tracer.layout.scalar(ITERATIONS)
         self.slots, self.vectors = tracer.layout.slots, tracer.layout.vectors
         self.state = tracer.formulation.design
+        self._geometry = tracer.geometry
+        self.geometry = [slot for place in tracer.geometry for slot in self.vectors[place]]
         self.sampled = [self.slots[TIME]]
         self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
         self._tangent = "motion" if self.request.order == 2 else "tangent"
@@ -82,7 +90,7 @@ class Model:
         )
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self._plan) if compiled else None
-        self._executors: dict[int, Executor] = {}
+        self._executors: dict[tuple[int, int], Executor] = {}
         self.design = self._solve_design()
 
     def _wanted(self) -> list[str]:
@@ -133,10 +141,11 @@ class Model:
         return {name: {"operations": len(each.nodes), "flops": each.flops} for name, each in self.programs.items()}
 
     def executor(self, lanes: int) -> Executor:
-        """The programs bound to that many lanes; kept, because binding costs as much as running."""
-        if lanes not in self._executors:
-            self._executors[lanes] = LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes)
-        return self._executors[lanes]
+        """The programs bound to that many lanes of this thread; kept, because binding costs as much as running."""
+        key = threading.get_ident(), lanes
+        if key not in self._executors:
+            self._executors[key] = LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes)
+        return self._executors[key]
 
     def samples(self, times: Array, drive: Array) -> Array:
         """What `sampled` holds at the times, shape (sampled, n).
@@ -158,28 +167,58 @@ class Model:
         executor = self.executor(1)
         every = range(len(self.slots))
         executor.put(every, lane[:, None])
+        self.start(executor, sample)
+        return executor.get(every)[:, 0]
+
+    def start(self, executor: Executor, sample: Array) -> None:
+        """Make solved lanes those that go on from where they stand, with the rates that a sample of the drives gives them."""
         executor.put(self.sampled, sample[:, None])
         executor.run(self._tangent)
-        found = executor.get(every)[:, 0]
         source, target = np.array(self._plan.carried).T
-        found[target] = found[source]
-        return found
+        executor.put(target, executor.get(source))
+        executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))  # there is no step behind it
 
-    def _solve_design(self) -> Array:
-        """The pose with all drivers at their design value; normally the design itself."""
-        executor = self.executor(1)
+    def standing(self, geometry: Array) -> Array:
+        """All slots of lanes that stand at the design position of variants, all drivers at their design value.
+
+        Normally that is the design itself. Lanes that do not close there, or are on a wrong branch, are NaN.
+
+        Args:
+            geometry: the numbers of all varied places, shape (numbers, variants).
+
+        Returns:
+            Shape (slots, variants).
+        """
+        count = geometry.shape[1]
+        executor = self.executor(count)
+        every = range(len(self.slots))
+        executor.put(every, np.zeros((len(every), 1)))
         for name, value in self.state.items():
             executor.put(self.vectors[name], np.array(value)[:, None])
         executor.put(self.sampled, self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))))
+        if len(geometry):
+            executor.put(self.geometry, geometry)
+            executor.run("prepare")
         for _ in range(50):  # a rod given longer or shorter than its design distance is taken up here
             executor.run("newton")
-            residual = float(executor.get([self.slots["residual"]])[0, 0])
-            if not residual > 1e-12 or not np.isfinite(residual):
+            (residual,) = executor.get([self.slots["residual"]])
+            if not (residual > CLOSED).any():
                 break
         executor.run("outputs")
-        found = executor.get(range(len(self.slots)))[:, 0]
-        closure = found[self.slots["closure"]]
-        if not (closure <= 1e-12 and found[self.slots["branch"]] > 0.0):
+        found = executor.get(every)
+        closes = (found[self.slots["closure"]] <= CLOSED) & (found[self.slots["branch"]] > 0.0)
+        return np.where(closes, found, np.nan)
+
+    @property
+    def ahead(self) -> list[int]:
+        """The places of what lanes are predicted from."""
+        return [target for _, target in self._plan.carried]
+
+    def _solve_design(self) -> Array:
+        geometry = np.array([number for value in self._geometry.values() for number in value])
+        found = self.standing(geometry[:, None])[:, 0]
+        if np.isnan(found).any():
+            closure = float(self.executor(1).get([self.slots["closure"]])[0, 0])
             raise SolveError(
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual "
                 f"{closure * self.frame.unit:.3g} m after Newton's iteration, expected 0; check points, axes and lengths"

@@ -1,8 +1,8 @@
 """The programs of a sweep, traced from the equations: they share one layout of slots.
 
-    predict   from state, v, a and time; time    -> state          Taylor step of second order
-    newton    state, drives                      -> state, residual, pivot       one Newton-Raphson iteration; residual is that before
-    motion    state, drives' rates               -> v, a           one factorisation at the converged pose, solved for nu and gamma
+    predict   from state, v, a and time; time    -> state        Taylor step of second order
+    newton    state, drives                      -> state, residual, pivot   one Newton-Raphson iteration; residual is that before
+    motion    state, drives' rates               -> v, a         one factorisation at the converged pose, solved for nu and gamma
     outputs   state, v, a                        -> wanted motions, closure, leftover, branch
     alone, joined   all that, and the tolerance  -> margin         positive where a lane may be accepted
 
@@ -19,12 +19,26 @@ from typing import Any
 from ..algebra import ZERO, Quat, Scalar, cross, rotation_less_identity, vec
 from ..mechanism import Mechanism, Vector
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion
-from ..program import DONE, ITERATIONS, MARGIN, Elimination, Program, Tape, absolute, before, maximum, minimum, program
+from ..program import (
+    DONE,
+    MARGIN,
+    Elimination,
+    Prepared,
+    Program,
+    Tape,
+    absolute,
+    before,
+    maximum,
+    minimum,
+    program,
+    where_larger,
+)
 from .cartesian import Cartesian
 from .continuity import LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
+from .geometry import placed, places
 from .relative import Relative
 
 
@@ -38,6 +52,7 @@ class Request:
         order: 0 positions, 1 and velocities, 2 and accelerations.
         style: how the rows are written.
         compiled: run by machine code where llvmlite is installed, else by numpy; the same results to round-off.
+        varied: places of the geometry (see `places`) that are inputs of the programs; all others are constants in them.
     """
 
     drivers: tuple[str, ...]
@@ -46,13 +61,18 @@ class Request:
     order: int = 2
     style: Style = Style.NATIVE
     compiled: bool = True
+    varied: tuple[str, ...] = ()
 
 
 RATE, RATE_T = "rate", "rate_t"
 """The vectors that hold the rates and accelerations of the unknowns."""
 TIME = "time"
-FROM = "from "
-"""Before the name of what a lane is predicted from."""
+FROM, EARLIER = "from ", "earlier "
+"""Before the names of what a lane is predicted from, and of what that was predicted from."""
+
+
+ABOUT = 1.5
+"""A step may be this much longer than the one it learns from."""
 
 
 class Layout:
@@ -79,9 +99,16 @@ class Tracer:
     """
 
     def __init__(self, mechanism: Mechanism, request: Request) -> None:
-        self.mechanism, self.request, self.frame = mechanism, request, frames(mechanism)
+        self.request, self.tape, self.layout = request, Tape(), Layout()
+        self.mechanism, self.frame = mechanism, frames(mechanism)
         self.selection = select_rows(mechanism, self.frame, self._formulate({}))
-        self.tape, self.layout = Tape(), Layout()
+        self.geometry = {place: places(mechanism)[place] for place in request.varied}
+        given = {place: self._vector(place, len(value)) for place, value in self.geometry.items()}
+        slots = {slot for place in given for slot in self.layout.vectors[place]}
+        self.prepared = Prepared(self.tape, slots, self.layout.scalar)
+        if given:
+            self.mechanism = placed(mechanism, given)
+            self.frame = frames(self.mechanism, self.frame.unit)
         self.formulation = self._formulate({name: Drive(*self._vector(f"drive {name}", 5)) for name in request.drivers})
         design = self.formulation.design
         self.at = self.formulation.configuration({name: self._vector(name, len(value)) for name, value in design.items()})
@@ -124,7 +151,7 @@ class Tracer:
             part = minimum(1.0, longest_turn / _largest(turns))
             step = [part * x for x in step]
         self._store_state(out, self.formulation.retract(self.at, [-x for x in step]))
-        return program("newton", self.tape, out)
+        return program("newton", self.tape, out, self.prepared)
 
     def motion(self, name: str, order: int) -> Program:
         """Rates of the unknowns, and with order 2 their accelerations: one factorisation for both."""
@@ -134,31 +161,45 @@ class Tracer:
         self._store(out, RATE, v)
         if order == 2:
             self._store(out, RATE_T, factor.solve(self._kept(self.formulation.gamma(self.at, v))))
-        return program(name, self.tape, out)
+        return program(name, self.tape, out, self.prepared)
 
     @property
     def carried(self) -> list[tuple[int, int]]:
         """Slots of a solved lane, and of what the lanes after it are predicted from."""
         sizes = {name: len(value) for name, value in self.formulation.design.items()}
+        sizes |= {f"predicted {name}": count for name, count in sizes.items()}
         sizes |= {RATE: self.unknowns, RATE_T: self.unknowns}
-        pairs = [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, "pivot")]
+        pairs = [(self.layout.scalar(FROM + TIME), self.layout.scalar(EARLIER + TIME))]
+        pairs += [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, "pivot")]
         pairs += [(self.layout.scalar(name), self.layout.scalar(name)) for name in ("tolerance", "consistent")]
         for name, count in sizes.items():
             pairs += zip(self.layout.vector(name, count), self.layout.vector(FROM + name, count), strict=True)
         return pairs
 
     def predict(self) -> Program:
-        """The state at the time by a Taylor step of second order."""
-        h = self._in(TIME) - self._in(FROM + TIME)
+        """The state at the time by a Taylor step of second order, and what the last such step lacked.
+
+        That is of third order, whatever the coordinates: it grows by the cube of the step. It is known where the step before was
+        about as long as this one, or longer.
+        """
+        time, here, earlier = (self._in(label + TIME) for label in ("", FROM, EARLIER))
+        h, h_before = time - here, here - earlier
         v, a = self._vector(FROM + RATE, self.unknowns), self._vector(FROM + RATE_T, self.unknowns)
         step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
         start = {name: self._vector(FROM + name, len(value)) for name, value in self.formulation.design.items()}
+        taylor = self.formulation.retract(self.formulation.configuration(start), step)
+        part = h / h_before
+        lack = where_larger(ABOUT * h_before, h, part * part * part, 0.0)
         out: dict[int, Scalar] = {}
-        predicted = self.formulation.retract(self.formulation.configuration(start), step)
-        self._store_state(out, predicted)
-        for name, value in predicted.items():  # kept, to see what the iteration makes of it
-            self._store(out, f"predicted {name}", value)
-        return program("predict", self.tape, out)
+        corrected: dict[str, list[Scalar]] = {}
+        for name, value in taylor.items():
+            self._store(out, f"predicted {name}", value)  # kept, to see what the iteration makes of it
+            solved, predicted = start[name], self._vector(f"{FROM}predicted {name}", len(value))
+            corrected[name] = [x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)]
+        # a step of zero makes Euler parameters of them again
+        still = [0.0] * self.unknowns
+        self._store_state(out, self.formulation.retract(self.formulation.configuration(corrected), still))
+        return program("predict", self.tape, out, self.prepared)
 
     def test(self, name: str, *, neighbours: bool) -> Program:
         """By how much a lane passes all tests of a solution: it has converged, closes, is on its branch, agrees with the
@@ -186,7 +227,7 @@ class Tracer:
             LARGEST_DEVIATION * moved + NEGLIGIBLE - gap,
             LONGEST_STEP - reach,
         )
-        return program(name, self.tape, {self.layout.scalar(MARGIN): reduce(minimum, margins)})
+        return program(name, self.tape, {self.layout.scalar(MARGIN): reduce(minimum, margins)}, self.prepared)
 
     def outputs(self) -> Program:
         """The wanted motions, and the tests of a solution: closure, redundant rows, branch."""
@@ -208,7 +249,7 @@ class Tracer:
             origin = self.mechanism.body(name).origin
             self._store_point(out, ("r", "rdot", "rddot"), name, name, origin, motions, accelerations)
             self._store_rotation(out, name, motions, accelerations)
-        return program("outputs", self.tape, out)
+        return program("outputs", self.tape, out, self.prepared)
 
     def _store_point(
         self,

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from copy import copy
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, ClassVar, Self
 
-from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec
+from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
 from ..errors import MechanismError
 from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
@@ -122,7 +123,7 @@ class Joint(ABC):
         """The same joint seen from its second body: i and j exchanged, and so every pair."""
         pairs = (Kind.POSITIONS, Kind.DIRECTIONS)
         swapped = {f.name: getattr(self, f.name)[::-1] for f in fields(self) if f.metadata.get("kind") in pairs}
-        return replace(self, i=self.j, j=self.i, **swapped)
+        return self.changed(i=self.j, j=self.i, **swapped)
 
     def scaled(self, factor: float) -> Self:
         """The same joint with all lengths multiplied by the factor."""
@@ -132,7 +133,14 @@ class Joint(ABC):
             if value is None or kind not in (Kind.POSITION, Kind.POSITIONS, Kind.LENGTH):
                 continue
             changed[each.name] = _times(factor, value)
-        return replace(self, **changed)
+        return self.changed(**changed)
+
+    def changed(self, **values: Any) -> Self:
+        """The same joint with other fields, not checked again: as good as this one, or of numbers that are known only later."""
+        other = copy(self)
+        for name, value in values.items():
+            object.__setattr__(other, name, value)
+        return other
 
     @property
     def rows(self) -> int:
@@ -253,5 +261,8 @@ def triad(axis: Sequence[Scalar]) -> tuple[Vec3, Vec3, Vec3]:
     """f, g, h: right-handed orthonormal, h along the axis (f x g = h)."""
     h = unit(axis)
     # the global axis most nearly perpendicular to h gives the best conditioned f
-    f = unit(tuple(cross(min((X, Y, Z), key=lambda e: abs(e @ h)), h)))
+    nearest = X
+    for e in (Y, Z):
+        nearest = vec([where_larger(nearest @ h, e @ h, new, old) for new, old in zip(e, nearest, strict=True)])
+    f = unit(tuple(cross(nearest, h)))
     return f, cross(h, f), h

@@ -4,7 +4,8 @@ from .elimination import Elimination
 from .executor import DONE, ITERATIONS, MARGIN, Executor, Plan
 from .llvm_executor import LlvmCode, LlvmExecutor
 from .numpy_executor import NumpyExecutor
-from .trace import Program, Tape, Traced, absolute, before, cos, maximum, minimum, program, sin, sqrt, where_larger
+from .straight_line import Prepared, Program, program
+from .trace import Tape, Traced, absolute, before, cos, maximum, minimum, sin, sqrt, where_larger
 
 __all__ = [
     "DONE",
@@ -16,6 +17,7 @@ __all__ = [
     "LlvmExecutor",
     "NumpyExecutor",
     "Plan",
+    "Prepared",
     "Program",
     "Tape",
     "Traced",

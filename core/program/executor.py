@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..trajectory import Array
-from .trace import Program
+from .straight_line import Program
 
 DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
 """Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
@@ -84,11 +84,17 @@ class Executor(Protocol):
         """
         ...
 
-    def fan(self, samples: Array, out: Array) -> None:
+    @property
+    def room(self) -> int:
+        """Lanes with those that fill up the last vector."""
+        ...
+
+    def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """Follow as many motions as there are lanes through the same samples, each lane alone.
 
         Args:
             samples: `Plan.sampled`, shape (sampled, n).
-            out: takes `Plan.kept`, shape (kept, n, lanes); NaN from where a lane was not accepted.
+            out: takes `Plan.kept`, shape (kept, columns, room), contiguous; NaN from where a lane was not accepted.
+            first, step: column of the first sample, and from each to the next: 1 or -1.
         """
         ...

@@ -10,7 +10,8 @@ import math
 import struct
 from collections.abc import Sequence
 
-from .trace import Node, Program
+from .straight_line import Program
+from .trace import Node
 
 # The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after reduction.
 SINE_TERMS, COSINE_TERMS = 9, 9
@@ -134,7 +135,9 @@ class Lines:
             return self.choose(*operands)
         if op == "before":
             order = ", ".join(f"i32 {k}" for k in (self.width, *range(self.width - 1)))
-            return self.let(f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]}, <{self.width} x i32> <{order}>")
+            return self.let(
+                f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]}, <{self.width} x i32> <{order}>"
+            )
         return self.trigonometric(operands[0], {"sin": 0.0, "cos": 1.0}[op])
 
 

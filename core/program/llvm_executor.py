@@ -25,7 +25,7 @@ class LlvmCode:
         if plan.after:  # a plan that is only run has no loops
             text += [llvm_loops.settle(plan, width), llvm_loops.over_groups("attempt", ["settle", "alone"], self.slots, width)]
             text += [llvm_loops.follow(plan, width), llvm_loops.fan(plan, width)]
-            signatures |= {"attempt": "pi", "follow": "pppiipiii", "fan": "pipiipi"}
+            signatures |= {"attempt": "pi", "follow": "pppiipiii", "fan": "pipiipiiii"}
         self._owner, self.functions = compiled.load("\n".join([*text, llvm_code.declarations(width)]), signatures)
 
 
@@ -67,14 +67,16 @@ class LlvmExecutor:
         wanted = samples.shape[1] - self.margin
         return self._code.functions["follow"](self._address, *addresses, stride, wanted, out.ctypes.data, row, first, step)
 
-    def fan(self, samples: Array, out: Array) -> None:
+    @property
+    def room(self) -> int:
+        """See `Executor`."""
+        return self._groups * self.margin
+
+    def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
-        whole = np.empty((self._code.kept, wanted, self._groups * self.margin)) if self.lanes % self.margin else out
-        lanes = whole.shape[2]
-        self._code.functions["fan"](self._address, self._groups, samples.ctypes.data, stride, wanted, whole.ctypes.data, lanes)
-        if whole is not out:
-            out[:] = whole[:, :, : self.lanes]
+        given = self._address, self._groups, samples.ctypes.data, stride, wanted
+        self._code.functions["fan"](*given, out.ctypes.data, *out.shape[1:], first, step)
 
 
 def _aligned(*shape: int) -> Array:

@@ -1,4 +1,4 @@
-"""The loops of a plan as LLVM code: Newton's iteration, following one motion with lanes as samples, and many with lanes as motions."""
+"""The loops of a plan as LLVM code: Newton's iteration, and following one motion, lanes as samples, or many, lanes as motions."""
 
 from __future__ import annotations
 
@@ -136,15 +136,17 @@ def fan(plan: Plan, width: int) -> str:
         place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%k"))
         begin.write(slot, begin.spread(begin.let(f"load double, ptr {place}, align 8")))
     accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
-    column = keep.sum(keep.product("%k", "%lanes"), keep.product("%g", width))
-    plane = keep.product("%wanted", "%lanes")
+    column = keep.sum("%first", keep.product("%step", "%k"))
+    place_in_plane = keep.sum(keep.product(column, "%lanes"), keep.product("%g", width))
+    plane = keep.product("%columns", "%lanes")
     for row, slot in enumerate(plan.kept):
-        place = keep.number("%out", keep.sum(keep.product(plane, row), column))
+        place = keep.number("%out", keep.sum(keep.product(plane, row), place_in_plane))
         keep.lines.append(f"store {vector} {keep.choose('%still', keep.read(slot), keep.constant(math.nan))}, ptr {place}, align 8")
     carried = [(move.read(source), target) for source, target in plan.carried]
     for value, target in carried:
         move.write(target, value)
-    return f"""define void @fan(ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted, ptr %out, i64 %lanes) {{
+    inputs = "ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted"
+    return f"""define void @fan({inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step) {{
 entry:
   br label %group
 group:

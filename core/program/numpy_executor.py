@@ -9,7 +9,8 @@ import numpy as np
 
 from ..trajectory import Array
 from .executor import DONE, ITERATIONS, MARGIN, Plan
-from .trace import Program, operands
+from .straight_line import Program
+from .trace import operands
 
 
 def _min(a: Array, b: Array, out: Array) -> None:
@@ -120,7 +121,12 @@ class NumpyExecutor:
             at += accepted
         return at
 
-    def fan(self, samples: Array, out: Array) -> None:
+    @property
+    def room(self) -> int:
+        """See `Executor`."""
+        return self.lanes
+
+    def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
         plan, block = self._plan, self._block
         source, target = np.array(plan.carried).T
@@ -129,7 +135,7 @@ class NumpyExecutor:
             block[list(plan.sampled)] = sample[:, None]
             self.attempt("alone")
             alive &= block[plan.slots[MARGIN]] > 0.0
-            out[:, k] = np.where(alive, block[list(plan.kept)], np.nan)
+            out[:, first + step * k] = np.where(alive, block[list(plan.kept)], np.nan)
             for name in plan.onward:
                 self.run(name)
             block[target] = block[source]

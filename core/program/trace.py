@@ -7,10 +7,7 @@ outputs need. What a scene does not use is therefore not in its programs, withou
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
 from typing import TypeAlias
 
 from ..algebra import Scalar
@@ -21,8 +18,6 @@ Node: TypeAlias = tuple[str, *tuple[float, ...]]
 "+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max" propagate NaN); "larger" a b is
 true where |a| > |b|; "where" m p q is p where m is true, else q; "before" x a is the x of the lane before, and a in the first lane.
 """
-
-FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"})
 
 
 class Tape:
@@ -87,6 +82,15 @@ class Traced:
     def __neg__(self) -> Scalar:
         negated = self._negated
         return self.tape.node("neg", self.number) if negated is None else negated
+
+    def sqrt(self) -> Scalar:
+        """The square root."""
+        return sqrt(self)
+
+    @staticmethod
+    def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
+        """p where |a| > |b|, else q."""
+        return where_larger(a, b, p, q)
 
     @property
     def _negated(self) -> Traced | None:
@@ -212,49 +216,6 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
 def before(x: Traced, first: Traced) -> Scalar:
     """The x of the lane before; in the first lane, `first`."""
     return x.tape.node("before", x.number, first.number)
-
-
-@dataclass(frozen=True)
-class Program:
-    """Operations in an order that can be run, and the slots that take the results.
-
-    Attributes:
-        nodes: the live operations only; operands are positions in this tuple.
-        outputs: slot -> position of the node it takes. All outputs are written after the last input was read.
-    """
-
-    name: str
-    nodes: tuple[Node, ...]
-    outputs: Mapping[int, int]
-
-    @property
-    def operations(self) -> Counter[str]:
-        """How often each operation occurs."""
-        return Counter(node[0] for node in self.nodes)
-
-    @cached_property
-    def flops(self) -> int:
-        """Arithmetic operations of one lane: everything but reading inputs and constants."""
-        return sum(count for op, count in self.operations.items() if op in FLOPS)
-
-
-def program(name: str, tape: Tape, outputs: Mapping[int, Scalar]) -> Program:
-    """The part of the tape that the outputs (slot -> scalar) need."""
-    wanted = {slot: tape.number(value) for slot, value in outputs.items()}
-    live: set[int] = set()
-    waiting = list(wanted.values())
-    while waiting:
-        number = waiting.pop()
-        if number not in live:
-            live.add(number)
-            waiting += operands(tape.nodes[number])
-    order = sorted(live)
-    position = {number: k for k, number in enumerate(order)}
-    nodes = tuple(
-        node if node[0] in ("input", "const") else (node[0], *(position[int(x)] for x in node[1:]))
-        for node in (tape.nodes[number] for number in order)
-    )
-    return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()})
 
 
 def operands(node: Node) -> tuple[int, ...]:

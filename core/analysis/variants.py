@@ -1,0 +1,68 @@
+"""Many variants of one mechanism along one path: the programs' lanes are variants, and geometry is an input.
+
+All variants take the same samples, predicted each from its own pose at the sample before. A lane that is not accepted somewhere is
+solved again alone, by the march that divides its steps; what that does not reach either is NaN, with the reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..trajectory import Array
+from .march import CONSISTENT, Route, march
+
+
+@dataclass(frozen=True, eq=False)
+class Variants:
+    """What became of V variants at n samples, in the order of the path.
+
+    Attributes:
+        kept: the kept rows of the model (`Model.rows`), shape (kept, n, V); NaN where a sample was not reached.
+        solved: whether each sample of each variant was reached, shape (n, V).
+        retried: how many variants were solved again alone.
+        messages: by variant, why samples are missing.
+    """
+
+    kept: Array
+    solved: NDArray[np.bool_]
+    retried: int
+    messages: Mapping[int, str]
+
+
+def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
+    """Solve all variants at all samples.
+
+    Args:
+        route: of a model with varied places, from the design position.
+        geometry: numbers of the varied places in their order, shape (numbers, V).
+        tol: as for `solve`.
+    """
+    model, n, count = route.model, len(route.path.times), geometry.shape[1]
+    lanes = model.standing(geometry)
+    lanes[[model.slots[name] for name in ("tolerance", "consistent")]] = np.array([[tol], [max(CONSISTENT, tol)]])
+    executor = model.executor(count)
+    executor.put(range(len(lanes)), lanes)
+    model.start(executor, route.origin)
+    start = executor.get(model.ahead)
+    whole = np.empty((model.kept, n, executor.room))
+    for side in route.sides:
+        executor.put(model.ahead, start)
+        samples = np.ascontiguousarray(side.samples[:, : len(side.times)])
+        executor.fan(samples, whole, side.first, side.step)
+    kept = whole[:, :, :count]
+    solved = ~np.isnan(kept[model.rows["closure"].start])
+    failed = np.flatnonzero(~solved.all(axis=0))
+    messages: dict[int, str] = {}
+    for k in failed.tolist():
+        if np.isnan(lanes[0, k]):
+            messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
+            continue
+        found = march(replace(route, design=lanes[:, k]), tol)
+        kept[:, route.order, k], solved[route.order, k] = found.kept, found.solved
+        if found.messages:
+            messages[k] = "; ".join(found.messages)
+    return Variants(kept[:, route.back], solved[route.back], len(failed), messages)

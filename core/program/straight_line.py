@@ -1,0 +1,89 @@
+"""Straight-line programs: the operations of a tape that some outputs need, in an order that can be run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..algebra import Scalar
+from .trace import Node, Tape, Traced, operands
+
+FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"})
+
+
+@dataclass(frozen=True)
+class Program:
+    """Operations in an order that can be run, and the slots that take the results.
+
+    Attributes:
+        nodes: the live operations only; operands are positions in this tuple.
+        outputs: slot -> position of the node it takes. All outputs are written after the last input was read.
+    """
+
+    name: str
+    nodes: tuple[Node, ...]
+    outputs: Mapping[int, int]
+
+    @property
+    def operations(self) -> Counter[str]:
+        """How often each operation occurs."""
+        return Counter(node[0] for node in self.nodes)
+
+    @cached_property
+    def flops(self) -> int:
+        """Arithmetic operations of one lane: everything but reading inputs and constants."""
+        return sum(count for op, count in self.operations.items() if op in FLOPS)
+
+
+def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prepared | None = None) -> Program:
+    """The part of the tape that the outputs (slot -> scalar) need; what is prepared is read from its slot."""
+    wanted = {slot: tape.number(value) for slot, value in outputs.items()}
+    live: dict[int, Node] = {}
+    waiting = list(wanted.values())
+    while waiting:
+        number = waiting.pop()
+        if number not in live:
+            live[number] = node = tape.nodes[number] if prepared is None else prepared.node(number)
+            waiting += operands(node)
+    position = {number: k for k, number in enumerate(sorted(live))}
+    nodes = tuple(
+        node if node[0] in ("input", "const") else (node[0], *(position[int(x)] for x in node[1:]))
+        for _, node in sorted(live.items())
+    )
+    return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()})
+
+
+class Prepared:
+    """What depends on given slots alone (the geometry): computed once by a program of its own, and kept in slots.
+
+    Args:
+        given: the slots it may depend on.
+        slot: a new slot for a name.
+    """
+
+    def __init__(self, tape: Tape, given: Collection[int], slot: Callable[[str], int]) -> None:
+        self.tape, self._given, self._slot = tape, given, slot
+        self._fixed: list[bool] = []
+        self._kept: dict[int, int] = {}
+
+    def node(self, number: int) -> Node:
+        """The node, or where it is prepared the input that reads it."""
+        node = self.tape.nodes[number]
+        # a decision is no number that a slot could hold: it is made anew of what is prepared
+        if node[0] in ("input", "const", "larger") or not self._is_fixed(number):
+            return node
+        if number not in self._kept:
+            self._kept[number] = self._slot(f"prepared {len(self._kept)}")
+        return ("input", self._kept[number])
+
+    def program(self) -> Program:
+        """What computes all that programs have read so far."""
+        return program("prepare", self.tape, {slot: Traced(self.tape, number) for number, slot in self._kept.items()})
+
+    def _is_fixed(self, number: int) -> bool:
+        for node in self.tape.nodes[len(self._fixed) :]:
+            here = node[1] in self._given if node[0] == "input" else all(self._fixed[x] for x in operands(node))
+            self._fixed.append(here)
+        return self._fixed[number]
