@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from typing import Any, Protocol
 
+from ..algebra import Vec3, vec
+from ..jet import Jet
 from ..mechanism import Mechanism, Vector
 from ..motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
 
 TIME = "time"
 """The name a sweep has instead of a driver's where time itself is swept."""
+
+MARKER = "~"
+"""Begins the names of points that the reading of a case adds to a body, to see how it turns; they are no hardpoints."""
 
 
 class Truth(StrEnum):
@@ -69,15 +75,58 @@ class Sweep:
         return {self.driver: self.values, **further}
 
 
+class Quantity(Protocol):
+    """What is compared: a function of the motion of points.
+
+    Attributes:
+        points: names of the points it reads.
+        unit: of its value, SI: m, rad, 1, or one of these by m.
+        orders: how many of value, first and second derivative by time follow from what engines give.
+        atol, rtol: an error is accepted up to atol [unit, unit/s, unit/s^2] + rtol * range of the reference.
+        why: the reason for the tolerance.
+        sense: what a positive value means; empty where unit and name say it.
+        signs: the convention of signs and axes; empty where the case's own axes are all there is.
+        facts: what a reader of results needs to know of it.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def points(self) -> tuple[str, ...]: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def orders(self) -> int: ...
+    @property
+    def atol(self) -> float: ...
+    @property
+    def rtol(self) -> float: ...
+    @property
+    def why(self) -> str: ...
+    @property
+    def sense(self) -> str: ...
+    @property
+    def signs(self) -> str: ...
+    @property
+    def facts(self) -> Mapping[str, Any]: ...
+
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """The quantity over the samples; what is not known is NaN.
+
+        Args:
+            at: global positions of its points as jets [m].
+            design: the same at the design position, where they stand still.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Output:
-    """A compared quantity: a point's coordinate along a direction.
+    """The plain quantity: a point's coordinate along a direction.
 
     Attributes:
         direction: global unit vector [-].
         relative: measured from the design position.
-        atol, rtol: an error is accepted up to atol [m, m/s, m/s^2] + rtol * range of the reference.
-        why: the reason for the tolerance.
     """
 
     name: str
@@ -88,6 +137,36 @@ class Output:
     rtol: float
     why: str
     unit: str = "m"
+
+    @property
+    def orders(self) -> int:
+        """Position, velocity and acceleration."""
+        return 3
+
+    @property
+    def sense(self) -> str:
+        """The direction says it."""
+        return ""
+
+    @property
+    def signs(self) -> str:
+        """None but the case's own axes."""
+        return ""
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The point."""
+        return (self.point,)
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """All there is to it."""
+        return asdict(self)
+
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """The coordinate [m]."""
+        position = at[self.point]
+        return vec(self.direction) @ (position - design[self.point] if self.relative else position)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +192,15 @@ class Case:
     truth: Truth
     mechanism: Mechanism
     sweep: Sweep
-    outputs: tuple[Output, ...]
+    outputs: tuple[Quantity, ...]
     reference: Mapping[str, Series] = field(default_factory=dict[str, Series])
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points that outputs read; the motion of no other is needed."""
-        return tuple(dict.fromkeys(output.point for output in self.outputs))
+        return tuple(dict.fromkeys(point for output in self.outputs for point in output.points))
+
+    @property
+    def signs(self) -> str:
+        """The convention of signs of the outputs that have one, in words; what heads every table of them. Empty without."""
+        return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))

@@ -12,6 +12,7 @@ from ..joints import Coupler, Joint, Kind
 from ..motions import Motion
 from .reading.driving import DRIVERS
 from .reading.schema import kind_of, own_fields
+from .suspension import SuspensionOutput, own_keys
 
 # Geometry that suits any joint. The two directions make a right angle up to the rounding of a table, as a cross wants it, and
 # point the same way on, as the shafts of a constant-velocity joint do.
@@ -36,6 +37,18 @@ def catalogue() -> Iterator[str]:
     yield from _columns([(name, _keys(cls)) for name, cls in sorted(DRIVERS.items())])
     yield "motions of drivers: type, and"
     yield from _columns([(name, _keys(cls)) for name, cls in sorted(Motion.registry.items())])
+
+
+def output_catalogue() -> Iterator[str]:
+    """Lines to print: the types of outputs, with their unit, their keys, what they need of [suspension], and their signs."""
+    yield "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and"
+    rows: list[tuple[str, ...]] = []
+    for name, cls in sorted(SuspensionOutput.registry.items()):
+        keys = [each.name if each.default is MISSING else f"({each.name})" for each in own_keys(cls)]
+        needs = f"needs {', '.join(cls.needs)}" if cls.needs else ""
+        rows.append((name, f"[{cls.measure}]", ", ".join(keys), f"positive: {cls.positive}", needs))
+    yield from _columns(rows)
+    yield "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table [suspension] says of which wheel"
 
 
 def rows_of(cls: type[Joint]) -> int | None:

@@ -11,6 +11,9 @@ a motion adds d * s / D to an acceleration, s being its own: pace is then sqrt(s
 fastest; both are the largest over the samples, and of all drivers the one that goes fastest through D counts. So the same
 relative accuracy is asked of all three, at any scale and any rate: with atol = 1e-9 m, a mechanism of 1 m and a drive of 1 m/s,
 an acceleration of 1 m/s^2 that is wrong by 1e-6 of itself is a thousand times out of tolerance.
+
+The same holds for outputs in other units, an angle for one: they too are functions of the pose. The derivative of an output by
+wheel travel is one with an atol of its own, that of the output over D; its rate is held to that times the pace.
 """
 
 from __future__ import annotations
@@ -20,12 +23,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..algebra import Vec3
 from ..drivers import Driver, JointDriver
 from ..errors import CaseError
+from ..jet import Jet
 from ..joints.base import Joint, Kind
-from ..trajectory import Array, Trajectory
-from .case import Case, Output, Series
+from ..mechanism import Vector
+from ..trajectory import Array, PointMotion, Trajectory
+from .case import MARKER, Case, Quantity, Series
 from .record import Deviation, Deviations, OutputSeries
 
 # D of a mechanism whose points all coincide [m]: keeps the pace finite and is smaller than any mechanism driven in earnest.
@@ -34,23 +41,30 @@ SMALLEST_SIZE = 1e-3
 
 def pace(case: Case) -> float:
     """How fast the mechanism goes through itself [1/s]: see the head of this file."""
-    path = case.sweep.path
-    turns = np.array([_turns(case.mechanism.driver(name)) for name in path.motions])
-    values, rates, seconds = path.drive(list(path.motions), path.times)
-    extent = np.where(turns, 1.0, max(SMALLEST_SIZE, _size(case, values[~turns])))
+    path, turns = case.sweep.path, _turning(case)
+    _, rates, seconds = path.drive(list(path.motions), path.times)
+    extent = np.where(turns, 1.0, size(case))
     rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
     return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
 
 
+def size(case: Case) -> float:
+    """Largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m]."""
+    path = case.sweep.path
+    values, _, _ = path.drive(list(path.motions), path.times)
+    points = [case.mechanism.point(name).position for name in case.points if not name.startswith(MARKER)]
+    points += [position for joint in case.mechanism.joints for position in _positions(joint)]
+    shift = float(np.ptp(values[~_turning(case)], axis=1).max(initial=0.0))
+    return max(SMALLEST_SIZE, float(np.ptp(np.array(points), axis=0).max()), shift)
+
+
+def _turning(case: Case) -> NDArray[np.bool_]:
+    """Which of the moving drivers turn, shape (drivers,)."""
+    return np.array([_turns(case.mechanism.driver(name)) for name in case.sweep.path.motions], dtype=np.bool_)
+
+
 def _turns(driver: Driver) -> bool:
     return isinstance(driver, JointDriver) and driver.freedom == "rotation"
-
-
-def _size(case: Case, shifts: Array) -> float:
-    """Largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m]."""
-    points = [case.mechanism.point(name).position for name in case.points]
-    points += [position for joint in case.mechanism.joints for position in _positions(joint)]
-    return max(float(np.ptp(np.array(points), axis=0).max()), float(np.ptp(shifts, axis=1).max(initial=0.0)))
 
 
 def _positions(joint: Joint) -> Iterator[tuple[float, float, float]]:
@@ -61,22 +75,29 @@ def _positions(joint: Joint) -> Iterator[tuple[float, float, float]]:
             yield from getattr(joint, each.name)
 
 
-def output_series(case: Case, output: Output, trajectory: Trajectory) -> Series:
+def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Series:
     """The output over the samples of a trajectory: NaN where the sample was not solved, None where the engine has none."""
-    motion = trajectory.points[output.point]
-    origin = np.array(case.mechanism.point(output.point).position) if output.relative else np.zeros(3)
-
-    def along(vectors: Array | None) -> Array | None:
-        if vectors is None:
-            return None
-        return np.where(trajectory.solved, np.asarray(vectors, dtype=np.float64) @ np.array(output.direction), np.nan)
-
-    position = along(np.asarray(motion.position, dtype=np.float64) - origin)
-    assert position is not None
-    return Series(position, along(motion.velocity), along(motion.acceleration))
+    at = {name: _moving(trajectory.points[name]) for name in output.points}
+    with np.errstate(all="ignore"):  # what is not known is NaN, and what is made of it becomes NaN
+        jet = output.of(at, {name: _standing(case.mechanism.point(name).position) for name in output.points})
+    solved = trajectory.solved
+    position, *rates = (np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a))
+    known = [rate if np.isfinite(rate).any() or not solved.any() else None for rate in rates]
+    return Series(position, *known)
 
 
-def as_numbers(series: Series, output: Output) -> OutputSeries:
+def _moving(motion: PointMotion) -> Vec3:
+    """A point's position as jets, NaN for derivatives that the engine does not give."""
+    given = (motion.position, motion.velocity, motion.acceleration)
+    x, v, a = (np.full(np.shape(motion.position), np.nan) if each is None else np.asarray(each, dtype=np.float64) for each in given)
+    return Vec3(*(Jet(x[:, k], v[:, k], a[:, k]) for k in range(3)))
+
+
+def _standing(position: Vector) -> Vec3:
+    return Vec3(*(Jet(np.array(x), np.zeros(()), np.zeros(())) for x in position))
+
+
+def as_numbers(series: Series, output: Quantity) -> OutputSeries:
     """The series as plain numbers, null for NaN, with the reason for what is missing."""
     reasons = [] if np.isfinite(series.position).all() else ["samples without a value are null"]
     reasons += [f"there is no {name}" for name in ("velocity", "acceleration") if getattr(series, name) is None]
@@ -85,6 +106,7 @@ def as_numbers(series: Series, output: Output) -> OutputSeries:
         velocity=None if series.velocity is None else _numbers(series.velocity),
         acceleration=None if series.acceleration is None else _numbers(series.acceleration),
         unit=output.unit,
+        sense=output.sense or None,
         reason="; ".join(reasons) or None,
     )
 
@@ -93,7 +115,7 @@ def _numbers(values: Array) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
-def deviations(case: Case, output: Output, found: Series, standards: Sequence[tuple[str, Series]]) -> Deviations:
+def deviations(case: Case, output: Quantity, found: Series, standards: Sequence[tuple[str, Series]]) -> Deviations:
     """How far an output is off in position, velocity and acceleration.
 
     Args:
@@ -109,7 +131,9 @@ def deviations(case: Case, output: Output, found: Series, standards: Sequence[tu
             (name, getattr(series, quantity)) for name, series in standards if getattr(series, quantity) is not None
         ]
         compared[quantity] = None
-        if values is None:
+        if order >= output.orders:
+            reasons.append(f"{quantity}: takes a derivative more than engines give")
+        elif values is None:
             reasons.append(f"{quantity}: the engine gives none")
         elif not known:
             names = " and ".join(name for name, _ in standards)
@@ -149,9 +173,9 @@ def deviation(values: Array, reference: Array, atol: float, rtol: float, against
     )
 
 
-def describe(output: str, quantity: str, worst: Deviation, driver: str, values: Sequence[float]) -> str:
-    """One line that says how far off an output is, and where."""
-    unit = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}[quantity]
+def describe(output: str, quantity: str, worst: Deviation, driver: str, values: Sequence[float], unit: str = "m") -> str:
+    """One line that says how far off an output is, and where; `unit` is the output's."""
+    unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[quantity]
     return (
         f"{output}: {quantity} is off by {worst.max_abs:.3g} {unit} at sample {worst.worst_step} ({driver} = "
         f"{values[worst.worst_step]:.9g}), tolerance {worst.tolerance:.3g} {unit}, against {worst.against}"

@@ -10,11 +10,14 @@ from typing import Any
 
 from ...joints import Coupler, Joint, Kind
 from ...mechanism import Body, Mechanism, Point, Vector
-from ..case import Case, Output, Truth
-from .document import class_of, explained, fault, join, parse, read_text, remedy, shown, typed
+from ..case import Case, Output, Quantity, Truth
+from ..compare import size
+from ..suspension import PER_TRAVEL, SuspensionOutput
+from .document import as_table, class_of, explained, fault, join, parse, read_text, remedy, shown, typed
 from .driving import read_drivers, read_sweep
 from .reference import Convert, ReferenceKeys, is_derivative, read_reference
 from .schema import (
+    COORDINATE,
     SCHEMA,
     BodyKeys,
     CaseKeys,
@@ -25,15 +28,10 @@ from .schema import (
     kind_of,
     own_fields,
 )
+from .suspension import SuspensionTable, read_output, read_suspension, with_markers, with_slopes
+from .tolerance import DEFAULT_ATOL, DEFAULT_WHY, tolerance
 
 LARGEST_FILE = 4_000_000
-
-# Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized mechanisms at 1e-16 m.
-DEFAULT_ATOL = 1e-9
-DEFAULT_WHY = (
-    "the default of 1e-9 m: a thousandth of the micrometre that hardpoints are measured to, and millions of times the round-off "
-    "of metre-sized coordinates in double precision"
-)
 
 LENGTHS: Mapping[str, Convert] = {"m": float, "mm": lambda x: x / 1000.0}
 ANGLES: Mapping[str, Convert] = {"rad": float, "deg": math.radians}
@@ -56,8 +54,8 @@ def load_case(path: str | Path) -> Case:
     length, angle = LENGTHS[units.length], ANGLES[units.angle]
     mechanism = _mechanism(file, keys, length)
     sweep, driver_unit = read_sweep(file, keys, mechanism, length, angle)
-    outputs = _outputs(file, keys, mechanism, length)
-    case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
+    by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float}
+    case = _with_outputs(file, keys, Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()), by_unit)
     if keys.reference is None:
         return case
     if keys.truth in (None, Truth.CONSENSUS_ONLY):
@@ -65,7 +63,7 @@ def load_case(path: str | Path) -> Case:
         kinds = ", ".join(kind for kind in Truth if kind is not Truth.CONSENSUS_ONLY)
         raise fault(file, "truth", f"found {found} beside a [reference], expected where that comes from; give one of {kinds}")
     columns = typed(file, "reference", keys.reference, ReferenceKeys)
-    series = read_reference(file, columns, driver_unit, length, sweep.values, [output.name for output in outputs])
+    series = read_reference(file, columns, driver_unit, by_unit, sweep.values, case.outputs)
     return replace(case, truth=keys.truth, reference=series)
 
 
@@ -116,22 +114,38 @@ def _unit(direction: Vector) -> Vector:
     return x / length, y / length, z / length
 
 
-def _outputs(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Convert) -> tuple[Output, ...]:
+def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Convert]) -> Case:
+    """The case with its outputs, and with the points that they need beyond those of the file."""
+    mechanism = case.mechanism
     if not keys.points:
         raise fault(file, "points", "found no point, expected one whose motion is compared; add [points.NAME]")
-    if keys.outputs:
-        return tuple(_output(file, join("outputs", name), name, value, keys, length) for name, value in keys.outputs.items())
-    return tuple(
+    table = None if keys.suspension is None else read_suspension(file, keys.suspension, mechanism, units["m"], units["rad"])
+    outputs: tuple[Quantity, ...] = tuple(
         Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
         for point in mechanism.points
         for axis, along in AXES.items()
     )
+    if keys.outputs:
+        outputs = tuple(_output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items())
+    case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
+    return replace(case, outputs=with_slopes(outputs, size(case))) if table is not None and table.per_travel else case
 
 
-def _output(file: Path, key: str, name: str, value: object, keys: CaseKeys, length: Convert) -> Output:
-    output = typed(file, key, value, OutputKeys)
-    if is_derivative(name):
+def _output(
+    file: Path, name: str, value: object, keys: CaseKeys, table: SuspensionTable | None, case: Case, units: Mapping[str, Convert]
+) -> Quantity:
+    key = join("outputs", name)
+    if is_derivative(name) or name.endswith(PER_TRAVEL):
         raise fault(file, key, "a name with this ending is a derivative in reference tables; give the output another name")
+    if "type" in as_table(file, key, value):
+        cls = class_of(file, key, "output", value, {COORDINATE: Output, **SuspensionOutput.registry})
+        if issubclass(cls, SuspensionOutput):
+            return read_output(file, key, cls, name, value, table, case, units)
+    return _coordinate(file, key, name, value, keys, units["m"])
+
+
+def _coordinate(file: Path, key: str, name: str, value: object, keys: CaseKeys, length: Convert) -> Output:
+    output = typed(file, key, value, OutputKeys)
     if output.point not in keys.points:
         raise fault(file, join(key, "point"), f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}")
     match output.component, output.direction:
@@ -144,15 +158,4 @@ def _output(file: Path, key: str, name: str, value: object, keys: CaseKeys, leng
         case component, _:
             what = "neither component nor direction" if component is None else "both component and direction"
             raise fault(file, key, f'found {what}, expected one of them; give component = "x" or direction = [x, y, z]')
-    return Output(name, output.point, direction, output.relative, *_tolerance(file, key, output, length))
-
-
-def _tolerance(file: Path, key: str, output: OutputKeys, length: Convert) -> tuple[float, float, str]:
-    """atol [m], rtol [-] and the reason for them."""
-    if output.atol is None and output.rtol is None:
-        if output.why is not None:
-            raise fault(file, join(key, "why"), "found a reason without a tolerance, expected both; add atol or rtol")
-        return DEFAULT_ATOL, 0.0, DEFAULT_WHY
-    if output.why is None:
-        raise fault(file, join(key, "why"), "missing, expected the reason for the tolerance; add the key 'why'")
-    return length(output.atol or 0.0), output.rtol or 0.0, output.why
+    return Output(name, output.point, direction, output.relative, *tolerance(file, key, output, length))

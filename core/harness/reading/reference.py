@@ -1,14 +1,19 @@
-"""The reference of a case: samples of its outputs, from a CSV file beside the case file or from rows inside it.
+"""The reference of a case: samples of its outputs, from a CSV file beside the case file or from rows inside it, or proved ones.
 
 First column: driver values, on the grid of the sweep, for nothing is interpolated. Further columns: OUTPUT, OUTPUT.velocity,
 OUTPUT.acceleration, in the units of the case file. Outputs without a column have no reference, and the comparison says so.
+A file ending in .json is a proved reference (`harness.references`), in SI units.
+
+A file with columns of suspension outputs names the convention of their signs in a comment, "# signs: iso8855" for one, so that
+it can be read by itself and is not taken for one with other signs.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -18,13 +23,16 @@ import numpy as np
 from msgspec import Meta
 
 from ...trajectory import Array
-from ..case import Series
+from ..case import Quantity, Series
+from ..references import read, series
+from ..suspension import PerTravel, SuspensionOutput
 from .document import fault, read_text, remedy, shown
 
 LARGEST_FILE = 64_000_000
 DERIVATIVES = (".velocity", ".acceleration")
 # Twelve digits of a driver value: what is off by less moves no output by as much as a tolerance; a rounded table is off by more.
 SAME_GRID = 1e-12
+SIGNS = re.compile(r"\s*#\s*signs:\s*(\w+)")
 
 Convert: TypeAlias = Callable[[float], float]
 """From the unit of a file to SI."""
@@ -40,12 +48,13 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class _Samples:
-    """Columns by name and rows with the place to name in messages."""
+    """Columns by name, rows with the place to name in messages, and the convention that a comment names."""
 
     file: Path
     header: str
     columns: Sequence[str]
     rows: Sequence[tuple[str, Sequence[float]]]
+    signs: str = ""
 
 
 def is_derivative(name: str) -> bool:
@@ -54,34 +63,63 @@ def is_derivative(name: str) -> bool:
 
 
 def read_reference(
-    case_file: Path, keys: ReferenceKeys, driver: Convert, length: Convert, values: Array, outputs: Sequence[str]
+    case_file: Path, keys: ReferenceKeys, driver: Convert, units: Mapping[str, Convert], values: Array, outputs: Sequence[Quantity]
 ) -> dict[str, Series]:
     """True values by output name, SI.
 
     Args:
-        driver, length: from the unit of the driver and of lengths to SI.
+        driver: from the unit of the driver to SI.
+        units: from the file's units to SI, by the unit there: m, rad and 1.
         values: the grid of the sweep [m or rad], shape (n,).
-        outputs: names of the outputs of the case.
+        outputs: those of the case.
 
     Raises:
-        CaseError: the file cannot be read or lies elsewhere, a column is unknown, or the grid is not that of the sweep.
+        CaseError: the file cannot be read or lies elsewhere, a column is unknown, the grid is not that of the sweep, or signs are
+            not those of the case.
     """
+    by_name = {output.name: output for output in outputs}
+    if keys.file is not None and keys.file.endswith(".json"):
+        file = _only_beside(case_file, keys)
+        return series(file, read(file), values, outputs)
     samples = _inline(case_file, keys, outputs) if keys.file is None else _from_csv(case_file, keys)
     names = list(samples.columns[1:])
-    _check_columns(samples, names, outputs)
+    _check_columns(samples, names, [*by_name])
     _check_grid(samples, [driver(row[0]) for _, row in samples.rows], values)
-    column = {name: np.array([length(row[k]) for _, row in samples.rows]) for k, name in enumerate(names, start=1)}
+    if keys.file is not None:
+        _check_signs(samples, [by_name[name] for name in names if name in by_name])
+    column = {name: [row[k] for _, row in samples.rows] for k, name in enumerate(names, start=1)}
     return {
-        name: Series(column[name], *(column.get(name + derivative) for derivative in DERIVATIVES))
-        for name in outputs
-        if name in column
+        output.name: Series(
+            _in_si(column[output.name], output.unit, units),
+            *(
+                _in_si(column[name], output.unit, units) if (name := output.name + ending) in column else None
+                for ending in DERIVATIVES
+            ),
+        )
+        for output in outputs
+        if output.name in column
     }
 
 
-def _inline(file: Path, keys: ReferenceKeys, outputs: Sequence[str]) -> _Samples:
+def _in_si(column: Sequence[float], unit: str, units: Mapping[str, Convert]) -> Array:
+    above, _, below = unit.partition("/")
+    scale = units[below](1.0) if below else 1.0
+    return np.array([units[above](value) / scale for value in column])
+
+
+def _check_signs(samples: _Samples, outputs: Sequence[Quantity]) -> None:
+    """A table of suspension outputs says whose signs it has, and they are the case's."""
+    wanted = {output.vehicle.convention.value for output in outputs if isinstance(output, SuspensionOutput | PerTravel)}
+    for convention in wanted - {samples.signs}:
+        found = f"found {shown(samples.signs)}" if samples.signs else "found no convention"
+        problem = f'{found} of signs, expected {convention!r} as in [suspension]; write "# signs: {convention}" if its signs are so'
+        raise fault(samples.file, "signs", problem)
+
+
+def _inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> _Samples:
     if keys.rows is None:
         raise fault(file, "reference", "found neither file nor rows, expected one of them; name a CSV file or give the rows")
-    columns = keys.columns or ["driver", *outputs]
+    columns = keys.columns or ["driver", *(output.name for output in outputs if not isinstance(output, PerTravel))]
     rows = [(f"reference.rows[{k}]", row) for k, row in enumerate(keys.rows)]
     samples = _Samples(file, "reference.columns", columns, rows)
     for where, row in rows:
@@ -90,9 +128,7 @@ def _inline(file: Path, keys: ReferenceKeys, outputs: Sequence[str]) -> _Samples
 
 
 def _from_csv(case_file: Path, keys: ReferenceKeys) -> _Samples:
-    if keys.rows is not None or keys.columns is not None:
-        raise fault(case_file, "reference", "found file and rows or columns, expected one source; remove one of them")
-    file = _beside(case_file, keys.file or "")
+    file = _only_beside(case_file, keys)
     text = read_text(file, LARGEST_FILE, "thin out the samples")
     # comment lines are blanked, not dropped, so that the reader's line numbers are those of the file
     lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
@@ -109,7 +145,15 @@ def _from_csv(case_file: Path, keys: ReferenceKeys) -> _Samples:
     for where, cells in body:
         _check_width(samples, where, len(cells))
         rows.append((where, [_number(file, f"{where}, column {name}", cell) for name, cell in zip(columns, cells, strict=True)]))
-    return _Samples(file, header, columns, rows)
+    signs = next((found[1] for line in text.splitlines() if (found := SIGNS.match(line))), "")
+    return _Samples(file, header, columns, rows, signs)
+
+
+def _only_beside(case_file: Path, keys: ReferenceKeys) -> Path:
+    """The file, which must be the only source."""
+    if keys.rows is not None or keys.columns is not None:
+        raise fault(case_file, "reference", "found file and rows or columns, expected one source; remove one of them")
+    return _beside(case_file, keys.file or "")
 
 
 def _beside(case_file: Path, name: str) -> Path:

@@ -30,11 +30,25 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
                          no driver, or "time": start and stop are times [s], there is no rate, and the motions move everything
                          both are solved from the design position outwards, or from the first sample, to which all drivers go
                          straight where their motions do not pass through the design at time zero
-    [outputs.NAME]       point, component = "x", "y" or "z", or direction; (relative) = false: measured from the design
-                         (atol), a length, (rtol), of the range of the true values: with either, (why), the reason for it
+    [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
+                         type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list --outputs` prints them with their
+                         keys, signs, and what they need there; each comes with its derivative by wheel travel, NAME.per_travel
+                         (relative) = false: measured from the design; not for quotients of velocities, such as motion_ratio
+                         (atol), in the output's unit, (rtol), of the range of the true values: with either, (why), the reason
                          no outputs: x, y and z of every point
+    [suspension]         what suspension outputs need to know of the vehicle
+                         convention = "iso8855" or "sae_j670" (z down), side = "left" or "right": whose signs, and which wheel
+                         forward, up: directions of the vehicle in the file's axes, at right angles
+                         (wheel_center) = "wheel_center", the name of a point; (center_plane) = [0, 0, 0], a point in the middle
+                         (static_toe) = 0, toe-in, and (static_camber) = 0, top outboard: angles of the wheel at design
+                         (kingpin) = ["lower", "upper"], names of points; (wheel_radius), loaded, to the contact centre
+                         (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
+                         (brakes) = "outboard", (drive) = "inboard": what holds the torque, wheel carrier or vehicle body
+                         (brake_share), (drive_share): parts of the vehicle's force at this axle, 0 to 1
+                         (per_travel) = true: derivatives by travel, the upward way of the wheel centre
     [reference]          true values: file, the name of a CSV file beside the case file, or rows, with (columns)
                          first column: what is swept, on its grid; others: OUTPUT, OUTPUT.velocity, OUTPUT.acceleration
+                         a CSV file of suspension outputs names their convention in a comment: # signs: iso8855
 """
 
 from __future__ import annotations
@@ -55,6 +69,8 @@ from ..case import TIME, Truth
 
 SCHEMA = "kincheck-case/1"
 MOST_SAMPLES = 1_000_000
+COORDINATE = "coordinate"
+"""The type of an output that names none."""
 
 Text = Annotated[str, Meta(min_length=1, description="a text that is not empty")]
 Flag = Annotated[bool, Meta(description="true or false")]
@@ -98,6 +114,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     units: Table = {}
     joints: Table = {}
     points: Table = {}
+    suspension: Table | None = None
     outputs: Table = {}
     reference: Table | None = None
 
@@ -127,16 +144,22 @@ class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     rate: Number | None = None
 
 
-class OutputKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """[outputs.NAME]; component or direction, and a tolerance with its reason."""
+class ToleranceKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[outputs.NAME] of any type: a tolerance with its reason."""
 
-    point: Text
-    component: Annotated[Literal["x", "y", "z"], Meta(description='"x", "y" or "z"')] | None = None
-    direction: Numbers3 | None = None
-    relative: Flag = False
     atol: Size | None = None
     rtol: Size | None = None
     why: Text | None = None
+
+
+class OutputKeys(ToleranceKeys, forbid_unknown_fields=True, kw_only=True):
+    """[outputs.NAME] of a coordinate; component or direction."""
+
+    point: Text
+    type: Literal["coordinate"] = COORDINATE
+    component: Annotated[Literal["x", "y", "z"], Meta(description='"x", "y" or "z"')] | None = None
+    direction: Numbers3 | None = None
+    relative: Flag = False
 
 
 _Keys = list[tuple[str, Any] | tuple[str, Any, Any]]

@@ -1,0 +1,47 @@
+"""Tolerances of outputs in a case file, and those they get without one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from .document import fault, join
+from .reference import Convert
+from .schema import ToleranceKeys
+
+# Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized mechanisms at 1e-16 m.
+DEFAULT_ATOL = 1e-9
+DEFAULT_WHY = (
+    "the default of 1e-9 m: a thousandth of the micrometre that hardpoints are measured to, and millions of times the round-off "
+    "of metre-sized coordinates in double precision"
+)
+_DEFAULTS: Mapping[str, str] = {
+    "m": DEFAULT_WHY,
+    "rad": (
+        "the default of 1e-9 rad: a nanometre, the default of lengths, at a metre; a hundred-thousandth of the hundredth of a "
+        "degree that wheel alignment is measured to, and millions of times the round-off of an angle in double precision"
+    ),
+    "1": (
+        "the default of 1e-9 of a ratio: a nanometre, the default of lengths, in a metre, and millions of times the round-off "
+        "of a ratio near one in double precision"
+    ),
+}
+"""The reason for the default by the unit of the output."""
+
+
+def tolerance(file: Path, key: str, keys: ToleranceKeys, convert: Convert, unit: str = "m") -> tuple[float, float, str]:
+    """atol [unit], rtol [-] and the reason for them.
+
+    Args:
+        convert: from the file's unit of the output to SI.
+
+    Raises:
+        CaseError: a tolerance without a reason, or a reason without a tolerance.
+    """
+    if keys.atol is None and keys.rtol is None:
+        if keys.why is not None:
+            raise fault(file, join(key, "why"), "found a reason without a tolerance, expected both; add atol or rtol")
+        return DEFAULT_ATOL, 0.0, _DEFAULTS[unit]
+    if keys.why is None:
+        raise fault(file, join(key, "why"), "missing, expected the reason for the tolerance; add the key 'why'")
+    return convert(keys.atol or 0.0), keys.rtol or 0.0, keys.why

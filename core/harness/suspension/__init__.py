@@ -1,0 +1,20 @@
+"""Suspensions: outputs as kinematics engineers know them, each with its derivative by wheel travel and its sign in words."""
+
+from . import instant_axis as instant_axis
+from . import steering_axis as steering_axis
+from . import wheel as wheel
+from .base import PER_TRAVEL, PerTravel, Rate, SuspensionOutput, own_keys
+from .vehicle import Axle, Convention, Reaction, Side, Vehicle
+
+__all__ = [
+    "PER_TRAVEL",
+    "Axle",
+    "Convention",
+    "PerTravel",
+    "Rate",
+    "Reaction",
+    "Side",
+    "SuspensionOutput",
+    "Vehicle",
+    "own_keys",
+]

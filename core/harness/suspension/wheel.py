@@ -1,0 +1,161 @@
+"""Outputs of the wheel: toe, camber, steer angle, and how the wheel centre or the contact centre shifts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from ...algebra import Vec3
+from ...jet import Jet, arctan2, sqrt
+from .base import Attitude, Change
+from .corner import Corner
+from .vehicle import Axle, Convention
+
+
+class Place(StrEnum):
+    """Where a shift of the wheel is measured."""
+
+    WHEEL_CENTER = "wheel_center"
+    CONTACT = "contact"
+
+
+class Component(StrEnum):
+    """An axis of the convention."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
+
+
+@dataclass(frozen=True)
+class Toe(Attitude):
+    """Angle in the road plane between the vehicle's x axis and the wheel plane (ISO 8855, 7.1.6).
+
+    In corner axes the axis of rotation s of a wheel that toes in points forward: tan = s_x / s_y.
+    """
+
+    type = "toe"
+    measure = "rad"
+    reads = ("wheel_center", "spin_marker")
+    positive = "toe-in"
+
+    def value(self, corner: Corner) -> Jet:
+        """Toe-in [rad]."""
+        s = corner.spin
+        return arctan2(s.x, s.y)
+
+
+@dataclass(frozen=True)
+class SteerAngle(Attitude):
+    """The same angle about the z axis of the convention by the right-hand rule: one sign for both wheels."""
+
+    type = "steer_angle"
+    measure = "rad"
+    positive = "to the left (ISO 8855), to the right (SAE J670)"
+    reads = ("wheel_center", "spin_marker")
+
+    @property
+    def sense(self) -> str:
+        """Left about an axis that points up, right about one that points down."""
+        return "positive: to the left" if self.vehicle.convention is Convention.ISO_8855 else "positive: to the right"
+
+    def value(self, corner: Corner) -> Jet:
+        """Steer angle [rad]."""
+        s, side = corner.spin, self.vehicle.side.left * self.vehicle.convention.up
+        return -side * arctan2(s.x, s.y)
+
+
+@dataclass(frozen=True)
+class Camber(Attitude):
+    """Angle between the vehicle's z axis and the wheel plane, whatever the toe: sin = -s_z."""
+
+    type = "camber"
+    measure = "rad"
+    reads = ("wheel_center", "spin_marker")
+    positive = "top outboard"
+
+    def value(self, corner: Corner) -> Jet:
+        """Camber [rad]; by the tangent, for a sine near one has lost half its digits."""
+        s = corner.spin
+        return arctan2(-s.z, sqrt(s.x * s.x + s.y * s.y))
+
+
+@dataclass(frozen=True)
+class _Shift(Change):
+    reads = ("wheel_center", "spin_marker")
+
+    at: Place = Place.CONTACT
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The wheel centre, and for the contact centre the axis of rotation too."""
+        return super().points if self.at is Place.CONTACT else (self.vehicle.wheel_center,)
+
+    @property
+    def problem(self) -> str:
+        """The contact centre is known from the wheel's radius only."""
+        if self.at is Place.WHEEL_CENTER or self.vehicle.wheel_radius is not None:
+            return ""
+        return 'found no wheel_radius in [suspension], expected it for the contact centre; add it, or at = "wheel_center"'
+
+    def _position(self, corner: Corner) -> Vec3:
+        return corner.contact if self.at is Place.CONTACT else corner.center
+
+
+@dataclass(frozen=True)
+class HalfTrackChange(_Shift):
+    """Lateral shift of the contact centre, or of the wheel centre: half of an axle's track change in parallel travel."""
+
+    type = "half_track_change"
+    measure = "m"
+    positive = "outboard, a wider track"
+
+    def value(self, corner: Corner) -> Jet:
+        """Half track [m]."""
+        return self._position(corner).y
+
+
+@dataclass(frozen=True)
+class WheelbaseChange(_Shift):
+    """Longitudinal shift of the contact centre, or of the wheel centre: forward lengthens at the front, rearward at the rear."""
+
+    type = "wheelbase_change"
+    measure = "m"
+    positive = "a longer wheel base: forward at the front, rearward at the rear"
+    needs = ("axle",)
+
+    @property
+    def sense(self) -> str:
+        """The wheel base gets longer."""
+        return f"positive: {'forward' if self.vehicle.axle is Axle.FRONT else 'rearward'}, a longer wheel base"
+
+    def value(self, corner: Corner) -> Jet:
+        """Coordinate along the wheel base [m]."""
+        x: Jet = self._position(corner).x
+        return x if self.vehicle.axle is Axle.FRONT else -x
+
+
+@dataclass(frozen=True)
+class WheelDisplacement(Change):
+    """Shift of the wheel centre against the vehicle's body along an axis of the convention."""
+
+    type = "wheel_displacement"
+    measure = "m"
+    positive = "x forward, y left, z up (ISO 8855); x forward, y right, z down (SAE J670)"
+    reads = ("wheel_center",)
+
+    component: Component = Component.Z
+
+    @property
+    def sense(self) -> str:
+        """Where the axis points."""
+        iso = self.vehicle.convention is Convention.ISO_8855
+        ways = {Component.X: "forward", Component.Y: "left" if iso else "right", Component.Z: "up" if iso else "down"}
+        return f"positive: {ways[self.component]}"
+
+    def value(self, corner: Corner) -> Jet:
+        """Coordinate [m]."""
+        x, y, z = corner.center
+        up = self.vehicle.convention.up
+        shifts: dict[Component, Jet] = {Component.X: x, Component.Y: up * self.vehicle.side.left * y, Component.Z: up * z}
+        return shifts[self.component]

@@ -1,0 +1,83 @@
+"""Jets: a number with its first and second derivative by time, so that any formula gives exact rates of what it computes.
+
+Vectors of jets are `algebra.Vec3`. A derivative that is not known is NaN, and whatever needs it becomes NaN by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .algebra import Vec3
+
+Lanes: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Jet:
+    """Value, first and second derivative by time, each of shape (n,) or (). Operators follow the rules of differentiation."""
+
+    __array_ufunc__: ClassVar[None] = None  # an array plus a jet is a jet, not an array of jets
+    x: Lanes
+    v: Lanes
+    a: Lanes
+
+    @property
+    def dot(self) -> Jet:
+        """The derivative by time as a jet of its own; its second derivative would be a third one, which nobody knows."""
+        return Jet(self.v, self.a, np.full_like(self.a, np.nan))
+
+    def __add__(self, b: Jet | float | Lanes) -> Jet:
+        return Jet(self.x + b.x, self.v + b.v, self.a + b.a) if isinstance(b, Jet) else Jet(self.x + b, self.v, self.a)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.x, -self.v, -self.a)
+
+    def __sub__(self, b: Jet | float | Lanes) -> Jet:
+        return self + -b
+
+    def __rsub__(self, b: float | Lanes) -> Jet:
+        return -self + b
+
+    def __mul__(self, b: Any) -> Jet:
+        if isinstance(b, Jet):
+            return Jet(self.x * b.x, self.v * b.x + self.x * b.v, self.a * b.x + 2.0 * self.v * b.v + self.x * b.a)
+        if isinstance(b, Vec3):
+            return NotImplemented
+        return Jet(self.x * b, self.v * b, self.a * b)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, b: Jet | float) -> Jet:
+        if not isinstance(b, Jet):
+            return self * (1.0 / b)
+        x = self.x / b.x  # x b = self, differentiated once and twice
+        v = (self.v - x * b.v) / b.x
+        return Jet(x, v, (self.a - 2.0 * v * b.v - x * b.a) / b.x)
+
+
+def sqrt(a: Jet) -> Jet:
+    """The square root; a must be positive."""
+    x = np.sqrt(a.x)  # x x = a, differentiated once and twice
+    v = a.v / (2.0 * x)
+    return Jet(x, v, (a.a - 2.0 * v * v) / (2.0 * x))
+
+
+def arctan2(y: Jet, x: Jet) -> Jet:
+    """The angle of the direction (x, y) [rad], in -pi..pi; x and y must not both vanish.
+
+    Its rate is (x y' - y x') / (x x + y y): a jet of jets' values and rates, differentiated once more by the quotient rule.
+    """
+    rate = (x * y.dot - y * x.dot) / (x * x + y * y)
+    return Jet(np.arctan2(y.x, x.x), rate.x, rate.v)
+
+
+def each(a: Vec3, do: Callable[[Jet], Jet]) -> Vec3:
+    """A vector of jets, changed component by component."""
+    return Vec3(do(a.x), do(a.y), do(a.z))
