@@ -1,8 +1,13 @@
-"""Built-in cases: NAME.toml each, with samples (NAME.csv) or a closed form (NAME.py) beside it as the truth."""
+"""Built-in cases: NAME.toml each, with samples (NAME.csv) or a closed form (NAME.py) beside it as the truth.
+
+Variants of a mechanism share a truth: NAME_VARIANT.toml names the samples in its [reference], or takes the closed form of NAME.py,
+there the function VARIANT where it has one, else `motion`.
+"""
 
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +17,7 @@ from ..core.errors import CaseError
 from ..core.harness.case import Case, Output, Series, Truth
 from ..core.harness.reading.casefile import load_case
 from ..core.harness.reading.document import remedy
-from .jet import Jet, Motion, steady
+from .jet import Jet, Motion
 
 FOLDER = Path(__file__).parent
 
@@ -30,16 +35,28 @@ def load(name: str) -> Case:
     """
     if name not in names():
         raise CaseError(f"{name!r} is not a built-in case; {remedy(name, names())}")
-    case = load_case(FOLDER / f"{name}.toml")
-    return with_closed_form(case, name) if (FOLDER / f"{name}.py").exists() else case
+    case, motion = load_case(FOLDER / f"{name}.toml"), closed_form(name)
+    return case if case.reference or motion is None else with_closed_form(case, motion)
 
 
-def with_closed_form(case: Case, name: str) -> Case:
-    """The case with the closed form of cases/NAME.py as the reference: `motion`, from the driver's change to the points."""
-    closed_form = importlib.import_module(f".{name}", __name__)
-    design: Motion = closed_form.motion(steady(np.zeros(1), 0.0))
-    moving: Motion = closed_form.motion(steady(case.sweep.change, case.sweep.rate))
-    reference = {output.name: _series(output, moving, design) for output in case.outputs}
+def closed_form(name: str) -> Callable[..., Motion] | None:
+    """Takes the drivers' changes from the design, as jets in the order of the case file, to the points; None if there is none."""
+    stems = [file.stem for file in FOLDER.glob("*.py") if f"{name}_".startswith(f"{file.stem}_")]
+    if not stems:
+        return None
+    stem = max(stems, key=len)
+    module = importlib.import_module(f".{stem}", __name__)
+    return getattr(module, name[len(stem) + 1 :], module.motion)
+
+
+def with_closed_form(case: Case, motion: Callable[..., Motion]) -> Case:
+    """The case with a closed form as the reference of its outputs that are coordinates."""
+    drivers = [driver.name for driver in case.mechanism.drivers]
+    values, rates, seconds = case.sweep.path.drive(drivers, case.sweep.path.times)
+    moving = motion(*map(Jet, values, rates, seconds))
+    design = motion(*(Jet(zero, zero, zero) for zero in np.zeros((len(drivers), 1))))
+    coordinates = [output for output in case.outputs if isinstance(output, Output)]
+    reference = {output.name: _series(output, moving, design) for output in coordinates}
     return replace(case, truth=Truth.CLOSED_FORM, reference=reference)
 
 

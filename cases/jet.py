@@ -5,6 +5,7 @@ The closed forms of the cases are written with these alone; they share no code w
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -37,8 +38,10 @@ class Jet:
         return -self + b
 
     def __mul__(self, b: Jet | float) -> Jet:
-        if not isinstance(b, Jet):
+        if isinstance(b, float | int):
             return Jet(self.x * b, self.v * b, self.a * b)
+        if not isinstance(b, Jet):  # pyright: ignore[reportUnnecessaryIsInstance]
+            return NotImplemented  # a vector knows what to do
         return Jet(self.x * b.x, self.v * b.x + self.x * b.v, self.a * b.x + 2.0 * self.v * b.v + self.x * b.a)
 
     __rmul__ = __mul__
@@ -81,5 +84,5 @@ def steady(values: Lanes, rate: float) -> Jet:
     return Jet(values, np.full_like(values, rate), np.zeros_like(values))
 
 
-Motion: TypeAlias = dict[str, tuple[Jet, Jet, Jet]]
+Motion: TypeAlias = Mapping[str, Iterable[Jet]]
 """Global x, y, z of each point by name [m]."""

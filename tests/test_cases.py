@@ -10,7 +10,7 @@ import pytest
 from kincheck import cases
 from kincheck.cases import four_bar, jet, rssr, spatial_slider_crank
 from kincheck.core.errors import CaseError
-from kincheck.core.harness.case import Case, Truth
+from kincheck.core.harness.case import Case, Output, Truth
 from kincheck.core.joints import Distance
 
 CLOSED_FORMS = {"four_bar": four_bar, "rssr": rssr, "spatial_slider_crank": spatial_slider_crank}
@@ -19,13 +19,22 @@ ANGLES = [0.3, 1.9, 3.5, 5.6]
 ROUND_OFF = 1e-13
 
 
+IN_HOUSE = {"mcpherson_strut", "mcpherson_steered", "mcpherson_suspension"}
+IN_HOUSE |= {
+    "chrono_macpherson",
+    "chrono_macpherson_cylindrical",
+    "chrono_double_wishbone",
+    "chrono_sedan_double_wishbone",
+    "chrono_multi_link",
+    "chrono_multi_link_bodies",
+}
+
+
 def test_names_and_truths():
-    assert {name: cases.load(name).truth for name in cases.names()} == {
-        "four_bar": Truth.CLOSED_FORM,
-        "mcpherson_strut": Truth.IN_HOUSE_ORACLE,
-        "rssr": Truth.CLOSED_FORM,
-        "spatial_slider_crank": Truth.CLOSED_FORM,
-    }
+    """Nobody publishes curves of suspensions: what the project computed for them must never read as validated."""
+    found = {name: cases.load(name).truth for name in cases.names()}
+    assert {name for name, truth in found.items() if truth is Truth.IN_HOUSE_ORACLE} == IN_HOUSE
+    assert {truth for name, truth in found.items() if name not in IN_HOUSE} == {Truth.CLOSED_FORM}
 
 
 def test_unknown_names_get_a_suggestion():
@@ -40,8 +49,9 @@ def test_every_output_has_a_full_reference(name: str):
     case = cases.load(name)
     assert case.name == name
     assert list(case.reference) == [output.name for output in case.outputs]
-    for series in case.reference.values():
-        for values in (series.position, series.velocity, series.acceleration):
+    for output in case.outputs:
+        series = case.reference[output.name]
+        for values in (series.position, series.velocity, series.acceleration)[: output.orders]:
             assert values is not None
             assert values.shape == case.sweep.values.shape
             assert np.isfinite(values).all()
@@ -51,7 +61,7 @@ def test_every_output_has_a_full_reference(name: str):
 def test_at_design_the_reference_is_the_case_file(name: str):
     case = cases.load(name)
     (design,) = np.flatnonzero(np.abs(case.sweep.change) < 1e-15)
-    for output in case.outputs:
+    for output in (each for each in case.outputs if isinstance(each, Output)):
         position = 0.0 if output.relative else np.dot(case.mechanism.point(output.point).position, output.direction)
         assert case.reference[output.name].position[design] == pytest.approx(position, abs=4e-15)  # round-off of metres
 
@@ -225,8 +235,8 @@ def test_rssr_against_a_table():
     Formula of Hartenberg and Denavit (1964, ch. 12) in its arctangent form, evaluated to 50 digits with mpmath.
     """
     table = {0: 348.94609687978577331, 90: -357.01449399425346206, 195: 325.86625177583580752, 330: 337.09754271028875053}
-    cosine, sine = rssr.rocker(jet.steady(np.radians([*table]), 1.0))
-    found = np.degrees(np.arctan2(sine.x, cosine.x)) % 360
+    _, y, z = rssr.motion(jet.steady(np.radians([*table]), 1.0))["rocker_pin"]
+    found = np.degrees(np.arctan2(z.x - 3.0, y.x - 1.0)) % 360
     assert found == pytest.approx(np.array([*table.values()]) % 360, abs=360 * ROUND_OFF)
 
 

@@ -1,0 +1,32 @@
+"""Closed form of Hooke's joint:  tan t2 = tan t1 / cos b,  the driving yoke in the plane of the shafts at t1 = 0 (any textbook).
+
+The driven yoke is normal to its own shaft and to the driving yoke, from which  cos t2 = cos b cos t1 / n,  sin t2 = sin t1 / n,
+n^2 = sin^2 t1 + cos^2 b cos^2 t1:  the same without a quadrant to choose.
+"""
+
+from __future__ import annotations
+
+from .jet import Jet, Motion, cos, sin, sqrt
+from .vectors import Numbers, Vec, fixed
+
+BEND = 0.8, 0.6  # cos b, sin b: the driving shaft is along x, the driven one turned from it towards z
+TIP = 0.3, 0.2  # of the driven shaft: this far along it, and off it, along y at design [m]
+
+
+def driven(turn: Jet, cosine: float) -> tuple[Jet, Jet]:
+    """Cosine and sine of the driven shaft's turn, the driving one's being `turn` [rad] and the cosine of b given."""
+    c, s = cosine * cos(turn), sin(turn)
+    n = sqrt(s * s + c * c)
+    return c / n, s / n
+
+
+def on_shaft(start: Numbers, bend: tuple[float, float], c: Jet, s: Jet) -> Vec:
+    """The tip of a shaft that starts there, bent from x towards z (cosine and sine of the angle), turned as c and s say."""
+    direction, aside = (bend[0], 0.0, bend[1]), (-bend[1], 0.0, bend[0])  # aside = direction x y
+    off = c * fixed((0.0, 1.0, 0.0), c) + s * fixed(aside, c)
+    return fixed(start, c) + TIP[0] * fixed(direction, c) + TIP[1] * off
+
+
+def motion(turn: Jet) -> Motion:
+    """The tip of the driven shaft with the driving one turned from the design by `turn` [rad]."""
+    return {"driven_tip": on_shaft((0.0, 0.0, 0.0), BEND, *driven(turn, BEND[0]))}

@@ -1,0 +1,21 @@
+"""Closed form of Modelica's spatial four-bar, the same in every decomposition of its rod's ends into joints.
+
+The crank pin is  R_x(t) (0, 0.5, 0.1),  the slider's pin  (x, 0.2, 0),  and the rod between them has the squared length 1.1:
+x = sqrt(1.1 - (y - 0.2)^2 - z^2)  with the crank pin's y and z; s = x - 1.2 is Modelica's displacement.
+"""
+
+from __future__ import annotations
+
+from .jet import Jet, Motion, constant, cos, sin, sqrt
+
+ROD_SQUARED = 1.1  # of (-1, 0.3, 0.1) [m^2]
+PIN = 0.2  # the slider's pin above the slide [m]
+
+
+def motion(turn: Jet) -> Motion:
+    """Points of the mechanism with the crank turned from the design by `turn` [rad]."""
+    c, s = cos(turn), sin(turn)
+    y, z = 0.5 * c - 0.1 * s, 0.5 * s + 0.1 * c
+    x = sqrt(ROD_SQUARED - (y - PIN) * (y - PIN) - z * z)
+    middle = 0.5 * x, 0.5 * (y + PIN), 0.5 * z
+    return {"slider_pin": (x, constant(PIN, turn), constant(0.0, turn)), "rod_middle": middle}
