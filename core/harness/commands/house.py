@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, SolveError
+from ..reading.supplied import NOTHING, Supplied
 
 if TYPE_CHECKING:
     from ..case import Case
     from ..engine import Engine
+    from ..writer import Writer
 
 
 class Status(IntEnum):
@@ -30,31 +32,39 @@ class House:
     """The engines and built-in cases there are, loaded when they are asked for.
 
     Attributes:
-        engines: names of the engines, in the order of the results.
-        engine: the engine of a name.
+        engines: names of the engines in projection mode, in the order of the results.
+        engine: the engine of a name, and of a mode unless it is projection.
         cases: names of the built-in cases.
         case: the built-in case of a name, with its truth.
+        writers: names of the formats that a mechanism can be written in.
+        writer: the writer of a format.
+        simulations: names of the engines in simulate mode.
     """
 
     engines: Sequence[str]
-    engine: Callable[[str], Any]
+    engine: Callable[..., Any]
     cases: Callable[[], Sequence[str]]
     case: Callable[[str], Case]
+    writers: Sequence[str]
+    writer: Callable[[str], Writer]
+    simulations: Sequence[str] = ()
 
-    def find_case(self, name: str) -> Case:
-        """The case of that name or in that file.
+    def find_case(self, name: str, supplied: Supplied = NOTHING) -> Case:
+        """The case of that name or in that file; `supplied` is what a file of another tool does not say.
 
         Raises:
             KincheckError: there is none, its file does not make sense, or its drivers do not match its freedom.
         """
         from ...analysis.freedom import require_driven
-        from ..reading.casefile import load_case
+        from ..reading.files import SUFFIXES, load
 
         known = self.cases()
         if name in known:
+            if supplied.given:
+                raise KincheckError(f"{name}: --{supplied.given[0]} is for files, and this is a built-in case: leave it out")
             case = self.case(name)
-        elif Path(name).suffix in (".toml", ".json") or os.sep in name or Path(name).exists():
-            case = load_case(Path(name))
+        elif Path(name).suffix in SUFFIXES or os.sep in name or Path(name).exists():
+            case = load(Path(name), supplied)
         else:
             raise KincheckError(unknown("case", name, known) + "; a case file ends in .toml or .json")
         try:
@@ -63,12 +73,14 @@ class House:
             raise KincheckError(f"{name}: {error}") from error
         return case
 
-    def find_cases(self, names: Sequence[str], problems: list[str], found: Sequence[Case] = ()) -> list[Case]:
+    def find_cases(
+        self, names: Sequence[str], problems: list[str], found: Sequence[Case] = (), supplied: Supplied = NOTHING
+    ) -> list[Case]:
         """The cases found already and those named; what is wrong with any of them is added to the problems."""
         cases = {case.name: case for case in found}
         for name in dict.fromkeys(names):
             try:
-                case = self.find_case(name)
+                case = self.find_case(name, supplied)
             except KincheckError as error:
                 problems += str(error).splitlines()
                 continue
@@ -77,10 +89,27 @@ class House:
             cases[case.name] = case
         return list(cases.values())
 
-    def find_engines(self, names: Sequence[str], problems: list[str]) -> list[Engine]:
-        """The engines named, each once; names that are none are added to the problems."""
-        problems += [unknown("engine", name, self.engines) for name in dict.fromkeys(names) if name not in self.engines]
-        return [self.engine(name) for name in dict.fromkeys(names) if name in self.engines]
+    def find_engines(self, names: Sequence[str], problems: list[str], mode: str | None = None) -> list[Engine]:
+        """The engines named, each once, in a mode or in the first that they have; what is none is added to the problems."""
+        engines: list[Engine] = []
+        for name in dict.fromkeys(names):
+            modes = [each for each, known in (("projection", self.engines), ("simulate", self.simulations)) if name in known]
+            if not modes:
+                problems.append(unknown("engine", name, [*dict.fromkeys((*self.engines, *self.simulations))]))
+            elif mode not in (None, *modes):
+                problems.append(f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}: leave out --mode or the engine")
+            else:
+                engines.append(self._loaded(name, mode or modes[0]))
+        return engines
+
+    def _loaded(self, name: str, mode: str) -> Engine:
+        """The engine, or what stands for it where loading it fails: one broken adapter must not end a run of all."""
+        from ..unloadable import Unloadable
+
+        try:
+            return self.engine(name) if mode == "projection" else self.engine(name, mode)
+        except Exception as error:
+            return Unloadable(name, f"{type(error).__name__}: {error}", mode)
 
 
 def unknown(what: str, name: str, known: Sequence[str]) -> str:

@@ -1,0 +1,1 @@
+"""Hardpoints: files of named points as suspension engineers have them, onto templates of suspensions, to cases."""

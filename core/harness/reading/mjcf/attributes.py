@@ -1,0 +1,56 @@
+"""The attributes that MJCF has, of the elements that are read; from MuJoCo's own schema (mj_printSchema, MuJoCo 4.0)."""
+
+from __future__ import annotations
+
+_ORIENTATION = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
+_FRAME = ("name", "childclass", "pos", *_ORIENTATION)
+_SOFT = ("solref", "solimp", "class", "active", "name")
+_FORCES = ("springdamper", "springyield", "stiffness", "springref", "armature", "damping", "frictionloss")
+_LIMITS = ("range", "limited", "actuatorfrcrange", "actuatorfrclimited", "actuatorgravcomp", "margin", "solreflimit", "solimplimit")
+_JOINT = ("type", "group", "pos", "axis", "ref", "user", "solreffriction", "solimpfriction", *_FORCES, *_LIMITS)
+
+KNOWN = {
+    "body": (*_FRAME, "mocap", "gravcomp", "user", "sleep", "fuse", "simple"),
+    "frame": _FRAME,
+    "joint": ("name", "class", *_JOINT),
+    "freejoint": ("name", "group", "align"),
+    "site": ("name", "class", "type", "group", "pos", *_ORIENTATION, "material", "mesh", "size", "fromto", "rgba", "user"),
+    "connect": (*_SOFT, "body1", "body2", "anchor", "site1", "site2"),
+    "weld": (*_SOFT, "body1", "body2", "relpose", "anchor", "torquescale", "site1", "site2"),
+    "equality joint": (*_SOFT, "joint1", "joint2", "polycoef"),
+    "equality tendon": (*_SOFT, "tendon1", "tendon2", "polycoef"),
+}
+
+_READ = ("compiler", "option", "default", "worldbody", "tendon", "equality")
+_NOT_READ = (
+    *("size", "statistic", "visual", "extension", "asset", "deformable"),
+    *("contact", "actuator", "sensor", "custom", "keyframe"),
+)
+ROOT = (*_READ, *_NOT_READ)
+"""What <mujoco> can hold: sections that are read, and those that are not."""
+
+IN_BODY = ("body", "frame", "joint", "freejoint", "site", "inertial", "geom", "camera", "light", "plugin")
+"""What a body can hold, besides elements that make bodies."""
+
+MAKE_BODIES = {
+    "include": "the rest of the model is in another file",
+    "replicate": "it makes bodies",
+    "composite": "it makes bodies",
+    "flexcomp": "it makes bodies",
+    "attach": "it takes bodies from another model",
+}
+"""Elements that stand for others; MuJoCo itself can write the model out."""
+
+WRITE_OUT = (
+    "let MuJoCo write the model out and give that file: "
+    "python -c \"import mujoco; mujoco.mj_saveLastXML('flat.xml', mujoco.MjModel.from_xml_path('model.xml'))\""
+)
+
+DYNAMIC = {
+    "range": "ranges",
+    "stiffness": "springs",
+    "damping": "damping",
+    "armature": "armature",
+    "frictionloss": "friction",
+}
+"""Attributes of joints that move nothing where motion is given; they are counted for the list of what is left out."""
