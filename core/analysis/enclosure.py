@@ -21,13 +21,14 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import KincheckError
 from ..program.ball_executor import ORDER, Ball, evaluate, flint
 from ..trajectory import Array
 from .exact import Equations
 
 # Radii of B that are tried, in units of the mechanism's size: the largest that succeeds says how far around the solution is alone.
 RADII = tuple(2.0**-k for k in (7, 14, 21, 28, 35, 42, 49))
-# Y is the inverse in double precision: a step of Newton's iteration with it gains many digits, or the pose is singular.
+# A step of Newton's iteration gains three digits or more, but near a singular pose.
 MOST_STEPS = 60
 # Steps end this many bits above the working precision, where their own round-off begins.
 SPARE_BITS = 40
@@ -52,14 +53,11 @@ class Enclosure:
     branch: Sequence[Ball]
 
 
-@dataclass(frozen=True)
-class Unproved:
-    """A sample for which there is no proof, and why."""
-
-    reason: str
+class UnprovedError(KincheckError, ArithmeticError):
+    """There is no proof for a sample; the message says why."""
 
 
-def enclose(equations: Equations, points: Sequence[str], pose: Array, drives: Sequence[Sequence[Ball]], bits: int) -> Enclosure | Unproved:
+def enclose(equations: Equations, points: Sequence[str], pose: Array, drives: Sequence[Sequence[Ball]], bits: int) -> Enclosure:
     """Prove one sample; to be called at the precision of the equations.
 
     Args:
@@ -67,39 +65,29 @@ def enclose(equations: Equations, points: Sequence[str], pose: Array, drives: Se
         pose: approximate state, shape (size,).
         drives: for each moving driver value [units or rad], velocity and acceleration, exact or as balls.
         bits: the precision.
+
+    Raises:
+        UnprovedError: the pose is singular, too far from a solution, or near one on another branch.
     """
-    sample = _Sample(equations, drives)
-    try:
-        inverse = np.linalg.inv(np.array(sample.derivative(list(map(flint().arb, pose))).tolist(), dtype=np.float64))
-    except np.linalg.LinAlgError:
-        return Unproved("the Jacobian has no inverse: singular pose")
-    if not np.isfinite(inverse).all():
-        return Unproved("the Jacobian has no finite inverse: singular pose")
-    Y = flint().arb_mat(inverse.tolist())
-    refined = _refine(sample, Y, pose, bits)
-    if isinstance(refined, Unproved):
-        return refined
-    X, c = refined
-    found = _alone(sample, Y, X, c)
-    if isinstance(found, Unproved):
-        return found
-    alone, contraction = found
-    moved = _float(_largest([x - y for x, y in zip(X, map(flint().arb, pose.tolist()), strict=True)]))
+    sample, start = _Sample(equations, drives), [flint().arb(x) for x in pose.tolist()]
+    X, c, inverse = _refine(sample, start, bits)
+    alone, contraction = _alone(sample, inverse, X, c)
+    moved = _float(_largest([x - x0 for x, x0 in zip(X, start, strict=True)]))
     if moved > alone:
-        return Unproved(
-            f"the solution that Newton's iteration reaches is {moved:.3g} of the mechanism's size from the approximate pose, and proved "
-            f"to be the only one within {alone:.3g}: it may be another one"
+        raise UnprovedError(
+            f"the solution that Newton's iteration reaches is {moved:.3g} of the mechanism's size from the approximate pose, and "
+            f"proved to be the only one within {alone:.3g}: it may be another one"
         )
     solution = [x + _around(c / (1 - contraction)) for x in X]
     tests = sample.tests(solution)
     left_out, branch = tests[: equations.left_out], tests[equations.left_out :]
     for value in branch:
         if not value > 0:
-            return Unproved(f"the solution is not proved to be on the intended branch (axes turned over): its test is {value.str(5)}")
+            raise UnprovedError(f"the solution is not on the intended branch, axes are turned over: their cosine is {value.str(5)}")
     try:
         motion = sample.motion(solution)
     except ZeroDivisionError:
-        return Unproved("the Jacobian is not proved to have an inverse: singular pose")
+        raise UnprovedError("singular pose: the Jacobian is not proved to have an inverse") from None
     return Enclosure(dict(zip(points, motion, strict=True)), alone, _float(contraction), left_out, branch)
 
 
@@ -145,33 +133,47 @@ class _Sample:
         series, inverse = flint().arb_series, self.derivative(state).inv()
         coefficients = [list(state)]
         for order in (1, 2):  # the unknown coefficient enters its own order through F' alone
-            known = [series(each, prec=ORDER) for each in zip(*coefficients, strict=True)]
+            known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
             rest = [_coefficient(x, order) for x in self._run("residuals", known, self._moving).values()]
             coefficients.append((-inverse * _column(rest)).entries())
-        known = [series(each, prec=ORDER) for each in zip(*coefficients, strict=True)]
+        known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
         moved = [*self._run("points", known, self._moving).values()]
         motions = [[factor * _coefficient(x, order) for x in moved] for order, factor in enumerate((1, 1, 2))]
         return [[each[k : k + 3] for each in motions] for k in range(0, len(moved), 3)]
 
 
-def _refine(sample: _Sample, Y: Any, pose: Array, bits: int) -> tuple[list[Ball], Ball] | Unproved:
-    """The pose after Newton's iteration, and c there."""
-    X, before = [flint().arb(x) for x in pose.tolist()], float("inf")
+def _inverse(sample: _Sample, x: Sequence[Ball]) -> Array:
+    """The inverse of F' in double precision."""
+    try:
+        inverse = np.linalg.inv(np.array(sample.derivative(x).tolist(), dtype=np.float64)).astype(np.float64)
+    except np.linalg.LinAlgError:
+        raise UnprovedError("singular pose: the Jacobian has no inverse") from None
+    if not np.isfinite(inverse).all():
+        raise UnprovedError("singular pose: the Jacobian has no finite inverse")
+    return inverse
+
+
+def _refine(sample: _Sample, start: Sequence[Ball], bits: int) -> tuple[list[Ball], Ball, Array]:
+    """The pose after Newton's iteration, c there, and Y; taken anew where it gains less than three digits a step."""
+    x, inverse, before = list(start), _inverse(sample, start), float("inf")
     for _ in range(MOST_STEPS):
-        step = Y * sample.residuals(X)
+        step = flint().arb_mat(inverse.tolist()) * sample.residuals(x)
         c = _largest(step.entries())
         if c < flint().arb(2) ** (SPARE_BITS - bits):
-            return X, c
+            return x, c, inverse
         size = _float(c)
         if not size < 0.5 * before:
             break
-        X, before = [(x - dx).mid() for x, dx in zip(X, step.entries(), strict=True)], size
-    return Unproved(f"Newton's iteration stops at steps of {before:.1g} of the mechanism's size: singular pose, or no solution near")
+        x = [(old - change).mid() for old, change in zip(x, step.entries(), strict=True)]
+        if size > 1e-3 * before:
+            inverse = _inverse(sample, x)
+        before = size
+    raise _singular(f"or no solution near: Newton's iteration stops at steps of {before:.1g}", inverse)
 
 
-def _alone(sample: _Sample, Y: Any, X: Sequence[Ball], c: Ball) -> tuple[float, Ball] | Unproved:
+def _alone(sample: _Sample, inverse: Array, X: Sequence[Ball], c: Ball) -> tuple[float, Ball]:
     """The largest radius tried for which the test succeeds, and k there."""
-    identity, smallest = flint().arb_mat(len(X), len(X), 1), float("inf")
+    Y, identity, smallest = flint().arb_mat(inverse.tolist()), flint().arb_mat(len(X), len(X), 1), float("inf")
     for radius in RADII:
         box = [x + _around(flint().arb(radius)) for x in X]
         rows = (identity - Y * sample.derivative(box)).tolist()
@@ -179,7 +181,12 @@ def _alone(sample: _Sample, Y: Any, X: Sequence[Ball], c: Ball) -> tuple[float, 
         if c + k * radius < radius:
             return radius, k
         smallest = min(smallest, _float(k))
-    return Unproved(f"Krawczyk's test fails in every box tried (contraction {smallest:.3g}, expected below 1): singular pose, or near one")
+    raise _singular(f"or near one: contraction {smallest:.3g} in the best box, expected below 1", inverse)
+
+
+def _singular(how: str, inverse: Array) -> UnprovedError:
+    smallest = 1.0 / float(np.linalg.norm(inverse, 2))
+    return UnprovedError(f"singular pose, {how}; the smallest singular value of the Jacobian is {smallest:.2g}")
 
 
 def _column(values: Sequence[Ball]) -> Any:

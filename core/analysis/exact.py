@@ -10,6 +10,7 @@ length of the Euler parameters is an equation of its own. Proofs therefore check
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
@@ -98,25 +99,37 @@ class Exact:
     def __gt__(self, b: Any) -> bool:
         return bool((self - b).ball > 0)
 
+    def __le__(self, b: Any) -> bool:
+        return bool((self - b).ball <= 0)
+
+    def __ge__(self, b: Any) -> bool:
+        return bool((self - b).ball >= 0)
+
     def __bool__(self) -> bool:
-        return not (self.value == 0)
+        return bool(self.value != 0)
 
     def __float__(self) -> float:
         return float(self.value)
 
     def sqrt(self) -> Exact:
-        """The square root: a fraction where it is one."""
+        """The square root, a fraction where it is one; of a ball around zero, that of its part >= 0."""
         if not self._is_ball and self.value.p.is_square() and self.value.q.is_square():
             return Exact(self.value.sqrt())
-        return Exact(self.ball.sqrt())
+        return Exact(self.ball.nonnegative_part().sqrt())
+
+    def arctan2(self, x: Any) -> Exact:
+        """The angle of the direction (x, self) [rad]; numpy asks for it by this name."""
+        return Exact(flint().arb.atan2(self.ball, flint().arb(_value(x))))
 
 
 def _value(b: Any) -> Any:
-    return b.value if isinstance(b, Exact) else Exact.of(Fraction(b)).value
+    if isinstance(b, Exact):
+        return b.value
+    return Exact.of(Fraction(b)).value if math.isfinite(b) else flint().arb(b)
 
 
 def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
-    """The mechanism with the numbers of joints, points, couplers and drivers as `Exact`; bodies keep theirs, which joints do not see."""
+    """The mechanism with the numbers of joints, points, couplers and drivers as `Exact`; joints do not see those of bodies."""
 
     def read(value: Any) -> Any:
         if isinstance(value, float):
@@ -174,7 +187,8 @@ class Equations:
     """What a proof needs of a mechanism. All programs read: the state, then the drivers, then `geometry`.
 
     Attributes:
-        state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler parameters "q BODY", "x COORDINATE".
+        state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler parameters "q BODY", coordinates
+            "x JOINT.FREEDOM" [units or rad].
         drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its half.
         geometry: values of the further inputs.
         residuals: as many as there are scalars in the state: the kept rows, then the lengths of the Euler parameters.

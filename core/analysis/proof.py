@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
-from ..algebra import IDENTITY, ZERO, Quat, vec
+from ..algebra import ZERO, Quat, vec
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..primitives.base import GROUND_POSE, Drive, Pose
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array, BodyMotion, Trajectory
-from .enclosure import Enclosure, Unproved, enclose
+from .cartesian import Cartesian
+from .enclosure import Enclosure, UnprovedError, enclose
 from .equations import Constraint, Frames, constraints, frames
 from .exact import Reading, equations, exact_mechanism
-from .freedom import Selection
 from .model import compile_model
 from .programs import Request
 from .solve import sweep
@@ -35,16 +36,20 @@ class Proofs:
         samples: in the order of the path.
         seconds: of each sample, without the native solution [s].
         native: the native solution, from which the proofs start; they do not rest on it.
-        selection: the rows that the proofs are about, and those left out.
+        rows: the equations that the proofs are about, as "joint: primitive".
+        redundant: those that were left out, because the others say the same at the design position.
     """
 
-    samples: Sequence[Enclosure | Unproved]
+    samples: Sequence[Enclosure | UnprovedError]
     seconds: Sequence[float]
     native: Trajectory
-    selection: Selection
+    rows: Sequence[str]
+    redundant: Sequence[str]
 
 
-def prove(mechanism: Mechanism, path: Path, points: Sequence[str], drives: Drives, reading: Reading, bits: int, tol: float) -> Proofs:
+def prove(
+    mechanism: Mechanism, path: Path, points: Sequence[str], drives: Drives, reading: Reading, bits: int, tol: float
+) -> Proofs:
     """Prove the samples of a path.
 
     Args:
@@ -62,20 +67,24 @@ def prove(mechanism: Mechanism, path: Path, points: Sequence[str], drives: Drive
     model = compile_model(mechanism, Request(tuple(path.motions), tuple(points), tuple(body.name for body in mechanism.moving)))
     native = sweep(model, path, tol)
     poses = _states(mechanism, native, path.times)
-    samples: list[Enclosure | Unproved] = []
+    samples: list[Enclosure | UnprovedError] = []
     seconds: list[float] = []
     with precision(bits):
         traced = equations(exact_mechanism(mechanism, reading), tuple(drives), points, model.selection.kept)
         units = [1 if mechanism.driver(name).type == "joint_angle" else Fraction(traced.frame.unit) for name in drives]
         for k, solved in enumerate(native.solved):
             started = perf_counter()
-            if solved:
-                driven = [[_ball(x / unit) for x in drives[name][k]] for name, unit in zip(drives, units, strict=True)]
+            driven = [[_ball(x / unit) for x in drives[name][k]] for name, unit in zip(drives, units, strict=True)]
+            try:
+                if not solved:
+                    raise UnprovedError(f"there is no approximate pose to start from: {native.message}")
                 samples.append(enclose(traced, points, poses[k], driven, bits))
-            else:
-                samples.append(Unproved(f"there is no approximate pose to start from: {native.message}"))
+            except UnprovedError as error:
+                samples.append(error)
             seconds.append(perf_counter() - started)
-    return Proofs(samples, seconds, native, model.selection)
+    names = [f"{owner}: {primitive}" for owner, primitive in Cartesian(constraints(mechanism, model.frame, {}), ()).owners]
+    rows, redundant = ([names[k] for k in each] for each in (model.selection.kept, model.selection.dropped))
+    return Proofs(samples, seconds, native, rows, redundant)
 
 
 def _ball(x: Fraction) -> Ball:
@@ -88,9 +97,8 @@ def _states(mechanism: Mechanism, native: Trajectory, times: Array) -> Array:
     poses = {name: _pose(mechanism, frame, name, motion) for name, motion in native.bodies.items()}
     found = [x for name in frame.moving for x in poses[name].u]
     found += [x for name in frame.moving for x in poses[name].q]
-    for c in constraints(mechanism, frame, {}):
-        if isinstance(c, Constraint) and c.coordinate:
-            found.append(_coordinate(c, poses, times, native))
+    named = {c.coordinate: c for c in constraints(mechanism, frame, {}) if isinstance(c, Constraint) and c.coordinate}
+    found += [_coordinate(c, poses, times, native) for c in named.values()]
     return np.stack(found, axis=1)
 
 
@@ -98,7 +106,26 @@ def _pose(mechanism: Mechanism, frame: Frames, name: str, motion: BodyMotion) ->
     """Displacement of the internal origin [units] and rotation since the design, from the motion of the body's own frame."""
     body = mechanism.body(name)
     e0, *e = body.euler_parameters
-    q = Quat(motion.p.T[0], vec(motion.p.T[1:])) * Quat(e0, vec(e)).conjugate()
+    q = Quat(motion.p.T[0], vec([*motion.p.T[1:]])) * Quat(e0, vec(e)).conjugate()
     turned = Pose.of(ZERO, q)
     lever = frame.origins[name] - (1.0 / frame.unit) * vec(body.origin)
-    return Pose.of((1.0 / frame.unit) * (vec(motion.r.T) - vec(body.origin)) + turned.swing(lever), q)
+    return Pose.of((1.0 / frame.unit) * (vec([*motion.r.T]) - vec(body.origin)) + turned.swing(lever), q)
+
+
+def _coordinate(c: Constraint, poses: Mapping[str, Pose], times: Array, native: Trajectory) -> Array:
+    """A joint's own turn [rad] or displacement [units], from the residual that would vanish at it, shape (n,)."""
+
+    def residual(**drive: float) -> Array:
+        primitive: Any = c.primitive
+        (value,) = replace(primitive, drive=Drive(**drive)).phi(poses.get(c.i, GROUND_POSE), poses.get(c.j, GROUND_POSE))
+        return value
+
+    if c.coordinate.endswith(".translation"):
+        return residual(c=0.0)
+    turn = 2.0 * np.arctan2(residual(half_cos=1.0, half_sin=0.0), -residual(half_cos=0.0, half_sin=1.0))
+    # turns are counted from the design outwards; a sweep so coarse that they are miscounted fails to be proved
+    for side in (times >= 0.0, times < 0.0):
+        outward = np.flatnonzero(side & native.solved)
+        outward = outward[np.argsort(np.abs(times[outward]), kind="stable")]
+        turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
+    return turn

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import Any, TypeAlias
 
 from ..errors import KincheckError
-from .trace import Program
+from .straight_line import Program
 
 Ball: TypeAlias = Any
 """A `flint.arb`, or a `flint.arb_series`."""
@@ -58,21 +58,26 @@ def _larger(a: Ball, b: Ball) -> bool:
     raise UndecidedError(f"|{a}| and |{b}| cannot be told apart; raise the precision")
 
 
-_OPERATIONS: Mapping[str, Callable[..., Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "neg": operator.neg,
-    "sqrt": lambda a: a.sqrt(),
-    "sin": lambda a: a.sin(),
-    "cos": lambda a: a.cos(),
-    "abs": abs,
-    "min": lambda a, b: a.min(b),
-    "max": lambda a, b: a.max(b),
-    "larger": _larger,
-    "where": lambda m, p, q: p if m else q,
-}
+def _over(a: Ball, b: Ball) -> Ball:
+    return a / b
+
+
+def _minimum(a: Ball, b: Ball) -> Ball:
+    return a.min(b)
+
+
+def _maximum(a: Ball, b: Ball) -> Ball:
+    return a.max(b)
+
+
+def _where(m: bool, p: Ball, q: Ball) -> Ball:
+    return p if m else q
+
+
+_ARITHMETIC: dict[str, Any] = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": _over, "neg": operator.neg}
+_OWN: dict[str, Any] = {name: operator.methodcaller(name) for name in ("sqrt", "sin", "cos")}
+_CHOICES: dict[str, Any] = {"abs": abs, "min": _minimum, "max": _maximum, "larger": _larger, "where": _where}
+_OPERATIONS: Mapping[str, Callable[..., Any]] = {**_ARITHMETIC, **_OWN, **_CHOICES}
 
 
 def evaluate(program: Program, inputs: Sequence[Ball]) -> dict[int, Ball]:

@@ -1,12 +1,13 @@
 """Derivatives of traced scalars, traced themselves: the chain rule over the operations of a tape.
 
-Zeros and ones fold as everywhere, so the program of a Jacobian holds what its entries need and nothing else.
+Zeros and ones fold as everywhere, so the program of a Jacobian holds what its entries need and nothing else. Constants of the tape
+stay operands: folded, they would be rounded to doubles, and balls are to prove something of the result.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
 
 from ..algebra import Scalar
 from .trace import Tape, Traced, cos, operands, sin
@@ -14,17 +15,28 @@ from .trace import Tape, Traced, cos, operands, sin
 Gradient: TypeAlias = dict[int, Scalar]
 """Derivatives by the inputs that matter, by place of the input."""
 
-_RULES: Mapping[str, Callable[..., tuple[Scalar, ...]]] = {
-    "+": lambda y, a, b: (1.0, 1.0),
-    "-": lambda y, a, b: (1.0, -1.0),
-    "*": lambda y, a, b: (b, a),
-    "/": lambda y, a, b: (1.0 / b, -(y / b)),
-    "neg": lambda y, a: (-1.0,),
-    "sqrt": lambda y, a: (0.5 / y,),
-    "sin": lambda y, a: (cos(a),),
-    "cos": lambda y, a: (-sin(a),),
-}
-"""Derivatives of an operation by its operands, from its value y and the operands."""
+
+def _weights(op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
+    """Derivatives of an operation by its operands a and b, y being its value."""
+    match op:
+        case "+":
+            return 1.0, 1.0
+        case "-":
+            return 1.0, -1.0
+        case "*":
+            return b, a
+        case "/":
+            return 1.0 / b, -(y / b)
+        case "neg":
+            return (-1.0,)
+        case "sqrt":
+            return (0.5 / y,)
+        case "sin":
+            return (cos(a),)
+        case "cos":
+            return (-sin(a),)
+        case _:
+            raise TypeError(f"operation {op!r} has a kink and no derivative; leave it out of equations to be differentiated")
 
 
 def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> list[Gradient]:
@@ -35,17 +47,14 @@ def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> 
     """
     gradients: dict[int, Gradient] = {each.number: {k: 1.0} for k, each in enumerate(inputs)}
     for number, node in enumerate(tuple(tape.nodes)):  # the tape grows as the derivatives are traced
-        read = [k for k in operands(node) if gradients.get(k)]
-        if not read:
-            continue
-        if node[0] not in _RULES:
-            raise TypeError(f"operation {node[0]!r} has a kink and no derivative; leave it out of equations to be differentiated")
-        weights = _RULES[node[0]](Traced(tape, number), *(Traced(tape, k) for k in operands(node)))
-        gradients[number] = _sum(zip(weights, (gradients.get(k, {}) for k in operands(node)), strict=True))
+        read = operands(node)
+        if any(gradients.get(k) for k in read):
+            weights = _weights(node[0], Traced(tape, number), *(Traced(tape, k) for k in read))
+            gradients[number] = _sum(zip(weights, (gradients.get(k, {}) for k in read), strict=True))
     return [gradients.get(value.number, {}) if isinstance(value, Traced) else {} for value in values]
 
 
-def _sum(terms: Any) -> Gradient:
+def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:
     """The weighted sum of gradients, without what cancels."""
     total: Gradient = {}
     for weight, gradient in terms:
