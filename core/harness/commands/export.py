@@ -1,0 +1,55 @@
+"""kincheck export: write a case's mechanism for a simulator."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ...errors import KincheckError
+from . import foreign
+from .house import House, Status, unknown
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    export: argparse.ArgumentParser
+    export = commands.add_parser("export", help="write a mechanism for a simulator", description=_export.__doc__)
+    export.set_defaults(do=_export)
+    export.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    export.add_argument("--to", required=True, metavar="FORMAT", help="mjcf (MuJoCo), exudyn (a Python script) or urdf (Pinocchio)")
+    export.add_argument("--out", type=Path, metavar="FILE", help="default: the case's name, in this folder")
+    export.add_argument(
+        "--at",
+        type=float,
+        metavar="VALUE",
+        help="start there: a value of the swept driver as the sweep has it, in SI units; default: the design position",
+    )
+    foreign.add_options(export)
+
+
+def _export(options: argparse.Namespace, house: House) -> int:
+    """Write a case's mechanism in a simulator's format, with a consistent start.
+
+    What the format has no place for goes into a second file beside the first: the constraints of a URDF.
+    """
+    from ..writer import written
+
+    if options.to not in house.writers:
+        raise KincheckError(unknown("format", options.to, house.writers))
+    case = house.find_case(options.case, foreign.supplied(options))
+    foreign.tell_left_out([case])
+    texts = written(case, house.writer(options.to), options.at)
+    first = next(iter(texts))
+    main: Path = options.out or Path(case.name + first)
+    files = {main if ending == first else main.with_suffix(ending): text for ending, text in texts.items()}
+    for file in files:
+        if options.out is None and file.exists():
+            raise KincheckError(f"{file} is there already; name a file with --out to write over it")
+    for file, text in files.items():
+        try:
+            file.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise KincheckError(f"{file}: cannot be written ({error.strerror}); name another with --out") from error
+        print(file)
+    return Status.WITHIN
