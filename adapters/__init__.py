@@ -1,4 +1,4 @@
-"""Adapters: one file an engine, each made from the neutral mechanism. Engines are imported only when they are used."""
+"""Adapters: one file an engine or a format, each made from the neutral mechanism. They are imported only when they are used."""
 
 import importlib
 from typing import Any
@@ -9,9 +9,35 @@ ENGINES = {
     "pinocchio": "Pinocchio",
     "exudyn": "Exudyn",
 }
-"""Name on the command line (and of the module) -> class."""
+"""Name on the command line (and of the module) -> class: the engines in projection mode."""
+
+SIMULATIONS = {
+    "mujoco": ("mujoco_steps", "stiff"),
+    "mujoco-default": ("mujoco_steps", "default"),
+    "mujoco-projecting": ("mujoco_steps", "projecting"),
+    "pinocchio": ("pinocchio_dynamics", "Dynamics"),
+    "exudyn": ("exudyn_solvers", "trapezoidal"),
+    "exudyn-alpha": ("exudyn_solvers", "generalized_alpha"),
+    "exudyn-static": ("exudyn_solvers", "static"),
+    "exudyn-static-modified": ("exudyn_solvers", "static_modified"),
+}
+"""Name on the command line -> module and what makes the engine: simulate mode. A simulator's bare name is its recommended solver.
+
+A record is one of a case, an engine and a mode, and the same name in two modes is two products; a further variant of a simulator
+needs a name. A mode of its own for each variant would have made what may be ranked with what a matter of a list.
+"""
 
 
-def engine(name: str) -> Any:
-    """The engine of that name, ready to use; its simulator is not imported yet."""
-    return getattr(importlib.import_module(f".{name}", __name__), ENGINES[name])()
+def engine(name: str, mode: str = "projection") -> Any:
+    """The engine of that name and mode, ready to use; its simulator is not imported yet."""
+    module, maker = (name, ENGINES[name]) if mode == "projection" else SIMULATIONS[name]
+    return getattr(importlib.import_module(f".{module}", __name__), maker)()
+
+
+WRITERS = ("mjcf", "exudyn", "urdf")
+"""Formats, as on the command line; that of a name is the function `write` of the module write_NAME."""
+
+
+def writer(name: str) -> Any:
+    """The function that writes a mechanism in the format of that name; no simulator is needed for it."""
+    return importlib.import_module(f".write_{name}", __name__).write

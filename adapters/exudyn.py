@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..core.errors import SolveError
 from ..core.harness.case import Case
+from ..core.harness.engine import Floor
 from ..core.trajectory import Array, Trajectory
 from .exudyn_rows import DRIVERS, JOINTS, NO_ROTATION, Rows, turned
-from .projection import solve_by_projection, without_counterpart
+from .floors import floor_of
+from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
 
 # Largest change of a coordinate per step of the differences of the Jacobian [m or -]. Round-off, 1e-16 / 1e-3, and truncation,
 # (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
@@ -25,19 +29,26 @@ DIFFERENCE = 1e-3
 WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 
 
+@dataclass(frozen=True)
 class Exudyn:
-    """Exudyn as an engine; see `kincheck.core.harness.engine.Engine`."""
+    """The engine `exudyn`; see `Engine`. With a number of corrections, Newton makes so many; see `solve_by_projection`."""
 
+    corrections: int | None = None
     name = "exudyn"
     mode = "projection"
     loop = "python"
-    settings: Mapping[str, Any] = {
-        "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
-        "residual": "ComputeAlgebraicEquations",
-        "jacobian": "ComputeNewtonJacobian, constraint rows",
-        "linear solver": "numpy solve, or least squares where rows are redundant",
-        "acceleration": f"Jacobian differentiated along the velocity, sixth order, coordinates changed by {DIFFERENCE:g}",
-    }
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What is solved and how."""
+        return {
+            "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
+            "residual": "ComputeAlgebraicEquations",
+            "jacobian": "ComputeNewtonJacobian, constraint rows",
+            "linear solver": "numpy solve, or least squares where rows are redundant",
+            "acceleration": f"Jacobian differentiated along the velocity, sixth order, coordinates changed by {DIFFERENCE:g}",
+            **corrected(self.corrections),
+        }
 
     def version(self) -> str | None:
         """Version of Exudyn, or None where it cannot be imported, for whatever reason."""
@@ -56,7 +67,39 @@ class Exudyn:
 
     def solve(self, model: ExudynModel, case: Case, tol: float) -> Trajectory:
         """All samples; see `kincheck.core.harness.engine.Engine.solve`."""
-        return solve_by_projection(model, case, tol, {"rows": len(model.target)})
+        return solve_by_projection(model, case, tol, {"rows": len(model.target)}, self.corrections)
+
+    def efforts(self) -> Mapping[str, Exudyn]:
+        """By the number of Newton steps."""
+        return {label: Exudyn(corrections) for label, corrections in EFFORTS.items()}
+
+    def floor(self, case: Case) -> Floor:
+        """Of the residual and Jacobian of its static solver; rates take two more Jacobians, the fewest that make a difference."""
+        model = self.build(case)
+        solved = self.solve(model, case, 1e-12)
+        _container, mbs, settings, solver = _least()
+        residual = (lambda: model.solver.ComputeAlgebraicEquations(model.mbs), lambda: solver.ComputeAlgebraicEquations(mbs), 1)
+        own, empty = (
+            partial(s.ComputeNewtonJacobian, m, t)
+            for s, m, t in ((model.solver, model.mbs, model.settings), (solver, mbs, settings))
+        )
+        pose = {"ComputeAlgebraicEquations": residual, "ComputeNewtonJacobian": (own, empty, 1)}
+        return floor_of(self, solved, model.unknowns, pose, {"ComputeNewtonJacobian (rates)": (own, empty, 2)})
+
+
+def _least() -> tuple[Any, Any, Any, Any]:
+    """Container, system, settings and solver of the least that Exudyn takes: one free coordinate."""
+    exu: Any = importlib.import_module("exudyn")
+    items: Any = importlib.import_module("exudyn.itemInterface")
+    exu.config.printToConsole = False
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    mbs.AddObject(items.ObjectMass1D(nodeNumber=mbs.AddNode(items.Node1D()), mass=1.0))
+    mbs.Assemble()
+    settings, solver = exu.SimulationSettings(), exu.MainSolverStatic()
+    settings.solution.file.write = False
+    solver.InitializeSolver(mbs, settings)
+    return container, mbs, settings, solver
 
 
 class ExudynModel:

@@ -83,11 +83,11 @@ class Rows:
         for joint in mechanism.joints:
             JOINTS[type(joint)](self, joint)
             for relation in joint.relations if isinstance(joint, joints.AxialJoint) else ():
-                self._relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
+                self.relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
         for coupler in mechanism.couplers:
-            self._relate(list(zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)))
+            self.relate(list(zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)))
         for value, driver in enumerate(mechanism.drivers):
-            self.follow(DRIVERS[type(driver)](self, driver), value)
+            self.drive(driver, value)
 
     def _add_bodies(self) -> None:
         for body in self.mechanism.bodies:
@@ -149,7 +149,11 @@ class Rows:
         """Let a row follow a value."""
         self.following.append(Following(row, value, weight))
 
-    def _relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
+    def drive(self, driver: Driver, value: int) -> None:
+        """The driver's coordinate follows its value."""
+        self.follow(DRIVERS[type(driver)](self, driver), value)
+
+    def relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
         """The weighted sum of two coordinates (joint, freedom, weight) stays zero."""
         (first, freedom, weight), (second, other_freedom, other) = terms
         value, size = self.unknown(), math.hypot(weight, other)

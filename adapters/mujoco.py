@@ -11,8 +11,8 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Mapping
-from dataclasses import replace
-from types import MappingProxyType
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,35 +20,42 @@ from numpy.typing import NDArray
 
 from ..core.drivers import JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ..core.harness.case import Case
+from ..core.harness.engine import Floor
 from ..core.trajectory import Array, Trajectory
+from .floors import floor_of
 from .mujoco_spec import JOINTS, Closure, Sketch, coordinate
-from .projection import solve_by_projection, without_counterpart
+from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
 
 DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 ROWS = {"connect": 3, "weld": 6, "tendon": 1, "joint": 1}
 
 
+@dataclass(frozen=True)
 class MuJoCo:
-    """The engine `mujoco`; see `Engine`."""
+    """The engine `mujoco`; see `Engine`. With a number of corrections, Newton makes so many; see `solve_by_projection`."""
 
+    corrections: int | None = None
     name = "mujoco"
     mode = "projection"
     loop = "python"
-    settings: Mapping[str, Any] = MappingProxyType(
-        {
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What is solved and how."""
+        return {
             "residual": "efc_pos: m; angles: sin(angle/2) of welds, rad of joints; drivers: m or rad",
             "jacobian": "efc_J, dense",
             "linear_solver": "LU where the rows are square and of full rank at design, else least squares",
             "options": "no gravity, no contact, no autoreset",
             "cut_joints": "tendon; or connect or weld, to an auxiliary body where the joint has slides or hinges",
             "relations": "joint equalities",
+            **corrected(self.corrections),
         }
-    )
 
     def version(self) -> str | None:
         """MuJoCo's version, or None where it cannot be imported."""
         try:
-            return str(_mujoco().__version__)
+            return str(mujoco().__version__)
         except Exception:  # a broken binary raises whatever its loader likes; to the harness all of it means "not here"
             return None
 
@@ -56,20 +63,39 @@ class MuJoCo:
         """None, or the joint or driver that has no counterpart here."""
         return without_counterpart(case, "MuJoCo", JOINTS, DRIVERS)
 
-    def build(self, case: Case) -> _Model:
+    def build(self, case: Case) -> MuJoCoModel:
         """The compiled model and its rows."""
-        return _Model(_mujoco(), case)
+        return MuJoCoModel(mujoco(), case)
 
-    def solve(self, model: _Model, case: Case, tol: float) -> Trajectory:
+    def solve(self, model: MuJoCoModel, case: Case, tol: float) -> Trajectory:
         """All samples; see `Engine.solve`."""
-        return solve_by_projection(model, case, tol, model.details)
+        return solve_by_projection(model, case, tol, model.details, self.corrections)
+
+    def efforts(self) -> Mapping[str, MuJoCo]:
+        """By the number of Newton steps."""
+        return {label: MuJoCo(corrections) for label, corrections in EFFORTS.items()}
+
+    def floor(self, case: Case) -> Floor:
+        """Of `mj_kinematics` and what else a pose takes."""
+        mj = mujoco()
+        model = self.build(case)
+        trajectory = self.solve(model, case, 1e-12)
+        nothing = mj.MjSpec().compile()
+        given, empty = (model.m, model.d), (nothing, mj.MjData(nothing))
+
+        def calls(*names: str) -> Mapping[str, tuple[Any, Any, int]]:
+            return {name: (partial(getattr(mj, name), *given), partial(getattr(mj, name), *empty), 1) for name in names}
+
+        pose = calls("mj_kinematics", "mj_comPos", "mj_tendon", "mj_makeConstraint")
+        return floor_of(self, trajectory, model.m.nv, pose, calls("mj_comVel", "mj_referenceConstraint"))
 
 
-def _mujoco() -> Any:
+def mujoco() -> Any:
+    """The simulator, imported when it is first asked for."""
     return importlib.import_module("mujoco")
 
 
-class _Model:
+class MuJoCoModel:
     """A compiled mechanism as a `ProjectionModel`: the rows of its equalities, then one row for each driver."""
 
     def __init__(self, mj: Any, case: Case) -> None:
@@ -87,6 +113,7 @@ class _Model:
         self.A = np.zeros((self.n + len(mechanism.drivers), self.m.nv))
         self.columns = np.eye(len(self.A))[:, self.n :]  # the rows of the drivers are the last
         self.coordinates: list[tuple[int, int, float]] = []  # row, address in qpos, sign
+        self.driven: list[tuple[int, int, float]] = []  # of joint drivers: address in qpos, in qvel, sign
         self.pulled: list[tuple[int, int, Array, Array]] = []  # row, site, unit direction, design position
         for row, driver in enumerate(mechanism.drivers, start=self.n):
             if isinstance(driver, PointCoordinate):
@@ -95,6 +122,7 @@ class _Model:
             elif isinstance(driver, JointDriver):
                 joint, sign = self.m.joint(coordinate(driver.joint, driver.freedom)), sketch.signs[driver.joint]
                 self.coordinates.append((row, int(joint.qposadr[0]), sign))
+                self.driven.append((int(joint.qposadr[0]), int(joint.dofadr[0]), sign))
                 self.A[row, int(joint.dofadr[0])] = sign
         self.details = {
             "tree": sketch.tree,

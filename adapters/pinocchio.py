@@ -10,12 +10,14 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..core.drivers import JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ..core.harness.case import Case
+from ..core.harness.engine import Floor
 from ..core.joints import (
     AxialJoint,
     ConstantVelocity,
@@ -31,25 +33,34 @@ from ..core.joints import (
     Universal,
 )
 from ..core.joints.base import triad, unit
-from ..core.mechanism import GROUND, Vector
-from ..core.topology import spanning_tree
+from ..core.mechanism import GROUND, Mechanism, Vector
+from ..core.topology import Branch, SpanningTree, spanning_tree
 from ..core.trajectory import Array, Trajectory
 from .closures import CLOSURES, ends_of, twistless
 from .conditions import Condition
-from .projection import solve_by_projection, without_counterpart
+from .floors import floor_of
+from .pinocchio_rows import DrivenPoint, Frame, Linear
+from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
 
 
+@dataclass(frozen=True)
 class Pinocchio:
-    """Engine "pinocchio"; see `Engine`."""
+    """The engine `pinocchio`; see `Engine`. With a number of corrections, Newton makes so many; see `solve_by_projection`."""
 
+    corrections: int | None = None
     name = "pinocchio"
     mode = "projection"
     loop = "python"
-    settings: Mapping[str, Any] = {
-        "coordinates": "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer",
-        "closures": "conditions on frame placements, Jacobians and classical accelerations",
-        "linear solve": "numpy LU where the rows are square and independent, else least squares",
-    }
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What is solved and how."""
+        return {
+            "coordinates": "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer",
+            "closures": "conditions on frame placements, Jacobians and classical accelerations",
+            "linear solve": "numpy LU where the rows are square and independent, else least squares",
+            **corrected(self.corrections),
+        }
 
     def version(self) -> str | None:
         """Version of Pinocchio, or None where it cannot be imported."""
@@ -64,13 +75,40 @@ class Pinocchio:
         """None, or which joint or driver has no counterpart here."""
         return without_counterpart(case, "Pinocchio", CLOSURES, (PointCoordinate, JointAngle, JointDisplacement))
 
-    def build(self, case: Case) -> _Model:
+    def build(self, case: Case) -> PinocchioModel:
         """Tree, frames and conditions of the case, at the design position."""
-        return _Model(importlib.import_module("pinocchio"), case)
+        return PinocchioModel(importlib.import_module("pinocchio"), case)
 
-    def solve(self, model: _Model, case: Case, tol: float) -> Trajectory:
+    def solve(self, model: PinocchioModel, case: Case, tol: float) -> Trajectory:
         """Solve all samples; see `Engine.solve`."""
-        return solve_by_projection(model, case, tol, {"closures": model.closures})
+        return solve_by_projection(model, case, tol, {"closures": model.closures}, self.corrections)
+
+    def efforts(self) -> Mapping[str, Pinocchio]:
+        """By the number of Newton steps."""
+        return {label: Pinocchio(corrections) for label, corrections in EFFORTS.items()}
+
+    def floor(self, case: Case) -> Floor:
+        """Of the Jacobians and placements of joints and frames."""
+        model = self.build(case)
+        solved = self.solve(model, case, 1e-12)
+        pin, least = model.pin, model.pin.Model()
+        # Pinocchio ends the process where it is asked for the Jacobian of a frame that no joint carries
+        joint = least.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "joint")
+        frame = least.addFrame(pin.Frame("frame", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+        own, empty = (model.model, model.data), (least, least.createData())
+        zero = np.zeros(model.model.nv)
+
+        def calls(function: Any, *given: Any, none: tuple[Any, ...] | None = None, times: int = 1) -> tuple[Any, Any, int]:
+            return partial(function, *own, *given), partial(function, *empty, *(none or (np.zeros(1),) * len(given))), times
+
+        frames = model.model.nframes - 1 - len(model.wanted)
+        pose = {
+            "computeJointJacobians": calls(pin.computeJointJacobians, model.q),
+            "updateFramePlacements": calls(pin.updateFramePlacements),
+            "getFrameJacobian": calls(pin.getFrameJacobian, 1, model.axes, none=(frame, model.axes), times=frames),
+        }
+        rates = {"forwardKinematics": calls(pin.forwardKinematics, model.q, zero, zero, times=2)}
+        return floor_of(self, solved, model.model.nv, pose, rates)
 
 
 # Axes are normalised, because Pinocchio takes others without a word and then shears the body.
@@ -100,48 +138,43 @@ _TREE: dict[type[Joint], Callable[[Any, Any], Sequence[Any]]] = {
 """Pinocchio's joints that make a joint, from first body to second, one a freedom of an axial joint; other types are always cut."""
 
 
-class _Model:
+class PinocchioModel:
     """The mechanism in Pinocchio; a `ProjectionModel`. Rows: those of joints, then of couplers, then one a driver."""
 
     def __init__(self, pin: Any, case: Case) -> None:
         mechanism, tree = case.mechanism, spanning_tree(case.mechanism)
         self.pin, self.model, self.axes = pin, pin.Model(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        carrier = {name: 0 for name in (GROUND, *(body.name for body in mechanism.bodies)) if mechanism.is_fixed(name)}
+        self.carrier = {name: 0 for name in (GROUND, *(body.name for body in mechanism.bodies)) if mechanism.is_fixed(name)}
         self.origin = [np.zeros(3)]
         self.coordinates: dict[tuple[str, str], tuple[int, int]] = {}
         self.conditions: list[Condition] = []
         self.closures: dict[str, str] = {}
-        for branch in tree.branches:
-            joint, at = branch.joint, carrier[branch.parent]
+        for branch in self._branches(mechanism, tree):
+            joint, at = branch.joint, self.carrier[branch.parent]
             if joint is None:
-                carrier[branch.child] = self._add_joint(at, pin.JointModelFreeFlyer(), mechanism.body(branch.child).origin)
+                self.carrier[branch.child] = self._add_joint(at, pin.JointModelFreeFlyer(), mechanism.body(branch.child).origin)
                 continue
             P = ends_of(mechanism, joint)[0]
-            carrier[branch.child] = self._add_chain(at, joint, P, 1 if joint.j == branch.child else -1)
+            self.carrier[branch.child] = self._add_chain(at, joint, P, 1 if joint.j == branch.child else -1)
             if isinstance(joint, ConstantVelocity):
                 self.closures[joint.name] = "ball joint of the tree, shafts turn alike (1 row)"
-                self.conditions += twistless(joint, *(self._add_frame(carrier[body], P) for body in joint.bodies))
+                self.conditions += twistless(joint, *(self._add_frame(self.carrier[body], P) for body in joint.bodies))
 
         named = {name for coupler in mechanism.couplers for name in coupler.joints}
         named |= {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
         for joint in tree.cut:
-            (i, j), ends = (carrier[body] for body in joint.bodies), ends_of(mechanism, joint)
-            closure, copied = CLOSURES[type(joint)], ""
-            if joint.name in named:
-                # what is driven or coupled must be a coordinate, which counts the turns: it moves a copy of the second body
-                i, closure, copied = self._add_chain(i, joint, ends[0], 1), CLOSURES[Fixed], f"on a copy of {joint.j!r}: "
-            self.closures[joint.name] = copied + closure.text
-            self.conditions += closure.conditions(joint, *map(self._add_frame, (i, j), ends))
+            i, j = (self.carrier[body] for body in joint.bodies)
+            self._close(joint, i, j, ends_of(mechanism, joint), joint.name in named)
         for each in mechanism.couplers:
             self.conditions.append(self._linear(*zip(each.joints, each.freedoms, each.coefficients, strict=True)))
         for driver in mechanism.drivers:
             if isinstance(driver, PointCoordinate):
                 point = mechanism.point(driver.point)
-                frame = self._add_frame(carrier[point.body], point.position)
-                self.conditions.append(_DrivenPoint(frame, _unit(driver.direction), np.array(point.position)))
+                frame = self._add_frame(self.carrier[point.body], point.position)
+                self.conditions.append(DrivenPoint(frame, _unit(driver.direction), np.array(point.position)))
             elif isinstance(driver, JointDriver):
                 self.conditions.append(self._linear((driver.joint, driver.freedom, 1.0)))
-        self.wanted = [self._add_frame(carrier[point.body], point.position) for point in map(mechanism.point, case.points)]
+        self.wanted = [self._add_frame(self.carrier[point.body], point.position) for point in map(mechanism.point, case.points)]
 
         ends = np.cumsum([each.n for each in self.conditions])
         self.slices = [slice(end - each.n, end) for end, each in zip(ends, self.conditions, strict=True)]
@@ -149,6 +182,19 @@ class _Model:
         self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]  # the rows of the drivers are the last
         self.data = self.model.createData()
         self.reset()
+
+    def _branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterable[Branch]:
+        """The branches in an order where every parent comes before its children; kinematics needs no other."""
+        return tree.branches
+
+    def _close(self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool) -> None:
+        """Rows for a joint that the tree has not, between what joints i and j carry."""
+        closure, copied = CLOSURES[type(joint)], ""
+        if named:
+            # what is driven or coupled must be a coordinate, which counts the turns: it moves a copy of the second body
+            i, closure, copied = self._add_chain(i, joint, ends[0], 1), CLOSURES[Fixed], f"on a copy of {joint.j!r}: "
+        self.closures[joint.name] = copied + closure.text
+        self.conditions += closure.conditions(joint, *map(self._add_frame, (i, j), ends))
 
     def _add_chain(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
         """The number of the last of the joints that make a joint, from its first body on or (sign -1) from its second."""
@@ -161,12 +207,12 @@ class _Model:
             self.conditions.append(self._linear(*((joint.name, *term) for term in relation.items())))
         return at
 
-    def _linear(self, *terms: tuple[str, str, float]) -> _Linear:
+    def _linear(self, *terms: tuple[str, str, float]) -> Linear:
         """The weighted sum of coordinates, each given by joint, freedom and weight."""
         moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
         joints = [self.model.joints[at] for at, _, _ in moved]
         weights = np.array([sign * weight for _, sign, weight in moved])
-        return _Linear(self, [each.idx_q for each in joints], [each.idx_v for each in joints], weights)
+        return Linear(self, [each.idx_q for each in joints], [each.idx_v for each in joints], weights)
 
     def _add_joint(self, parent: int, joint: Any, at: Vector) -> int:
         """The number of a new joint at that point, global at design."""
@@ -174,12 +220,12 @@ class _Model:
         self.origin.append(np.array(at))
         return self.model.addJoint(parent, joint, placement, f"joint {self.model.njoints}")
 
-    def _add_frame(self, joint: int, at: Vector) -> _Frame:
+    def _add_frame(self, joint: int, at: Vector) -> Frame:
         """A new frame on what the joint carries, at that point, global at design."""
         placement = self.pin.SE3(np.eye(3), np.array(at) - self.origin[joint])
         # numbered, because a second frame of one name would silently be the first one
         name = f"frame {self.model.nframes}"
-        return _Frame(self, self.model.addFrame(self.pin.Frame(name, joint, 0, placement, self.pin.FrameType.OP_FRAME)))
+        return Frame(self, self.model.addFrame(self.pin.Frame(name, joint, 0, placement, self.pin.FrameType.OP_FRAME)))
 
     def reset(self) -> None:
         self.q: Array = self.pin.neutral(self.model)
@@ -219,69 +265,6 @@ class _Model:
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.pin.forwardKinematics(self.model, self.data, self.q, v, a)
         return [(frame.position, frame.velocity[:3], frame.acceleration[:3]) for frame in self.wanted]
-
-
-@dataclass(frozen=True, eq=False)
-class _Frame:
-    """A frame of the model, which it reads as last computed; see `closures.Frame`."""
-
-    of: _Model
-    index: int
-
-    @property
-    def position(self) -> Array:
-        return self.of.data.oMf[self.index].translation
-
-    @property
-    def rotation(self) -> Array:
-        return self.of.data.oMf[self.index].rotation
-
-    @property
-    def jacobian(self) -> Array:
-        return self.of.pin.getFrameJacobian(self.of.model, self.of.data, self.index, self.of.axes)
-
-    @property
-    def velocity(self) -> Array:
-        return self.of.pin.getFrameVelocity(self.of.model, self.of.data, self.index, self.of.axes).vector
-
-    @property
-    def acceleration(self) -> Array:
-        return self.of.pin.getFrameClassicalAcceleration(self.of.model, self.of.data, self.index, self.of.axes).vector
-
-
-@dataclass(frozen=True, eq=False)
-class _DrivenPoint:
-    """The displacement since design of a point along the fixed direction k [m]."""
-
-    frame: _Frame
-    k: Array
-    design: Array
-    n = 1
-
-    def rows(self) -> tuple[Any, Array]:
-        return self.k @ (self.frame.position - self.design), self.k @ self.frame.jacobian[:3]
-
-    def bias(self) -> Any:
-        return self.k @ self.frame.acceleration[:3]
-
-
-@dataclass(frozen=True, eq=False)
-class _Linear:
-    """A weighted sum of coordinates [m or rad]: a driver's, or zero by a coupler or a joint's own relation."""
-
-    of: _Model
-    q: list[int]
-    v: list[int]
-    weights: Array
-    n = 1
-
-    def rows(self) -> tuple[Any, Array]:
-        row = np.zeros(self.of.model.nv)
-        row[self.v] = self.weights
-        return self.weights @ self.of.q[self.q], row
-
-    def bias(self) -> Any:
-        return 0.0
 
 
 def _unit(a: Iterable[float]) -> Array:

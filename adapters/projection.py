@@ -23,6 +23,8 @@ from ..core.motions import Path
 from ..core.trajectory import Array, PointMotion, Trajectory
 
 MAX_ITERATIONS = 20
+# Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method. None is as many as it takes.
+EFFORTS: Mapping[str, int | None] = {"predictor only": 0, "1 Newton step": 1, "2 Newton steps": 2, "until converged": None}
 # A step shorter than this part of the sample distance that still fails is the end of the motion, not a coarse grid.
 SMALLEST_STEP = 2.0**-10
 # Singular values below this part of the largest count as zero: far above round-off (1e-15), far below a sound mechanism (1e-2).
@@ -97,14 +99,27 @@ def without_counterpart(
     return None
 
 
-def solve_by_projection(model: ProjectionModel, case: Case, tol: float, details: Mapping[str, Any] | None = None) -> Trajectory:
-    """Solve all samples of the case with the model; see `Engine.solve`."""
-    return _Walk(model, case, tol).trajectory(details or {})
+def corrected(corrections: int | None) -> Mapping[str, Any]:
+    """The setting, where it is one."""
+    return {} if corrections is None else {"newton_steps": corrections}
 
 
-class _Walk:
-    def __init__(self, model: ProjectionModel, case: Case, tol: float) -> None:
-        self.model, self.case, self.tol = model, case, tol
+def solve_by_projection(
+    model: ProjectionModel, case: Case, tol: float, details: Mapping[str, Any] | None = None, corrections: int | None = None
+) -> Trajectory:
+    """Solve all samples of the case with the model; see `Engine.solve`.
+
+    Args:
+        corrections: exactly so many Newton steps after the predictor, whatever residual they leave; None: until it meets tol.
+    """
+    return Walk(model, case, tol, corrections).trajectory(details or {})
+
+
+class Walk:
+    """The way of a model through a case, sample by sample."""
+
+    def __init__(self, model: ProjectionModel, case: Case, tol: float, corrections: int | None = None) -> None:
+        self.model, self.case, self.tol, self.corrections = model, case, tol, corrections
         self.drivers = [driver.name for driver in case.mechanism.drivers]
         corners = [np.asarray(case.mechanism.point(name).position) for name in case.points]
         self.size = max(1e-3, float(np.ptp(np.stack([*corners, *_joint_points(case)]), axis=0).max()))
@@ -114,7 +129,7 @@ class _Walk:
         singular = np.linalg.svd(jacobian, compute_uv=False)
         self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
         self.square = jacobian.shape == (self.rank, self.rank)
-        self.unknowns = jacobian.shape[1]
+        self.rows, self.unknowns = jacobian.shape
         if self.rank < self.unknowns:
             raise SolveError(
                 f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns} coordinates of the simulator's model are "
@@ -135,7 +150,11 @@ class _Walk:
             worst = float(np.abs(r).max()) if np.isfinite(r).all() else math.inf
             if not math.isfinite(worst):
                 return None
-            if met:  # one step after meeting the tolerance: quadratic convergence makes it exact to round-off
+            if iteration - 1 == self.corrections:
+                return corrected, iteration - 1, worst
+            if (
+                met and self.corrections is None
+            ):  # one step after meeting the tolerance: quadratic convergence makes it exact to round-off
                 return (corrected, iteration - 1, worst) if worst <= self.tol else None
             met = worst <= self.tol
             try:

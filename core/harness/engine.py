@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ..trajectory import Trajectory
@@ -15,7 +16,8 @@ class Engine(Protocol):
     Attributes:
         name: as on the command line.
         mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or "simulate" (its own
-            solver or time stepping). Modes are different products and never share a ranking.
+            solver or time stepping). Modes are different products and never share a ranking. Name and mode together are an
+            engine's identity: the simulate mode that is recommended has the simulator's name, variants of it have one of their own.
         loop: where the loop over samples and iterations runs: "python", "simulator" or "compiled".
         settings: what the report prints so that a reader can repeat the run.
     """
@@ -46,9 +48,41 @@ class Engine(Protocol):
 
         Args:
             model: what `build` gave; may be used for several solves.
-            tol: largest accepted constraint residual [m or -].
+            tol: largest accepted constraint residual [m or -]. In simulate mode the simulator's own settings say what it accepts,
+                and the residual tells what came of it.
 
         Returns:
-            A trajectory of case.points; samples that cannot be reached are NaN and explained, never numbers.
+            A trajectory of case.points; samples that cannot be reached are NaN and explained, never numbers. Its iterations are
+            Newton's; in simulate mode, time or load steps.
         """
+        ...
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A bound from below on what an engine can take for a sample.
+
+    Attributes:
+        us_per_sample: the sum of the parts [us].
+        counted: what was counted and how, for a reader.
+        parts: time by what takes it [us].
+    """
+
+    us_per_sample: float
+    counted: str
+    parts: Mapping[str, float]
+
+
+class Measurable(Engine, Protocol):
+    """An engine that a diagram of work against precision can be drawn of.
+
+    The predictor and the warm start are the same for all its efforts; what an effort spares or spends is in its settings.
+    """
+
+    def efforts(self) -> Mapping[str, Engine]:
+        """The same engine at several efforts, from coarse to fine, by what tells them apart."""
+        ...
+
+    def floor(self, case: Case) -> Floor | None:
+        """What its compiled code alone needs for a sample; None where the loop is compiled and its time is the floor itself."""
         ...

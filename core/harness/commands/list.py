@@ -14,15 +14,17 @@ def add(commands: Any) -> None:
     listing: argparse.ArgumentParser = commands.add_parser("list", help="list cases and engines", description=_list.__doc__)
     listing.set_defaults(do=_list)
     listing.add_argument("--joints", action="store_true", help="list the types a case file can name: joints, drivers, motions")
+    listing.add_argument("--outputs", action="store_true", help="list the types of outputs a case file can name, with their signs")
 
 
 def _list(options: argparse.Namespace, house: House) -> int:
-    """List the built-in cases with their truth and source, and the engines with their versions; or the types of joints."""
-    from ..catalogue import catalogue
+    """List the built-in cases with truth and source, and the engines with their versions; or the types of joints or of outputs."""
+    from ..catalogue import catalogue, output_catalogue
     from ..circumstances import truth_of
 
-    if options.joints:
-        print(*catalogue(), sep="\n")
+    if options.joints or options.outputs:
+        listed = [*(catalogue() if options.joints else ()), *(output_catalogue() if options.outputs else ())]
+        print(*listed, sep="\n")
         return Status.WITHIN
     print("cases:")
     names = house.cases()
@@ -30,9 +32,11 @@ def _list(options: argparse.Namespace, house: House) -> int:
         case = house.case(name)
         print(f"  {name:{max(map(len, names))}}  {str(truth_of(case)).replace('_', ' '):16}  {case.source}")
     print("engines:")
-    for name in house.engines:
-        engine = house.engine(name)
+    engines = [*map(house.engine, house.engines), *(house.engine(name, "simulate") for name in house.simulations)]
+    width = max(len(engine.name) for engine in engines)
+    for engine in engines:
+        name = engine.name
         version = engine.version()
         state = f"not installed: {how_to_install(name)}" if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
-        print(f"  {name:{max(map(len, house.engines))}}  {state}")
+        print(f"  {name:{width}}  {state}")
     return Status.WITHIN
