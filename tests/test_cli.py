@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import kincheck.adapters
 import kincheck.cases
@@ -30,14 +31,16 @@ UNABLE = Fake("unable", refusal="joint 'cv' (universal) has no counterpart")
 def kincheck_main(monkeypatch):
     """main() with the cases and engines of the test."""
 
-    def main(*argv, engines=(RIGHT,), cases=None):
+    def main(*argv, engines=(RIGHT,), cases=None, jobs="0"):
         cases = {"crank": crank(), "crank_two": crank("crank_two")} if cases is None else cases
         by_name = {engine.name: engine for engine in engines}
         monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
+        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
         monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, RIGHT))
         monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
         monkeypatch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
-        return cli.main([str(each) for each in argv])
+        # in this process, to which fakes with answers of their own belong; isolation has a room of its own
+        return cli.main([*map(str, argv), *(["--jobs", jobs] if argv[0] == "run" and jobs else [])])
 
     return main
 
@@ -60,6 +63,37 @@ def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
         ("crank_two", "native"),
         ("crank_two", "missing"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("engines", "options", "inside"),
+    [([RIGHT], [], True), ([RIGHT], ["--timeout", "60"], False), ([RIGHT, Fake()], [], False), ([Fake()], [], False)],
+    ids=["native", "native, limited", "both", "other"],
+)
+def test_what_is_not_ours_alone_is_solved_in_worker_processes(kincheck_main, capsys, monkeypatch, engines, options, inside):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent))
+    RIGHT.solves = 0
+    assert kincheck_main("run", "crank", "--json", "-", *options, engines=engines, jobs=None) == 0
+    facts = json.loads(capsys.readouterr().out)["run"]
+    assert (facts["jobs"] == 0) is inside
+    assert ("timeout" in facts) is not inside
+    assert (RIGHT.solves > 0) is inside
+
+
+def test_an_adapter_that_cannot_be_loaded_is_an_error_of_its_pairs(kincheck_main, capsys, monkeypatch):
+    def load(name):
+        if name == "other":
+            raise ImportError("libother.so: no such file")
+        return RIGHT
+
+    argv = ["run", "crank", "--json", "-"]
+    assert kincheck_main(*argv, engines=[RIGHT, Fake("other")]) == 0
+    capsys.readouterr()
+    monkeypatch.setattr(kincheck.adapters, "engine", load)
+    assert cli.main([*argv, "--jobs", "0"]) == 1
+    records = json.loads(capsys.readouterr().out)["records"]
+    assert [each["outcome"] for each in records] == ["pass", "error"]
+    assert records[1]["message"] == "ImportError: engine 'other' cannot be loaded: ImportError: libother.so: no such file"
 
 
 def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
@@ -90,6 +124,13 @@ def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_tha
         (["crank", "--mode", "simulate"], "no engine has the mode 'simulate'"),
         (["crank", "--engine", "native", "--mode", "simulate"], "engine 'native' has the mode 'projection', not 'simulate'"),
         (["--unknown"], "unrecognized arguments: --unknown"),
+        (["--jobs", "-1"], "'-1' is not a number of processes; give 0, 1, 2, ..."),
+        (
+            ["--timeout", "5"],
+            "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and --memory, or --jobs",
+        ),
+        (["--scheduler", "tcp://there:8786"], "--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs"),
+        (["--resume"], "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"),
     ],
 )
 def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, argv, said):

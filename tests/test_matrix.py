@@ -27,10 +27,11 @@ def run(monkeypatch, tmp_path, capsys):
     def main(*argv, engines, cases=()):
         by_name = {engine.name: engine for engine in engines}
         monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
+        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
         monkeypatch.setattr(kincheck.adapters, "engine", by_name.get)
         monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(case.name for case in cases))
         monkeypatch.setattr(kincheck.cases, "load", {case.name: case for case in cases}.get)
-        status = cli.main(["run", *argv, "--markdown", str(tmp_path / "matrix.md")])
+        status = cli.main(["run", *argv, "--jobs", "0", "--markdown", str(tmp_path / "matrix.md")])
         return status, capsys.readouterr().out, (tmp_path / "matrix.md").read_text("utf-8")
 
     return main

@@ -1,12 +1,12 @@
-"""The report holds the numbers of its records, escapes what comes from files, needs no network, and draws its figures."""
+"""The report holds the numbers of its records, escapes what comes from files, and needs no network."""
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import re
-import shutil
-import subprocess
+import zlib
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,12 @@ from typing import Any
 import msgspec
 import pytest
 from kincheck.core.harness.record import Deviation, Deviations, Results
-from kincheck.core.harness.reporting.figures import SAMPLES
-from kincheck.core.harness.reporting.report import headline, number, write_report
+from kincheck.core.harness.reporting.axis import SAMPLES
+from kincheck.core.harness.reporting.report import headline, write_report
+from kincheck.core.harness.reporting.wording import number
 
 from .made_up import CRANK, GRID, distances, judged, record, results, series
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"
 
 
@@ -29,7 +29,8 @@ class Page(HTMLParser):
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
         self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.scripts: list[str] = []
+        self.scripts: dict[str, str] = {}
+        self.names: list[str] = []
         self.text = ""
         self.feed(text)
 
@@ -37,18 +38,19 @@ class Page(HTMLParser):
         self.tags.append((tag, dict(attrs)))
         self.text += " "
         if tag == "script":
-            self.scripts.append("")
+            self.names.append(dict(attrs).get("id") or f"script {len(self.names)}")
+            self.scripts[self.names[-1]] = ""
 
     def handle_data(self, data: str) -> None:
         if self.cdata_elem == "script":
-            self.scripts[-1] += data
+            self.scripts[self.names[-1]] += data
         elif self.cdata_elem is None:
             self.text += data
 
     @property
     def data(self) -> Any:
-        island = [dict(attrs).get("type") == "application/json" for tag, attrs in self.tags if tag == "script"].index(True)
-        return json.loads(self.scripts[island], parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+        text = zlib.decompress(base64.b64decode(self.scripts["report-data"], validate=True))
+        return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
 def report(run: Results, folder: Path) -> Page:
@@ -69,9 +71,10 @@ def test_figures_hold_the_outputs_in_millimetres_with_the_travel_upwards(tmp_pat
     for each in run.records[:2]:
         [curve] = traces(page, "case-0-0", each.engine, "lines")
         assert curve["y"] == "driver"
-        assert curve["x"] == [1000 * v for v in each.outputs["half_track_change"].position if v is not None]
+        expected = [1000 * v for v in each.outputs["half_track_change"].position if v is not None]
+        assert curve["x"] == pytest.approx(expected, rel=1e-9)  # ten digits are kept
     [reference] = traces(page, "case-0-0", "reference", "lines")
-    assert reference["x"] == [1000 * v for v in series(GRID).position if v is not None]
+    assert reference["x"] == pytest.approx([1000 * v for v in series(GRID).position if v is not None], rel=1e-9)
     layout = page.data["figures"]["case-0-0"]["layout"]
     assert layout["xaxis"]["title"]["text"] == "half-track change [mm]"
     assert "wheel travel [mm]" in layout["yaxis"]["title"]["text"]
@@ -92,9 +95,9 @@ def test_error_figures_hold_the_distances_from_the_reference(tmp_path: Path, mot
         [curve] = traces(page, f"case-0-0-{motion}", each.engine, "lines+markers")
         deviation: Deviation = getattr(each.errors["half_track_change"], motion)
         expected = distances(getattr(each.outputs["half_track_change"], motion), getattr(series(GRID), motion))
-        assert curve["y"] == pytest.approx(expected, rel=1e-3)  # four digits are kept
-        assert curve["y"][deviation.worst_step] == pytest.approx(deviation.max_abs, rel=1e-3)
-        assert max(curve["y"]) == pytest.approx(deviation.max_abs, rel=1e-3)
+        assert curve["y"] == pytest.approx(expected, rel=5e-3)  # three digits are kept
+        assert curve["y"][deviation.worst_step] == pytest.approx(deviation.max_abs, rel=5e-3)
+        assert max(curve["y"]) == pytest.approx(deviation.max_abs, rel=5e-3)
     [ring] = traces(page, f"case-0-0-{motion}", "worst", "markers")
     top = getattr(run.records[1].errors["half_track_change"], motion)
     assert (ring["x"], ring["y"]) == ([1000 * GRID[top.worst_step]], [top.max_abs])
@@ -111,7 +114,7 @@ def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_wi
     assert traces(page, "case-0-0", "reference", "lines") == []
     assert traces(page, "case-0-0-position", "native", "lines+markers") == []
     [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
-    assert max(curve["y"]) == pytest.approx(output["half_track_change"].position.max_abs, rel=1e-3)  # type: ignore[union-attr]
+    assert max(curve["y"]) == pytest.approx(output["half_track_change"].position.max_abs, rel=5e-3)  # type: ignore[union-attr]
     assert "1 with nothing to compare with" in page.text
     assert "no reference: compared with nothing" in page.text
 
@@ -124,8 +127,10 @@ def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path: Path) -
     assert worst is not None
     head = words[: words.index("Overview")]
     assert "1 of 2 comparisons is outside tolerance" in head
-    assert f"Worst one on strut Error {number(worst.max_abs)} m" in head
-    assert f"At sample {worst.worst_step} of 0…20 wheel travel {1000 * GRID[worst.worst_step]:+.4g} mm".replace("-", "−") in head
+    travel = f"{1000 * GRID[worst.worst_step]:+.4g}".replace("-", "−")
+    assert "Worst: engine one on case strut, output half-track change (position), at wheel travel" in head
+    assert f"at wheel travel {travel} mm (sample {worst.worst_step} of 0…20): {number(worst.max_abs / 1e-9)} × tolerance" in head
+    assert f"Error {number(worst.max_abs)} m, tolerance 1e-9, against in-house oracle" in head
     assert "✗ fail one on strut: half_track_change: too far off" in head
     assert "○ unavailable two on strut: two is not installed" in words
     for told in (
@@ -147,7 +152,7 @@ def test_the_worst_case_leads(tmp_path: Path) -> None:
     cases = [("good", 1e-11), ("bad", 5e-9), ("better", 1e-15)]
     records = [record(case, "closed_form", "one", error, GRID) for case, error in cases]
     page = report(Results(run={}, records=records), tmp_path)
-    assert "Worst one on bad" in re.sub(r"\s+", " ", page.text)
+    assert "Worst: engine one on case bad" in re.sub(r"\s+", " ", page.text)
 
 
 @pytest.mark.parametrize(
@@ -170,8 +175,8 @@ def test_text_from_files_is_escaped(tmp_path: Path) -> None:
     page = report(
         Results(run={**run.run, HOSTILE: HOSTILE}, records=[run.records[0], strange, named], references=run.references), tmp_path
     )
-    assert len(page.scripts) == 3
-    assert not any("alert" in script for script in page.scripts[1:])
+    assert page.names == ["report-data", "plotly", "script 2", "script 3"]
+    assert not any("alert" in page.scripts[name] for name in page.names)
     assert not [attrs for tag, attrs in page.tags if tag == "a" and not (attrs["href"] or "").startswith("#")]
     assert page.text.count("<script>alert('x')</script>") > 5
     shown = [trace.get("name", "") for figure in page.data["figures"].values() for trace in figure["data"]]
@@ -227,7 +232,7 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
     assert SAMPLES <= len(curve["x"]) <= SAMPLES + 2
     assert len(page.data["drivers"]["case-0"]) == len(curve["x"])
     [drawn] = traces(page, "case-0-0-position", "one", "lines+markers")
-    assert max(drawn["y"]) == pytest.approx(1e-7, rel=1e-3)
+    assert max(drawn["y"]) == pytest.approx(1e-7, rel=5e-3)
     assert "Thinned figures: strut" in page.text
 
 
@@ -242,39 +247,3 @@ def test_an_empty_run_says_so(tmp_path: Path) -> None:
 )
 def test_numbers_are_short_and_a_dash_is_no_zero(value: float | None, text: str) -> None:
     assert number(value) == text
-
-
-def in_chromium(path: Path, profile: Path) -> tuple[str, list[str]]:
-    """The document after its scripts have run, and what they wrote to the console."""
-    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"]
-    flags += ["--disable-component-update", "--disable-sync", "--enable-logging=stderr", "--v=0", "--virtual-time-budget=20000"]
-    command = [str(CHROMIUM), *flags, f"--user-data-dir={profile}", "--dump-dom", path.as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_a_browser_draws_every_figure_and_the_controls_work(tmp_path: Path) -> None:
-    path = tmp_path / "report.html"
-    write_report(results(case=HOSTILE), path)
-    act = """<script>addEventListener("load", () => setTimeout(() => {
-      document.querySelector("button[data-series=one]").click();
-      const select = document.querySelector("select");
-      select.value = "case-0-1";
-      select.dispatchEvent(new Event("change"));
-      document.body.dataset.shown = [...document.querySelectorAll(".plot")].filter((plot) => plot.offsetHeight).length;
-    }, 2000));</script></body>"""
-    before, console = in_chromium(path, tmp_path / "profile")
-    assert console == []
-    assert before.count('data-drawn="yes"') == 4  # two outputs; position and velocity errors of one
-    assert before.count('class="main-svg"') >= 4
-    # An output: the reference, and lines and markers of native and one. An error: curve, zeros and
-    # what is told of each, and the ring.
-    assert before.count('class="trace scatter trace') == 2 * 5 + 2 * 7
-    path.write_text(path.read_text(encoding="utf-8").replace("</body>", act), encoding="utf-8")
-    after, console = in_chromium(path, tmp_path / "profile")
-    assert console == []
-    assert after.count('data-drawn="yes"') == 6
-    assert 'data-shown="4"' in after
-    assert re.search(r'aria-pressed="false" data-series="one"', after)
-    assert after.count('class="trace scatter trace') == 2 * 3 + 4 * 4

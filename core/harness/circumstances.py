@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
+import statistics
+import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
+from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import msgspec
@@ -15,31 +19,104 @@ import numpy as np
 from ..motions import Absolute, Motion
 from .case import TIME, Case, Truth
 from .compare import as_numbers
-from .record import Record, Results
+from .record import OutputSeries, Record, Results
 
 
-def results(cases: Sequence[Case], records: Sequence[Record], *, started: datetime, tol: float, command: str) -> Results:
-    """The records, with what a reader needs to repeat the run: versions, machine, settings, cases and their references."""
-    circumstances = {
-        "kincheck": importlib.metadata.version("kincheck"),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "engines": {record.engine: record.version for record in records},
-        "platform": platform.platform(),
-        "processor": _processor(),
-        "started": started.isoformat(timespec="seconds"),
-        "tol": tol,
-        "command": readable(command),
-        "cases": {case.name: _facts(case) for case in cases},
-    }
-    references = {
+def results(
+    cases: Sequence[Case],
+    records: Sequence[Record],
+    *,
+    started: datetime,
+    tol: float,
+    command: str,
+    facts: Mapping[str, Any] | None = None,
+) -> Results:
+    """The records, with what a reader needs to repeat the run: versions, machine, settings, cases and their references.
+
+    Args:
+        facts: further circumstances; they come before those found here, for a run that began in another process.
+    """
+    known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
+    return Results(run=known | {"engines": versions(records)}, records=list(records), references=references(cases))
+
+
+def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, command: str) -> dict[str, Any]:
+    """What is known of a run before it begins, as JSON has it."""
+    return plain(
+        {
+            "kincheck": importlib.metadata.version("kincheck"),
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "engines": {},
+            "platform": platform.platform(),
+            "processor": _processor(),
+            "host": readable(platform.node()),
+            "started": started.isoformat(timespec="seconds"),
+            "tol": tol,
+            "command": readable(command),
+            "cases": {case.name: _facts(case) for case in cases},
+        }
+    )
+
+
+def versions(records: Sequence[Record]) -> dict[str, str | None]:
+    """The version of each engine, by name: all of them, where a run that was resumed found another; None where none is known."""
+    found: dict[str, list[str]] = {record.engine: [] for record in records}
+    for record in records:
+        if record.version is not None and record.version not in found[record.engine]:  # one that crashed may not have told it
+            found[record.engine].append(record.version)
+    return {engine: " and ".join(each) or None for engine, each in found.items()}
+
+
+def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
+    """The true values of each case that has any, by case and output."""
+    return {
         case.name: {
             output.name: as_numbers(case.reference[output.name], output) for output in case.outputs if output.name in case.reference
         }
         for case in cases
         if case.reference
     }
-    return Results(run=plain(circumstances), records=list(records), references=references)
+
+
+def git_state(folder: Path) -> dict[str, Any] | None:
+    """Commit, branch (null where none is checked out) and whether files differ from it; None where there is no repository."""
+
+    def git(*arguments: str) -> str | None:
+        try:
+            done = subprocess.run(["git", "-C", folder, *arguments], capture_output=True, text=True, timeout=10, check=False)
+        except (OSError, subprocess.TimeoutExpired):  # no git, or a repository on a drive that does not answer
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    commit = git("rev-parse", "HEAD")
+    changed = git("status", "--porcelain", "--untracked-files=no")
+    if not commit:
+        return None
+    return {
+        "commit": commit,
+        "branch": git("symbolic-ref", "--short", "HEAD"),
+        "changed": None if changed is None else bool(changed),
+    }
+
+
+def calibration() -> float:
+    """Seconds of a fixed piece of work, the median of five: what times are divided by to be compared with another day's.
+
+    About 20 ms: interpreter steps and small linear solves in turn, which is what the engines' loops consist of.
+    """
+    matrix, column = np.eye(12) + 0.01 * np.arange(144.0).reshape(12, 12) / 144.0, np.ones(12)
+    times: list[float] = []
+    for _ in range(5):
+        begin = perf_counter()
+        for _ in range(700):
+            column = np.linalg.solve(matrix, column)
+            column /= np.abs(column).max()
+            total = 0.0
+            for step in range(500):
+                total += step * 0.5
+        times.append(perf_counter() - begin)
+    return statistics.median(times)
 
 
 def _facts(case: Case) -> dict[str, Any]:
@@ -50,7 +127,8 @@ def _facts(case: Case) -> dict[str, Any]:
         "truth": truth_of(case),
         "driver": swept,
         "motions": {name: _driver(case, name) | {"motion": _motion(motion)} for name, motion in sweep.motions.items()},
-        "outputs": {output.name: asdict(output) for output in case.outputs},
+        "signs": case.signs,
+        "outputs": {output.name: dict(output.facts) for output in case.outputs},
     }
 
 

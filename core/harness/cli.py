@@ -38,7 +38,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _house() -> House:
     from ... import adapters, cases
 
-    return House(tuple(adapters.ENGINES), adapters.engine, cases.names, cases.load)
+    writers = adapters.WRITERS, adapters.writer
+    return House(tuple(adapters.ENGINES), adapters.engine, cases.names, cases.load, *writers, tuple(adapters.SIMULATIONS))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -44,10 +44,10 @@ def lacking(results: Results, required: Sequence[str]) -> list[str]:
 
 
 def how_to_install(engine: str) -> str:
-    """The command that installs an engine's simulator, from kincheck's own metadata."""
+    """The command that installs an engine's simulator, whose name is its own up to a hyphen, from kincheck's own metadata."""
     wanted = [
         requirement.split(";")[0].strip()
         for requirement in importlib.metadata.requires("kincheck") or []
-        if re.search(rf"""extra == ['"]{engine}['"]""", requirement)
+        if re.search(rf"""extra == ['"]{engine.split("-")[0]}['"]""", requirement)
     ]
     return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"

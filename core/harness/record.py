@@ -29,12 +29,17 @@ class Outcome(StrEnum):
 
 
 class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
-    """One output over the samples, in SI. A sample, or a whole series, that was not computed is null; `reason` says why."""
+    """One output over the samples, in SI. A sample, or a whole series, that was not computed is null; `reason` says why.
+
+    Attributes:
+        sense: what a positive value means, where name and unit do not say it.
+    """
 
     position: list[float | None]
     velocity: list[float | None] | None
     acceleration: list[float | None] | None
     unit: str
+    sense: str | None = None
     reason: str | None = None
 
 
@@ -69,11 +74,15 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Seconds(msgspec.Struct, frozen=True, kw_only=True):
-    """Wall-clock seconds: making the model, the first solve, and a solve after it (median of several)."""
+    """Wall-clock seconds: making the model, the first solve, a solve after it (median of several), and judging the answer.
+
+    A phase that was not reached is null, and so are those after it.
+    """
 
     build: float | None = None
     first: float | None = None
     warm: float | None = None
+    compare: float | None = None
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -123,6 +132,63 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         )
 
 
+class SceneBody(msgspec.Struct, frozen=True, kw_only=True):
+    """A body as drawn: its frame at the design, and at every frame of the scene.
+
+    Attributes:
+        origin, euler_parameters: at the design, global [m, -].
+        r: origins, global [m], shape (frames, 3); empty where only the design is known, or the body is fixed.
+        p: Euler parameters e0..e3, body -> global [-], shape (frames, 4); empty as r.
+    """
+
+    name: str
+    fixed: bool
+    origin: list[float]
+    euler_parameters: list[float]
+    r: list[list[float]] = []
+    p: list[list[float]] = []
+
+
+class SceneJoint(msgspec.Struct, frozen=True, kw_only=True):
+    """A joint's geometry, global at the design [m].
+
+    Attributes:
+        bodies: names of the first and the second body.
+        points: none, one common to both bodies, or one on each.
+        axes: directions of any length: none, one common to both bodies, or one on each.
+    """
+
+    name: str
+    type: str
+    bodies: list[str]
+    points: list[list[float]] = []
+    axes: list[list[float]] = []
+
+
+class ScenePoint(msgspec.Struct, frozen=True, kw_only=True):
+    """A named point of a body, global at the design [m], and whether an output reads it."""
+
+    name: str
+    body: str
+    position: list[float]
+    output: bool
+
+
+class Scene(msgspec.Struct, frozen=True, kw_only=True):
+    """A case's mechanism to look at. Poses are rounded to what a screen shows, and never compared with anything.
+
+    Attributes:
+        frames: indices of the samples at which there are poses; empty where only the design position is known.
+        message: empty, or why samples have no pose.
+    """
+
+    bodies: list[SceneBody]
+    joints: list[SceneJoint]
+    points: list[ScenePoint]
+    frames: list[int] = []
+    message: str = ""
+
+
 class Results(msgspec.Struct, frozen=True, kw_only=True):
     """A run.
 
@@ -130,12 +196,14 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
         run: its circumstances: versions, machine, settings, and what the cases are.
         records: one per (case, engine) pair.
         references: the true values of each case that has any, by case and output.
+        scenes: the mechanism of each case, by case; a run made without them has none.
     """
 
     schema: Literal["kincheck-results/1"] = "kincheck-results/1"
     run: dict[str, Any]
     records: list[Record]
     references: dict[str, dict[str, OutputSeries]] = {}
+    scenes: dict[str, Scene] = {}
 
 
 def to_json(results: msgspec.Struct) -> bytes:

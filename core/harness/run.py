@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import statistics
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from time import perf_counter
 from typing import Any
@@ -12,36 +12,18 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ..errors import KincheckError
-from ..trajectory import Array, Trajectory
+from .attempt import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
 from .case import Case, Series
-from .circumstances import plain, readable, results, truth_of
-from .compare import as_numbers, describe, deviations, output_series
+from .circumstances import results, truth_of
+from .compare import as_numbers, describe, deviations
 from .engine import Engine
-from .record import Deviations, Outcome, Record, Results, Seconds
+from .record import Deviations, Outcome, OutputSeries, Record, Results, Seconds
 
 NATIVE = "native"
 """Name of the engine that stands in where a case has no reference."""
 
-# Enough solves for a median that one interruption cannot move; slow engines stop after the budget [s].
-WARM_SOLVES = 5
-WARM_BUDGET = 0.5
-
 Progress = Callable[[Record, int, int], None]
 """Told of each record as it is made, how many there are now, and how many there will be."""
-
-
-class BadTrajectoryError(KincheckError):
-    """An engine's answer is not what the engine protocol promises."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Answer:
-    """What an engine made of a case."""
-
-    trajectory: Trajectory
-    outputs: Mapping[str, Series]
-    seconds: Seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +34,14 @@ class _Standard:
     absent: str = ""
 
 
+@dataclass(eq=False)
+class _Judging:
+    """A case being judged: what to compare with, None until the native engine is through, and the pairs that wait for it."""
+
+    standard: _Standard | None
+    waiting: list[tuple[Pair, Attempt]] = field(default_factory=list[tuple[Pair, Attempt]])
+
+
 def run(
     cases: Sequence[Case],
     engines: Sequence[Engine],
@@ -60,33 +50,94 @@ def run(
     progress: Progress | None = None,
     baseline: Engine | None = None,
     command: str = "",
+    solver: Solver = here,
+    made: Sequence[Record] = (),
+    facts: Mapping[str, Any] | None = None,
 ) -> Results:
     """Solve every case with every engine and judge each answer.
 
     An output is judged against the case's reference; what the reference does not have (an output, its velocity or acceleration)
-    is compared with the native engine's, and where that is missing too, with nothing, which the record says.
+    is compared with the native engine's, and where that is missing too, with nothing, which the record says. The records are in
+    the order of cases and engines, the native engine first, whatever the order in which the solver is through with them.
 
     Args:
         tol: largest accepted constraint residual, as for `Engine.solve`.
         baseline: the native engine, to compare with, where it is not among the engines; it gets no records.
         command: the command line, kept with the results.
+        solver: where pairs are solved: in this process, in worker processes, on a cluster.
+        made: records made earlier, by a run of the same cases and engines; their pairs are not solved again.
+        facts: further circumstances, kept with the results; they come before those of now.
     """
     started = datetime.now(UTC)
-    records: list[Record] = []
-    for case in cases:
-        native = _Standard({}, "no reference, and the native engine is not in this run: compared with nothing")
-        if baseline is not None and not _referenced(case):
-            native = _standard(*_attempt(case, baseline, tol, native))
-        for engine in sorted(engines, key=lambda each: each.name != NATIVE):
-            if engine.name == NATIVE:
-                native = _Standard({}, "no reference: compared with nothing")
-            record, answer = _attempt(case, engine, tol, native)
-            if engine.name == NATIVE:
-                native = _standard(record, answer)
-            records.append(record)
+    records = {_key(record): record for record in made}
+    ordered = sorted(engines, key=_native_first)
+    wanted = planned(cases, engines)
+    judging = {case.name: _Judging(_standard_known(case, ordered, baseline, records)) for case in cases}
+    pairs = [Pair(case, engine, tol) for case, engine in _to_solve(cases, ordered, baseline, records, judging)]
+
+    def judge(pair: Pair, attempt: Attempt, standard: _Standard) -> Record:
+        record = _record(pair, attempt, standard)
+        if pair.engine is not baseline:
+            records[_key(record)] = record
             if progress is not None:
-                progress(record, len(records), len(cases) * len(engines))
-    return results(cases, records, started=started, tol=tol, command=command)
+                progress(record, len(records), len(wanted))
+        return record
+
+    with closing(solver(pairs)) as attempts:
+        for index, attempt in attempts:
+            pair, case = pairs[index], judging[pairs[index].case.name]
+            if pair.engine.name == NATIVE:
+                case.standard = _standard(judge(pair, attempt, _Standard({}, "no reference: compared with nothing")))
+                for each in case.waiting:
+                    judge(*each, case.standard)
+            elif case.standard is None:
+                case.waiting.append((pair, attempt))
+            else:
+                judge(pair, attempt, case.standard)
+    return results(cases, [records[key] for key in wanted], started=started, tol=tol, command=command, facts=facts)
+
+
+def planned(cases: Sequence[Case], engines: Sequence[Engine]) -> list[tuple[str, str, str]]:
+    """Case, engine and mode of every pair, in the order of the records."""
+    return [(case.name, engine.name, engine.mode) for case in cases for engine in sorted(engines, key=_native_first)]
+
+
+def _native_first(engine: Engine) -> bool:
+    return engine.name != NATIVE
+
+
+def _key(record: Record) -> tuple[str, str, str]:
+    return record.case, record.engine, record.mode
+
+
+def _to_solve(
+    cases: Sequence[Case],
+    engines: Sequence[Engine],
+    baseline: Engine | None,
+    made: Mapping[tuple[str, str, str], Record],
+    judging: Mapping[str, _Judging],
+) -> Iterator[tuple[Case, Engine]]:
+    """Every pair that has no record, and the baseline where it is to be compared with."""
+    for case in cases:
+        missing = [engine for engine in engines if (case.name, engine.name, engine.mode) not in made]
+        if baseline is not None and missing and judging[case.name].standard is None:
+            yield case, baseline
+        yield from ((case, engine) for engine in missing)
+
+
+def _standard_known(
+    case: Case, engines: Sequence[Engine], baseline: Engine | None, made: Mapping[tuple[str, str, str], Record]
+) -> _Standard | None:
+    """What to compare with, if it is known before anything is solved."""
+    if _referenced(case):
+        return _Standard({})
+    native = next((engine for engine in engines if engine.name == NATIVE), None)
+    if native is not None:
+        record = made.get((case.name, native.name, native.mode))
+        return None if record is None else _standard(record)
+    if baseline is not None:
+        return None
+    return _Standard({}, "no reference, and the native engine is not in this run: compared with nothing")
 
 
 def _referenced(case: Case) -> bool:
@@ -99,100 +150,49 @@ def _referenced(case: Case) -> bool:
     )
 
 
-def _standard(record: Record, answer: _Answer | None) -> _Standard:
-    if answer is None:
-        return _Standard({}, f"no reference, and the native engine has no answer ({record.message}): compared with nothing")
-    return _Standard(answer.outputs)
+def _standard(native: Record) -> _Standard:
+    if not native.outputs:
+        return _Standard({}, f"no reference, and the native engine has no answer ({native.message}): compared with nothing")
+    return _Standard({name: _series(output) for name, output in native.outputs.items()})
 
 
-def _attempt(case: Case, engine: Engine, tol: float, native: _Standard) -> tuple[Record, _Answer | None]:
-    """The record of one pair, and the answer where there is one. Whatever an engine raises becomes a record."""
-    version: str | None = None
-
-    def without(outcome: Outcome, message: str) -> tuple[Record, None]:
-        nothing = Deviations(position=None, velocity=None, acceleration=None, reason=f"{outcome}: {message}")
-        errors = {output.name: nothing for output in case.outputs}
-        return _record(case, engine, version, outcome=outcome, message=message, errors=errors), None
-
-    try:
-        version = engine.version()
-        if version is None:
-            return without(Outcome.UNAVAILABLE, f"{engine.name} is not installed")
-        reason = engine.unsupported(case)
-        if reason is not None:
-            return without(Outcome.UNSUPPORTED, reason)
-        answer = _solve(case, engine, tol)
-        return _judged(case, engine, version, answer, native), answer
-    except Exception as error:  # anything a simulator may raise; KeyboardInterrupt is none of these
-        return without(Outcome.ERROR, readable(f"{type(error).__name__}: {error}"))
+def _series(output: OutputSeries) -> Series:
+    """What `as_numbers` wrote down, without loss: NaN for null."""
+    rates = [None if each is None else np.array(each, dtype=np.float64) for each in (output.velocity, output.acceleration)]
+    return Series(np.array(output.position, dtype=np.float64), *rates)
 
 
-def _solve(case: Case, engine: Engine, tol: float) -> _Answer:
-    """Build once, solve, and solve again for the time. The answer kept is the last: the one that was timed."""
+def _record(pair: Pair, attempt: Attempt, native: _Standard) -> Record:
+    """The record of one pair."""
+    case, engine = pair.case, pair.engine
+    facts = attempt.facts or Facts("unknown")
+    result = attempt.result
+    if isinstance(result, Answer):
+        try:
+            return _judged(case, engine, facts, result, attempt.seconds or Seconds(), native)
+        except Exception as error:  # a reference that does not fit, for one
+            result = Failure(Outcome.ERROR, said(error))
+    nothing = Deviations(position=None, velocity=None, acceleration=None, reason=f"{result.outcome}: {result.message}")
+    return _made(
+        case,
+        engine,
+        facts,
+        outcome=result.outcome,
+        message=result.message,
+        errors={output.name: nothing for output in case.outputs},
+        seconds=attempt.seconds,
+        details={"printed": result.printed} if result.printed else {},
+    )
+
+
+def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: Seconds, native: _Standard) -> Record:
     begin = perf_counter()
-    model = engine.build(case)
-    build = perf_counter() - begin
-
-    def solve() -> tuple[Trajectory, float]:
-        begin = perf_counter()
-        trajectory = engine.solve(model, case, tol)
-        seconds = perf_counter() - begin
-        check(case, engine.name, trajectory)
-        return trajectory, seconds
-
-    _, first = solve()  # may load and compile
-    trajectory, seconds = solve()
-    warm = [seconds]
-    while len(warm) < WARM_SOLVES and sum(warm) + warm[-1] <= WARM_BUDGET:
-        trajectory, seconds = solve()
-        warm.append(seconds)
-    outputs = {output.name: output_series(case, output, trajectory) for output in case.outputs}
-    return _Answer(trajectory, outputs, Seconds(build=build, first=first, warm=statistics.median(warm)))
-
-
-def check(case: Case, engine: str, trajectory: Trajectory) -> None:
-    """Hold an answer to the engine protocol.
-
-    Raises:
-        BadTrajectoryError: a point is missing, a shape is wrong, or a sample that is called solved is not finite.
-    """
-    n = len(case.sweep.values)
-    for name in ("solved", "iterations"):
-        _check_shape(f"{engine}: {name}", getattr(trajectory, name), (n,))
-    solved = np.asarray(trajectory.solved, dtype=np.bool_)
-    if solved.any() and not np.isfinite(trajectory.residual):
-        raise BadTrajectoryError(f"{engine}: residual is {trajectory.residual} although {solved.sum()} samples are called solved")
-    for point in case.points:
-        if point not in trajectory.points:
-            raise BadTrajectoryError(f"{engine}: no motion of point {point!r}; found: {', '.join(trajectory.points) or 'none'}")
-        motion = trajectory.points[point]
-        for quantity in ("position", "velocity", "acceleration"):
-            values: Array | None = getattr(motion, quantity)
-            if values is None and quantity != "position":
-                continue
-            _check_shape(f"{engine}: {quantity} of point {point!r}", values, (n, 3))
-            finite = np.isfinite(np.asarray(values, dtype=np.float64)).all(axis=1)
-            bad = np.flatnonzero(solved & ~finite)
-            if bad.size:
-                raise BadTrajectoryError(
-                    f"{engine}: {quantity} of point {point!r} is {np.asarray(values)[bad[0]].tolist()} at sample {bad[0]} "
-                    f"({case.sweep.driver} = {case.sweep.values[bad[0]]:.9g}), which is called solved; "
-                    f"{bad.size} of {n} samples are so: mark them unsolved and explain, or give finite numbers"
-                )
-
-
-def _check_shape(what: str, values: Any, expected: tuple[int, ...]) -> None:
-    if np.shape(values) != expected:
-        raise BadTrajectoryError(f"{what} has shape {np.shape(values)}, expected {expected}")
-
-
-def _judged(case: Case, engine: Engine, version: str, answer: _Answer, native: _Standard) -> Record:
-    trajectory, values = answer.trajectory, case.sweep.values.tolist()
+    values = case.sweep.values.tolist()
     errors = {output.name: _deviations(case, output.name, answer.outputs[output.name], native) for output in case.outputs}
-    solved, samples = int(trajectory.solved.sum()), len(values)
+    solved, samples = answer.solved, len(values)
     messages: list[str] = []
     if solved < samples:
-        why = trajectory.message or "the engine does not say why; ask it to"
+        why = answer.message or "the engine does not say why; ask it to"
         messages.append(f"{solved} of {samples} samples solved: {why}")
     outside = [
         (deviation.max_abs / deviation.tolerance if deviation.tolerance else np.inf, output, quantity, deviation)
@@ -203,28 +203,29 @@ def _judged(case: Case, engine: Engine, version: str, answer: _Answer, native: _
     if outside:
         _, output, quantity, deviation = max(outside, key=lambda each: each[0])
         more = f" (worst of {len(outside)} quantities out of tolerance)" if len(outside) > 1 else ""
-        messages.append(describe(output, quantity, deviation, case.sweep.driver, values) + more)
+        unit = next(each.unit for each in case.outputs if each.name == output)
+        messages.append(describe(output, quantity, deviation, case.sweep.driver, values, unit) + more)
     outcome = Outcome.FAIL if messages else Outcome.PASS
     if outcome is Outcome.PASS:
         messages += _not_compared(errors)
-    details = plain(trajectory.details)
-    return _record(
+    details = dict(answer.details)
+    return _made(
         case,
         engine,
-        version,
+        facts,
         outcome=outcome,
         message="; ".join(messages),
         driver={name: each.tolist() for name, each in case.sweep.moved.items()},
         outputs={output.name: as_numbers(answer.outputs[output.name], output) for output in case.outputs},
         errors=errors,
-        residual_max=float(trajectory.residual) if solved else None,
+        residual_max=answer.residual if solved else None,
         rank=details.pop("rank", None),
         dof=details.pop("dof", None),
-        iterations=int(np.asarray(trajectory.iterations)[trajectory.solved].sum()) if solved else None,
+        iterations=answer.iterations if solved else None,
         solved=solved,
         samples=samples,
-        seconds=answer.seconds,
-        us_per_step=1e6 * (answer.seconds.warm or 0.0) / samples if solved == samples else None,
+        seconds=msgspec.structs.replace(seconds, compare=perf_counter() - begin),
+        us_per_step=1e6 * (seconds.warm or 0.0) / samples if solved == samples else None,
         details=details,
     )
 
@@ -247,14 +248,14 @@ def _deviations(case: Case, name: str, found: Series, native: _Standard) -> Devi
     return msgspec.structs.replace(result, reason=native.absent)
 
 
-def _record(case: Case, engine: Engine, version: str | None, **result: Any) -> Record:
+def _made(case: Case, engine: Engine, facts: Facts, **result: Any) -> Record:
     return Record(
         case=case.name,
         truth=truth_of(case),
         engine=engine.name,
         mode=engine.mode,
-        loop=engine.loop,
-        version=version,
-        settings=plain(engine.settings),
+        loop=facts.loop,
+        version=facts.version,
+        settings=dict(facts.settings),
         **result,
     )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
+from collections.abc import Sequence
 from contextlib import nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,10 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..console import complain, lacking, progress
+from . import foreign, isolation
 from .house import House, Status
 
 if TYPE_CHECKING:
+    from ..case import Case
     from ..engine import Engine
+    from ..history.keeping import Keeping
     from ..record import Record
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized coordinates, and a thousandth of
@@ -23,6 +28,9 @@ if TYPE_CHECKING:
 TOL = 1e-12
 
 MODES = ("projection", "simulate")
+
+HISTORY = "KINCHECK_HISTORY"
+"""Environment variable: the history file where --history is not given."""
 
 
 def add(commands: Any) -> None:
@@ -33,7 +41,7 @@ def add(commands: Any) -> None:
     run.add_argument("case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases")
     run.add_argument("--joints", action="store_true", help="run a small closed loop around every joint type, and the cases named")
     run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: all engines")
-    run.add_argument("--mode", choices=MODES, help="only engines of this mode")
+    run.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
     run.add_argument(
         "--tol", type=positive, default=TOL, metavar="X", help=f"largest constraint residual [m or -]; default {TOL:g}"
     )
@@ -41,6 +49,15 @@ def add(commands: Any) -> None:
     run.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
     run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     run.add_argument("--markdown", type=Path, metavar="FILE", help="write the table of cases and engines as Markdown")
+    run.add_argument(
+        "--reference",
+        nargs="+",
+        action="extend",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="judge cases by these proved references, which kincheck reference wrote, instead of their own",
+    )
     run.add_argument("--explain", action="store_true", help="print what the native engine computes for each case, and leaves out")
     run.add_argument(
         "--require",
@@ -49,6 +66,20 @@ def add(commands: Any) -> None:
         default=[],
         metavar="NAME",
         help="engines that must be there and able (else status 2)",
+    )
+    foreign.add_options(run)
+    isolation.add_options(run, positive)
+    run.add_argument(
+        "--history",
+        type=Path,
+        metavar="FILE",
+        default=os.environ.get(HISTORY) or None,
+        help=f"keep the run in this file, each record as it is made; default: the environment variable {HISTORY}, else not at all",
+    )
+    run.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on with the last run in the history of the same cases, engines, tolerance, limits and versions that has no end",
     )
 
 
@@ -59,7 +90,7 @@ def positive(text: str) -> float:
     except ValueError:
         tol = math.nan
     if not (math.isfinite(tol) and tol > 0):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number; give a residual such as {TOL:g}")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number; give one such as 1, 0.5 or 1e-12")
     return tol
 
 
@@ -68,32 +99,53 @@ def _run(options: argparse.Namespace, house: House) -> int:
     from .. import run as running
     from ..probe import probes
     from ..reporting import deliver as delivery
+    from ..workers.distributed import ClusterError
 
-    problems: list[str] = []
+    problems: list[str] = isolation.contradictions(options)
+    if options.resume and options.history is None:
+        problems.append(f"--resume needs a history: give --history FILE, or set {HISTORY}")
     _return_cases(options, house)
+    foreign.return_cases(options)
     named: list[str] = options.case or ([] if options.joints else [*house.cases()])
-    cases = house.find_cases(named, problems, found=list(probes()) if options.joints else [])
+    cases = house.find_cases(named, problems, list(probes()) if options.joints else [], foreign.supplied(options))
+    foreign.tell_left_out(cases)
+    if options.reference and not problems:
+        from ..references import judged_by
+
+        cases = judged_by(cases, options.reference)
     engines, baseline = _engines(options, house, problems)
     files: dict[str, Any] = {"out": options.out, "json": options.json, "junit": options.junit, "markdown": options.markdown}
     delivery.check_destinations(problems, **files)
     if problems:  # all of them, and before anything is computed
         raise KincheckError("\n".join(problems))
 
-    records: list[Record] = []
+    solver, settings = isolation.solver(options, engines)
+    keeping = _keeping(options, cases, engines, settings)
+    made = [*keeping.made] if keeping else []
+    records: list[Record] = [*made]
+    tell = progress(records)
+
+    def keep(record: Record, done: int, total: int) -> None:
+        if keeping:
+            keeping.add(record)
+        tell(record, done, total)
+
+    common: dict[str, Any] = {"tol": options.tol, "command": options.command, "facts": keeping.facts if keeping else settings}
     started = datetime.now(UTC)
+    stopped = False
     with delivery.json_only() if options.json == "-" else nullcontext():
         try:
-            results = running.run(
-                cases,
-                engines,
-                tol=options.tol,
-                progress=progress(records),
-                baseline=baseline,
-                command=options.command,
-            )
-        except KeyboardInterrupt:
-            problems.append(f"interrupted: {len(records)} of {len(cases) * len(engines)} records were made and are kept")
-            results = running.results(cases, records, started=started, tol=options.tol, command=options.command)
+            results = running.run(cases, engines, progress=keep, baseline=baseline, solver=solver, made=made, **common)
+        except (KeyboardInterrupt, ClusterError) as reason:
+            plan = running.planned(cases, engines)
+            how = str(reason) or "interrupted"
+            problems.append(f"{how}: {len(records)} of {len(plan)} records were made and are kept")
+            stopped = True
+            records.sort(key=lambda each: plan.index((each.case, each.engine, each.mode)))
+            results = running.results(cases, records, started=started, **common)
+    if keeping:
+        keeping.end(results, interrupted=stopped)
+        problems += keeping.problems
     delivery.deliver(results, problems, matrix=options.joints, **files)
     if options.explain:
         from ..explain import explain
@@ -106,10 +158,34 @@ def _run(options: argparse.Namespace, house: House) -> int:
     return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
 
 
+def _keeping(
+    options: argparse.Namespace, cases: Sequence[Case], engines: Sequence[Engine], settings: dict[str, Any]
+) -> Keeping | None:
+    """The run in its history, where there is one."""
+    if options.history is None:
+        return None
+    from ..history.keeping import keep
+
+    about: dict[str, Any] = {"tol": options.tol, "command": options.command, "settings": settings}
+    keeping = keep(Path(options.history), cases, engines, resume=options.resume, **about)
+    if options.resume:
+        print(
+            f"kincheck: run {keeping.run} goes on, {len(keeping.made)} records are there"
+            if keeping.resumed
+            else f"kincheck: no run of the same kind without an end: run {keeping.run} is new",
+            file=sys.stderr,
+        )
+    return keeping
+
+
 def _return_cases(options: argparse.Namespace, house: House) -> None:
     """Give back the cases that an option taking several names has swallowed: `run --engine native my_case.toml`."""
     for names in (options.engine, options.require):
-        swallowed = [name for name in names if name not in house.engines and (name in house.cases() or Path(name).suffix)]
+        swallowed = [
+            name
+            for name in names
+            if name not in (*house.engines, *house.simulations) and (name in house.cases() or Path(name).suffix)
+        ]
         options.case += swallowed
         names[:] = [name for name in names if name not in swallowed]
 
@@ -119,15 +195,8 @@ def _engines(options: argparse.Namespace, house: House, problems: list[str]) -> 
     from ..run import NATIVE
 
     named = [*options.engine, *options.require]
-    engines = house.find_engines(named if options.engine else [*house.engines, *options.require], problems)
-    if options.mode:
-        others = {each.name: each.mode for each in engines if each.mode != options.mode}
-        engines = [each for each in engines if each.name not in others]
-        problems += [
-            f"engine {name!r} has the mode {mode!r}, not {options.mode!r}: leave out --mode or the engine"
-            for name, mode in others.items()
-            if name in named
-        ]
-        if not engines and not problems:
-            problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
+    every = house.simulations if options.mode == "simulate" else house.engines
+    engines = house.find_engines(named if options.engine else [*every, *options.require], problems, options.mode)
+    if not engines and not problems:
+        problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
     return engines, None if NATIVE in (each.name for each in engines) else house.engine(NATIVE)

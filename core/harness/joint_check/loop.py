@@ -10,12 +10,13 @@ import numpy as np
 from ...analysis.solve import solve
 from ...joints import Joint
 from ...trajectory import Array, Trajectory
+from ..attempt import check
 from ..case import Case, Series
 from ..compare import describe, deviations, output_series
 from ..engine import Engine
 from ..probe import probe
 from ..record import Deviation
-from ..run import NATIVE, check
+from ..run import NATIVE
 from .checks import ROUND_OFF
 from .findings import Finding, Verdict, judged
 

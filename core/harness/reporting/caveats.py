@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 from ..case import Truth
 from ..record import Outcome, Record, Results
-from .figures import SAMPLES, engine_name
+from .axis import SAMPLES
+from .wording import engine_name
 
 COMPARED = (Outcome.PASS, Outcome.FAIL)
 

@@ -47,7 +47,8 @@ def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, 
         return "skipped", f"{record.outcome}: {record.message}"
     if record.outcome is Outcome.FAIL:
         (driver, values), *_ = record.driver.items()
-        off = [describe(output, quantity, each, driver, values) for quantity, each in deviations.items() if not each.within]
+        unit = record.outputs[output].unit
+        off = [describe(output, quantity, each, driver, values, unit) for quantity, each in deviations.items() if not each.within]
         # samples that are missing are missing from every output
         missing = [record.message] if record.solved != record.samples and not off else []
         return ("failure", "; ".join(off + missing)) if off or missing else ("", "")

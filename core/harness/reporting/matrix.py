@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..record import Outcome, Record, Results
-from .table import COLOURS, LOG_WIDTH, QUANTITIES, messages, print_messages, worst
+from .table import COLOURS, LOG_WIDTH, QUANTITIES, messages, print_messages, signs, worst
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
@@ -36,6 +36,7 @@ def to_markdown(results: Results) -> str:
     lines = [_row(head), _row(["---"] * len(head))]
     lines += [_row([f"`{case}`", *(cell(records[engine]) for engine in engines)]) for case, records in rows.items()]
     lines += ["", f"{_reading(results)}."]
+    lines += [f"Signs of {', '.join(cases)}: {words}." for words, cases in signs(results).items()]
     lines += [
         f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}."
         for (engine, outcome, message), cases in messages(results).items()
@@ -49,7 +50,7 @@ def cell(record: Record) -> str:
     errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
     if errors:
         verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome}: "
-        return verdict + " · ".join(f"{each.max_abs:.0e}" for each in errors)
+        return verdict + " · ".join(f"{error.max_abs:.0e} {unit}".rstrip() for error, unit in errors)
     if record.outcome is Outcome.PASS and record.residual_max is not None:
         return f"residual {record.residual_max:.0e}"
     return str(record.outcome)

@@ -12,7 +12,8 @@ from rich.text import Text
 from ..record import Deviation, Outcome, Record, Results
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
-QUANTITIES = {"position": "m", "velocity": "m/s", "acceleration": "m/s²"}
+LENGTH = "m"
+QUANTITIES = {"position": LENGTH, "velocity": "m/s", "acceleration": "m/s²"}
 # Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
 LOG_WIDTH = 200
 
@@ -40,7 +41,9 @@ def print_table(results: Results, file: TextIO) -> None:
 
 
 def print_messages(results: Results, console: Console) -> None:
-    """Print every message, then a count of outcomes."""
+    """Print the signs of outputs that have a convention, every message, and a count of outcomes."""
+    for words, cases in signs(results).items():
+        console.print(Text(f"signs of {', '.join(cases)}: {words}"), soft_wrap=True)
     for (engine, outcome, message), cases in messages(results).items():
         console.print(Text(f"{outcome}: {', '.join(cases)} · {engine}: {message}"), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
@@ -54,13 +57,31 @@ def truth(record: Record) -> str:
 
 def _error(record: Record, quantity: str) -> Text:
     found = worst(record, quantity)
-    return Text("–") if found is None else Text(f"{found.max_abs:.1e}", style="" if found.within else "bold red")
+    if found is None:
+        return Text("–")
+    error, unit = found
+    return Text(f"{error.max_abs:.1e} {unit}".rstrip(), style="" if error.within else "bold red")
 
 
-def worst(record: Record, quantity: str) -> Deviation | None:
-    """The largest error of a quantity over the outputs, those out of tolerance first; None where nothing was compared."""
-    found = [each for errors in record.errors.values() for name, each in errors.items() if name == quantity]
-    return max(found, key=lambda each: (not each.within, each.max_abs), default=None)
+def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
+    """The largest error of a quantity over the outputs, and its output's unit, empty for the metre of the heads.
+
+    Out of tolerance comes first, then lengths: errors in different units are not to be compared. None where nothing was compared.
+    """
+    found: list[tuple[Deviation, str]] = []
+    for output, errors in record.errors.items():
+        unit = record.outputs[output].unit if output in record.outputs else LENGTH
+        found += [(each, "" if unit == LENGTH else f"[{unit}]") for name, each in errors.items() if name == quantity]
+    return max(found, key=lambda each: (not each[0].within, not each[1], each[0].max_abs), default=None)
+
+
+def signs(results: Results) -> dict[str, list[str]]:
+    """The conventions of signs that outputs have, in words, and the cases that they are of."""
+    said: dict[str, list[str]] = {}
+    for case, facts in results.run.get("cases", {}).items():
+        if words := facts.get("signs"):
+            said.setdefault(words, []).append(case)
+    return said
 
 
 def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:

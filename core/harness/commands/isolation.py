@@ -1,0 +1,74 @@
+"""Options of isolation: where pairs are solved, how many at a time, and what each may take."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..workers.limits import MEMORY, TIMEOUT, Limits, default_jobs
+
+if TYPE_CHECKING:
+    from ..attempt import Solver
+    from ..engine import Engine
+
+
+def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float]) -> None:
+    """Add the options to a command that solves pairs."""
+    group = parser.add_argument_group("isolation", "A pair of case and engine is solved in a worker process of its engine.")
+    group.add_argument(
+        "--jobs",
+        type=_count,
+        metavar="N",
+        help="worker processes at a time; default: half the processors; 0 solves in this process, without limits, which is the "
+        "default where only the native engine takes part and no limit is given",
+    )
+    group.add_argument(
+        "--timeout",
+        type=positive,
+        metavar="SECONDS",
+        help=f"of a pair, from its start; default {TIMEOUT:g}: no answer takes so long",
+    )
+    group.add_argument(
+        "--memory", type=positive, metavar="GB", help=f"of a worker process, on Linux; default {MEMORY:g}: ten times what any takes"
+    )
+    group.add_argument("--scheduler", metavar="ADDRESS", help="solve on the workers of this dask.distributed scheduler instead")
+
+
+def _count(text: str) -> int:
+    try:
+        count = int(text)
+    except ValueError:
+        count = -1
+    if count < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes; give 0, 1, 2, ...")
+    return count
+
+
+def contradictions(options: argparse.Namespace) -> list[str]:
+    """What is wrong with the options together."""
+    problems: list[str] = []
+    if options.scheduler is not None and options.jobs is not None:
+        problems.append("--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs")
+    if options.jobs == 0 and (options.timeout or options.memory):
+        problems.append("--jobs 0 solves in this process, which cannot be limited; leave out --timeout and --memory, or --jobs")
+    return problems
+
+
+def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
+    """Where the pairs are solved, and what the results say of it."""
+    from ..attempt import here
+    from ..run import NATIVE
+    from ..workers.distributed import on_cluster
+    from ..workers.pool import in_workers
+
+    limits = Limits(options.timeout or TIMEOUT, options.memory or MEMORY)
+    limited = {"timeout": limits.timeout, "memory_gb": limits.memory}
+    if options.scheduler is not None:
+        return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
+    jobs: int | None = options.jobs
+    if jobs is None:
+        # a process would cost the native engine more time than most cases do, and it has no foreign code to be kept apart
+        ours = all(engine.name == NATIVE for engine in engines) and not (options.timeout or options.memory)
+        jobs = 0 if ours else default_jobs()
+    return (in_workers(jobs, limits), {"jobs": jobs, **limited}) if jobs else (here, {"jobs": 0})

@@ -1,0 +1,92 @@
+"""A run being written down while it goes on, and taken up again where it ended by force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from ..case import Case
+from ..circumstances import calibration, circumstances, git_state, plain
+from ..engine import Engine
+from ..record import Record, Results
+from ..run import planned
+from .identity import digest
+from .store import HistoryError, Store
+
+
+@dataclass
+class Keeping:
+    """A run in a history.
+
+    Attributes:
+        run: its number.
+        resumed: it began earlier, and was taken up again.
+        made: its records of then.
+        facts: its circumstances, for `run`.
+        problems: what the history could not do; from then on the run goes on without it.
+    """
+
+    store: Store
+    run: int
+    facts: Mapping[str, Any]
+    resumed: bool = False
+    made: Sequence[Record] = ()
+    problems: list[str] = field(default_factory=list[str])
+
+    def add(self, record: Record) -> None:
+        """Keep a record."""
+        if self.problems:
+            return
+        try:
+            self.store.add_record(self.run, record)
+        except HistoryError as error:
+            self.problems.append(f"{error}; the records before {record.case} {record.engine} are kept there as run {self.run}")
+
+    def end(self, results: Results, *, interrupted: bool) -> None:
+        """The run has ended: with all its records, or by an interrupt."""
+        if not self.problems:
+            try:
+                self.store.finish(self.run, results, "interrupted" if interrupted else "finished")
+            except HistoryError as error:
+                self.problems.append(f"{error}; all records are kept there, but run {self.run} has no end; --resume gives it one")
+        self.store.close()
+
+
+def keep(
+    path: Path,
+    cases: Sequence[Case],
+    engines: Sequence[Engine],
+    *,
+    tol: float,
+    command: str,
+    settings: Mapping[str, Any],
+    resume: bool,
+) -> Keeping:
+    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits and versions.
+
+    Args:
+        settings: further circumstances.
+        resume: take up one that has no end; where there is none, a new one begins.
+
+    Raises:
+        HistoryError: the file cannot be read or written.
+    """
+    started = datetime.now(UTC)
+    known = circumstances(cases, started=started, tol=tol, command=command)
+    plan = planned(cases, engines)
+    limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
+    identity = digest(cases, plan, tol, limits, [known[name] for name in ("kincheck", "python", "numpy")])
+    store = Store(path)
+    try:
+        earlier = store.resume_run(identity) if resume else None
+        if earlier is not None:
+            return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
+        facts = known | plain({**settings, "git": git_state(Path.cwd()), "calibration_seconds": calibration()})
+        run = store.begin_run(identity, plan, facts)
+    except BaseException:
+        store.close()
+        raise
+    return Keeping(store, run, facts)

@@ -1,0 +1,111 @@
+"""The tables of a history, and how files of earlier versions come to have them.
+
+`runs`: a row a run. `records`: a row a (case, engine, mode) of a run; the columns are what trends and tables read, the whole record
+is in `record`. `documents`: what belongs to a run's case besides, references above all, each text once however many runs have it.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+
+APPLICATION = 0x6B696E63
+"""The application_id of these files ("kinc"): another program's database is refused, not added to."""
+
+MIGRATIONS = (
+    """
+    CREATE TABLE runs (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        started TEXT NOT NULL,         -- ISO 8601, UTC
+        finished TEXT,                 -- null: running, or ended by force
+        status TEXT NOT NULL CHECK (status IN ('running', 'finished', 'interrupted')),
+        command TEXT NOT NULL,
+        identity TEXT NOT NULL,        -- equal for runs of the same cases, engines, tolerance, limits and versions
+        owner TEXT NOT NULL,           -- the process that writes it
+        plan TEXT NOT NULL,            -- JSON: [[case, engine, mode], ...], the pairs in their order
+        circumstances TEXT NOT NULL    -- JSON: as Results.run
+    );
+    CREATE TABLE records (
+        run_id INTEGER NOT NULL REFERENCES runs (id),
+        case_name TEXT NOT NULL,
+        engine TEXT NOT NULL,
+        mode TEXT NOT NULL,
+        made TEXT NOT NULL,            -- ISO 8601, UTC
+        outcome TEXT NOT NULL,
+        message TEXT NOT NULL,
+        validated INTEGER NOT NULL,
+        truth TEXT NOT NULL,
+        version TEXT,                  -- of the engine
+        solved INTEGER,
+        samples INTEGER,
+        residual_max REAL,
+        build_seconds REAL,            -- phases that were not reached are null
+        first_seconds REAL,
+        warm_seconds REAL,
+        compare_seconds REAL,
+        us_per_step REAL,
+        errors TEXT NOT NULL,          -- JSON: as Record.errors
+        record BLOB NOT NULL,          -- the whole record: zlib, JSON
+        PRIMARY KEY (run_id, case_name, engine, mode)
+    );
+    CREATE INDEX records_of_a_pair ON records (case_name, engine, mode, run_id);
+    CREATE TABLE documents (
+        digest TEXT PRIMARY KEY,       -- SHA-256 of the text
+        content BLOB NOT NULL          -- zlib, JSON
+    );
+    CREATE TABLE attachments (
+        run_id INTEGER NOT NULL REFERENCES runs (id),
+        kind TEXT NOT NULL,            -- the key of Results: references, scenes
+        case_name TEXT NOT NULL,
+        digest TEXT NOT NULL REFERENCES documents (digest),
+        PRIMARY KEY (run_id, kind, case_name)
+    );
+    """,
+)
+"""One text for each version of the schema, which brings the tables from the one before it. A text that was published stays."""
+
+
+def migrate(connection: sqlite3.Connection) -> None:
+    """Bring the tables up to date, all or nothing. Others who do the same wait.
+
+    Raises:
+        ValueError: another program's file, or one that a later version has made.
+    """
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        version = check(connection)
+        for number, text in enumerate(MIGRATIONS[version:], version + 1):
+            # not executescript, which would commit what is before it
+            for statement in _statements(text):
+                connection.execute(statement)
+            connection.execute(f"PRAGMA user_version = {number}")
+        connection.execute(f"PRAGMA application_id = {APPLICATION}")
+    except BaseException:
+        connection.execute("ROLLBACK")
+        raise
+    connection.execute("COMMIT")
+
+
+def check(connection: sqlite3.Connection) -> int:
+    """The version of a file's tables, 0 where it is empty.
+
+    Raises:
+        ValueError: another program's file, or one that a later version has made.
+    """
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    if application != APPLICATION and (tables or version or application):
+        raise ValueError("a database of another program; give another file")
+    if version > len(MIGRATIONS):
+        raise ValueError(f"its schema is version {version}, this kincheck knows {len(MIGRATIONS)}; update kincheck")
+    return version
+
+
+def _statements(text: str) -> Iterator[str]:
+    begun = ""
+    for part in text.split(";")[:-1]:  # a semicolon may be in a string or a comment: then the statement goes on
+        begun += f"{part};"
+        if sqlite3.complete_statement(begun):
+            yield begun
+            begun = ""

@@ -1,0 +1,270 @@
+"""The store: a history file, read and written.
+
+    with Store(path) as store:                      # Store(path, writable=False) to read only
+        run = store.begin_run(...)                  # its number
+        store.add_record(run, record)               # on the disk when this returns
+        store.finish(run, results)
+        for each in store.runs(): ...               # RunRow, the latest first
+        results = store.results(run)                # as `kincheck run --json` writes them
+
+Everything else is SQL on `store.connection`: the tables are described in `schema`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+import zlib
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, Self, TypeAlias
+
+import msgspec
+
+from ...errors import KincheckError
+from ..circumstances import versions
+from ..record import Record, Results
+from .owner import alive, owner
+from .schema import MIGRATIONS, check, migrate
+
+Status: TypeAlias = Literal["running", "finished", "interrupted"]
+Plan: TypeAlias = Sequence[tuple[str, str, str]]
+
+# For another run to let go of the file [s]: it holds it for a millisecond a record. Longer, and something is wrong with it.
+BUSY = 30.0
+
+# Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB as JSON).
+QUICK = 1
+
+
+class HistoryError(KincheckError):
+    """A history file cannot be read or written; the message names it and says what to do."""
+
+
+@dataclass(frozen=True)
+class RunRow:
+    """A run as the history has it; see the table `runs`."""
+
+    id: int
+    started: str
+    finished: str | None
+    status: Status
+    command: str
+    plan: Plan
+    circumstances: dict[str, Any]
+
+
+class Store:
+    """A history file.
+
+    Raises:
+        HistoryError: from every method, where the file cannot be read or written.
+    """
+
+    def __init__(self, path: Path, *, writable: bool = True) -> None:
+        self.path = path
+        with self._explained("opened"):
+            self.connection = self._writable() if writable else self._readable()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        with suppress(sqlite3.Error):  # what was committed is on the disk; tidying up can fail on a full one
+            self.connection.close()
+
+    def begin_run(self, identity: str, plan: Plan, circumstances: dict[str, Any]) -> int:
+        """A new run; its number.
+
+        Args:
+            identity: by which it is found to be resumed: equal for runs that give the same records.
+            plan: case, engine and mode of its pairs, in the order of the results.
+            circumstances: as `Results.run`; among them when it started, and the command.
+        """
+        started, command = circumstances["started"], circumstances["command"]
+        row = (started, "running", command, identity, owner(), _json(plan), _json(circumstances))
+        with self._transaction():
+            done = self.connection.execute(
+                "INSERT INTO runs (started, status, command, identity, owner, plan, circumstances) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                row,
+            )
+        assert done.lastrowid is not None
+        return done.lastrowid
+
+    def resume_run(self, identity: str) -> RunRow | None:
+        """The last run of that identity, if it has no end and no other process is at it. It is this process's from now on."""
+        with self._transaction():
+            query = "SELECT id, owner FROM runs WHERE identity = ? AND status != 'finished' ORDER BY id DESC"
+            for run, other in self.connection.execute(query, (identity,)).fetchall():
+                if other == owner() or not alive(other):
+                    change = "UPDATE runs SET status = 'running', finished = NULL, owner = ? WHERE id = ?"
+                    self.connection.execute(change, (owner(), run))
+                    return self.run(run)
+        return None
+
+    def add_record(self, run: int, record: Record) -> None:
+        """Keep a record. A pair that has one keeps that: it is never there twice."""
+        seconds = record.seconds
+        row: dict[str, Any] = {
+            "run_id": run,
+            "case_name": record.case,
+            "engine": record.engine,
+            "mode": record.mode,
+            "made": now(),
+            "outcome": str(record.outcome),
+            "message": record.message,
+            "validated": record.validated,
+            "truth": str(record.truth),
+            "version": record.version,
+            "solved": record.solved,
+            "samples": record.samples,
+            "residual_max": record.residual_max,
+            "build_seconds": seconds and seconds.build,
+            "first_seconds": seconds and seconds.first,
+            "warm_seconds": seconds and seconds.warm,
+            "compare_seconds": seconds and seconds.compare,
+            "us_per_step": record.us_per_step,
+            "errors": _json(record.errors),
+            "record": zlib.compress(msgspec.json.encode(record), QUICK),
+        }
+        names = ", ".join(row)
+        with self._transaction():
+            places = ", ".join("?" * len(row))
+            self.connection.execute(f"INSERT OR IGNORE INTO records ({names}) VALUES ({places})", [*row.values()])
+
+    def finish(self, run: int, results: Results | None = None, status: Status = "finished") -> None:
+        """The run has ended. What the results have besides records, references above all, is kept with it."""
+        with self._transaction():
+            if results is not None:
+                self._attach(run, results)
+            self.connection.execute("UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run))
+
+    def runs(self) -> list[RunRow]:
+        """All runs, the latest first."""
+        with self._explained("read"):
+            return [self.run(number) for (number,) in self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()]
+
+    def run(self, run: int) -> RunRow:
+        """The run of that number.
+
+        Raises:
+            HistoryError: there is none.
+        """
+        with self._explained("read"):
+            query = "SELECT id, started, finished, status, command, plan, circumstances FROM runs WHERE id = ?"
+            row = self.connection.execute(query, (run,)).fetchone()
+        if row is None:
+            raise HistoryError(f"history {self.path}: there is no run {run}")
+        plan = msgspec.json.decode(row[5], type=list[tuple[str, str, str]])
+        return RunRow(*row[:5], plan=plan, circumstances=msgspec.json.decode(row[6]))
+
+    def records(self, run: int) -> list[Record]:
+        """The records of a run, in the order of its plan."""
+        place = {pair: k for k, pair in enumerate(self.run(run).plan)}
+        with self._explained("read"):
+            rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
+            records = [msgspec.json.decode(zlib.decompress(blob), type=Record) for (blob,) in rows]
+        return sorted(records, key=lambda each: place[each.case, each.engine, each.mode])
+
+    def results(self, run: int) -> Results:
+        """A run as the command wrote it; of one without an end, what there is."""
+        records = self.records(run)
+        attached: dict[str, dict[str, Any]] = {}
+        with self._explained("read"):
+            query = "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest) WHERE run_id = ?"
+            for kind, case, content in self.connection.execute(query, (run,)):
+                attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
+        facts = self.run(run).circumstances | {"engines": versions(records)}
+        whole: dict[str, Any] = {"run": facts, "records": [], **attached}
+        return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
+
+    def _attach(self, run: int, results: Results) -> None:
+        for kind in (name for name in results.__struct_fields__ if name not in ("schema", "run", "records")):
+            for case, document in getattr(results, kind).items():
+                text = msgspec.json.encode(document)
+                digest = hashlib.sha256(text).hexdigest()
+                self.connection.execute("INSERT OR IGNORE INTO documents VALUES (?, ?)", (digest, zlib.compress(text)))
+                self.connection.execute("INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest))
+
+    def _writable(self) -> sqlite3.Connection:
+        connection = sqlite3.connect(self.path, timeout=BUSY, isolation_level=None)
+        try:
+            check(connection)  # before anything is changed in a file that may not be ours
+            connection.execute("PRAGMA journal_mode = WAL")  # readers and a writer do not wait for each other
+            connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power cut too
+            connection.execute("PRAGMA foreign_keys = ON")
+            migrate(connection)
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _readable(self) -> sqlite3.Connection:
+        if not self.path.is_file():
+            raise HistoryError(f"history {self.path}: there is no such file; `kincheck run --history FILE` makes one")
+        # a file in a place where nothing can be written has no journal beside it: then nobody else is writing it either
+        for how in ("mode=ro", "mode=ro&immutable=1"):
+            connection = sqlite3.connect(f"{self.path.absolute().as_uri()}?{how}", uri=True, timeout=BUSY, isolation_level=None)
+            try:
+                version = check(connection)
+            except sqlite3.OperationalError:
+                connection.close()
+                if how != "mode=ro":
+                    raise
+                continue
+            except BaseException:
+                connection.close()
+                raise
+            if version < len(MIGRATIONS):
+                connection.close()
+                return self._writable()
+            return connection
+        raise AssertionError("the second way either connects or raises")
+
+    @contextmanager
+    def _transaction(self) -> Generator[None]:
+        with self._explained("written"):
+            self.connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self.connection.execute("COMMIT")
+            except BaseException:
+                if self.connection.in_transaction:  # SQLite has ended it itself after some failures
+                    self.connection.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def _explained(self, what: str) -> Generator[None]:
+        try:
+            yield
+        except (sqlite3.Error, OSError, ValueError, zlib.error, msgspec.MsgspecError) as error:
+            advice = "" if isinstance(error, ValueError) and not isinstance(error, msgspec.MsgspecError) else _advice(str(error))
+            raise HistoryError(f"history {self.path}: cannot be {what}: {error}{advice}") from error
+
+
+def _advice(message: str) -> str:
+    known = {
+        "full": "make room",
+        "disk I/O": "look at the disk: it may be full, or over a limit on the size of files",
+        "readonly": "give a file that can be written",
+        "unable to open": "give a file in a folder that exists and can be written",
+        "locked": f"another process holds it for longer than {BUSY:g} s; end that one",
+        "not a database": "give another file",
+    }
+    return "; " + next((advice for part, advice in known.items() if part in message), "it may be damaged: restore a copy of it")
+
+
+def _json(value: Any) -> str:
+    return msgspec.json.encode(value).decode()
+
+
+def now() -> str:
+    """The time as the history has it."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

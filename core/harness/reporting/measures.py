@@ -1,0 +1,103 @@
+"""Figures of what a single run cannot tell: errors and times over earlier runs, and error against time at several efforts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .figures import Figure, Style, log_axis, plain
+
+TIMES: Figure = {"type": "log", "title": {"text": "time per sample [µs]"}, "exponentformat": "power", "hoverformat": ".3~g"}
+
+
+@dataclass(frozen=True)
+class Past:
+    """What one engine made of a case in one run.
+
+    Attributes:
+        run: what the run is called on the axis, its date for one; runs are in the order given, oldest first.
+        engine: as the report names it; one that is not in the report's own run is drawn in a style of its own.
+        max_error: largest position error over all outputs [m]; None where nothing was compared.
+        us_per_step: warm time of a sample [us]; None where not all samples were reached.
+    """
+
+    run: str
+    engine: str
+    max_error: float | None
+    us_per_step: float | None
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What one engine reached at one effort setting.
+
+    Attributes:
+        setting: in words, "tol 1e-6" for one.
+        error: largest position error over all outputs [m].
+        us_per_sample: warm time of a sample [us].
+    """
+
+    engine: str
+    setting: str
+    error: float
+    us_per_sample: float
+
+
+def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[str, Figure]:
+    """Error and time of each engine over the runs, on log axes.
+
+    An error of zero has no place on the axis: the page draws it on a labelled floor, as in the error figures.
+    """
+    runs = list(dict.fromkeys(each.run for each in history))
+    drawn = _styles((each.engine for each in history), styles)
+
+    def figure(values: Mapping[tuple[str, str], float | None]) -> Figure:
+        # a category each: a date would otherwise become a place on a calendar, and runs of one night one point
+        names = [plain(run) for run in runs]
+        curves = [_curve(style, names, [values.get((style.name, run)) for run in runs]) for style in drawn]
+        return {"data": curves, "layout": {"xaxis": {"type": "category", "zeroline": False, "nticks": 6}, "hovermode": "x unified"}}
+
+    errors = figure({(each.engine, each.run): _finite(each.max_error) for each in history})
+    times = figure({(each.engine, each.run): _finite(each.us_per_step) for each in history})
+    times["layout"]["yaxis"] = TIMES
+    return {"error": _floored(errors), "time": times}
+
+
+def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> Figure:
+    """Work-precision diagram: error against time of each engine, a point for each setting, joined in the order of time."""
+    traces: list[Figure] = []
+    for style in _styles((each.engine for each in efforts), styles):
+        mine = sorted((each for each in efforts if each.engine == style.name), key=lambda each: each.us_per_sample)
+        curve = _curve(style, [_finite(each.us_per_sample) for each in mine], [_finite(each.error) for each in mine])
+        told = {"text": [plain(each.setting) for each in mine], "hovertemplate": "%{text}: %{x:.3~g} µs, %{customdata:.3~g} m"}
+        traces.append(curve | told)
+    return _floored({"data": traces, "layout": {"xaxis": TIMES, "hovermode": "closest"}})
+
+
+def _curve(style: Style, x: Sequence[Any], y: Sequence[float | None]) -> Figure:
+    line = {"width": 1.8, "color": style.colour, "dash": style.dash}
+    marker = {"size": 8, "symbol": style.symbol, "color": style.colour}
+    look = {"name": plain(style.name), "uid": style.key, "meta": style.name, "line": line, "marker": marker}
+    return {"type": "scatter", "mode": "lines+markers", "x": x, "y": y, **look}
+
+
+def _floored(figure: Figure) -> Figure:
+    """The figure with an axis for errors upwards."""
+    positive = [value for trace in figure["data"] for value in trace["y"] if value]
+    side, floor = log_axis("largest position error [m]", min(positive, default=1.0), max(positive, default=1.0))
+    return {"data": figure["data"], "layout": {**figure["layout"], "yaxis": side, "meta": {"floor": floor}}}
+
+
+def _styles(engines: Iterable[str], styles: Mapping[str, Style]) -> list[Style]:
+    """A style for each engine: the page's, or one after those for an engine the page's run did not have."""
+    drawn: list[Style] = []
+    for name in dict.fromkeys(engines):
+        further = sum(style.name not in styles for style in drawn)
+        drawn.append(styles[name] if name in styles else Style.number(len(styles) + further, name))
+    return drawn
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

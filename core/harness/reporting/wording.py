@@ -1,0 +1,61 @@
+"""Numbers, units and kinds of truth in the words of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+from ..case import Truth
+from ..record import Deviation, Record
+
+MOTIONS = ("position", "velocity", "acceleration")
+TRUTHS = {
+    Truth.CLOSED_FORM: "closed form",
+    Truth.THIRD_PARTY_DATA: "third-party data",
+    Truth.IN_HOUSE_ORACLE: "in-house oracle",
+    Truth.CONSENSUS_ONLY: "consensus only",
+}
+
+_LABELS = {"half_track_change": "half-track change", "wheelbase_change": "wheel-base change"}
+
+
+def engine_name(record: Record) -> str:
+    """The engine, with its mode unless it is projection: the same engine in another mode is another product."""
+    return record.engine if record.mode == "projection" else f"{record.engine} · {record.mode}"
+
+
+def output_label(name: str) -> str:
+    """An output's name as suspension engineers write it."""
+    return _LABELS.get(name, name.replace("_", " "))
+
+
+def motion_unit(unit: str, motion: str) -> str:
+    """The unit of a motion's derivative, e.g. m/s for a velocity in m."""
+    return unit + {"position": "", "velocity": "/s", "acceleration": "/s²"}[motion]
+
+
+def number(value: float | None) -> str:
+    """A number to three digits for a table; a dash where it was not computed."""
+    if value is None:
+        return "–"
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    mantissa, _, exponent = f"{value:.2e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}" if exponent else mantissa
+
+
+def known(value: Any) -> Any:
+    """A value of any kind from a results file, in words."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key} {known(each)}" for key, each in cast("Mapping[str, Any]", value).items()) or "–"
+    if isinstance(value, list | tuple):
+        return ", ".join(str(known(each)) for each in cast("Sequence[Any]", value)) or "–"
+    if isinstance(value, float):
+        return number(value)
+    return "–" if value is None or value == "" else value
+
+
+def against(deviation: Deviation) -> str:
+    """What an output was compared with."""
+    kinds = {kind.value: words for kind, words in TRUTHS.items()}
+    return kinds.get(deviation.against, deviation.against)

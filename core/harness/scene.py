@@ -1,0 +1,128 @@
+"""Scenes: the mechanism of each case to look at, at a few samples of its sweep."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import fields, replace
+
+import msgspec
+import numpy as np
+
+from ..analysis.model import compile_model
+from ..analysis.programs import Request
+from ..analysis.solve import sweep
+from ..errors import KincheckError
+from ..joints import Joint, Kind
+from ..mechanism import Vector
+from ..trajectory import Array, BodyMotion
+from .case import Case
+from .record import Record, Results, Scene, SceneBody, SceneJoint, ScenePoint
+from .run import NATIVE
+
+FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
+POSES = 3000  # frames times bodies, at most: a quarter of a megabyte of results
+LARGEST = 200  # moving bodies; no picture shows more
+DIGITS = 6  # of the mechanism's size: a thousandth of a pixel
+
+# Looser than a comparison's, for a pose is only drawn: a thousandth of the digits that are kept.
+TOL = 1e-9
+
+
+def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
+    """The same results with a scene of every case, but for mechanisms of more than `LARGEST` moving bodies.
+
+    Poses over the sweep are solved for only where the native engine has an answer in these results: what it has been seen to
+    manage, in a process of its own perhaps, will neither hang nor end this one.
+    """
+    answered = {record.case for record in results.records if _answers(record)}
+    shown = [case for case in cases if len(case.mechanism.moving) <= LARGEST]
+    return msgspec.structs.replace(results, scenes={case.name: scene(case, poses=case.name in answered) for case in shown})
+
+
+def _answers(record: Record) -> bool:
+    return record.engine == NATIVE and bool(record.solved)
+
+
+def scene(case: Case, *, poses: bool = True) -> Scene:
+    """The mechanism of a case.
+
+    Args:
+        poses: solve for the bodies' poses over the sweep; else the scene is the design position.
+    """
+    mechanism = case.mechanism
+    frames, motions = list[int](), dict[str, BodyMotion]()
+    message = "the native engine has no answer in this run: this is the design position"
+    if poses:
+        try:
+            frames, motions, message = _poses(case)
+        except KincheckError as error:
+            message = f"no poses, this is the design position: {error}"
+    size = _size([body.origin for body in mechanism.bodies] + [point for joint in mechanism.joints for point in _points(joint)])
+    return Scene(
+        bodies=[
+            SceneBody(
+                name=body.name,
+                fixed=body.fixed,
+                origin=list(body.origin),
+                euler_parameters=list(body.euler_parameters),
+                r=_rounded(motions[body.name].r, size) if body.name in motions else [],
+                p=_rounded(motions[body.name].p, 1.0) if body.name in motions else [],
+            )
+            for body in mechanism.bodies
+        ],
+        joints=[
+            SceneJoint(
+                name=joint.name,
+                type=joint.type,
+                bodies=list(joint.bodies),
+                points=[list(point) for point in _points(joint)],
+                axes=[list(axis) for axis in _vectors(joint, Kind.DIRECTION, Kind.DIRECTIONS)],
+            )
+            for joint in mechanism.joints
+        ],
+        points=[
+            ScenePoint(name=point.name, body=point.body, position=list(point.position), output=point.name in case.points)
+            for point in mechanism.points
+        ],
+        frames=frames,
+        message=message,
+    )
+
+
+def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
+    """The samples reached, of `FRAMES` evenly taken ones, and every moving body there."""
+    path, count = case.sweep.path, len(case.sweep.values)
+    bodies = tuple(body.name for body in case.mechanism.moving)
+    frames = min(FRAMES, count, POSES // max(1, len(bodies)))
+    taken = np.unique(np.linspace(0, count - 1, frames).round().astype(int))
+    # not compiled: for so few samples the compiler takes longer than numpy
+    model = compile_model(case.mechanism, Request(tuple(path.motions), (), bodies, order=0, compiled=False))
+    found = sweep(model, replace(path, times=path.times[taken]), TOL)
+    reached = {name: replace(motion, r=motion.r[found.solved], p=motion.p[found.solved]) for name, motion in found.bodies.items()}
+    return taken[found.solved].tolist(), reached if found.solved.any() else {}, found.message
+
+
+def _vectors(joint: Joint, one: Kind, pair: Kind) -> list[Vector]:
+    """What a joint's fields of a kind hold: vectors common to both bodies, or one on each."""
+    held: list[Vector] = []
+    for each in fields(joint):
+        value = getattr(joint, each.name)
+        if value is not None and each.metadata.get("kind") is one:
+            held.append(value)
+        elif value is not None and each.metadata.get("kind") is pair:
+            held += value
+    return held
+
+
+def _points(joint: Joint) -> list[Vector]:
+    return _vectors(joint, Kind.POSITION, Kind.POSITIONS)
+
+
+def _size(points: Sequence[Vector]) -> float:
+    """The largest extent of the design position [m]; one where there is none."""
+    return float(np.ptp(np.array(points), axis=0).max()) or 1.0 if points else 1.0
+
+
+def _rounded(values: Array, size: float) -> list[list[float]]:
+    return np.round(values, DIGITS - math.floor(math.log10(size))).tolist()

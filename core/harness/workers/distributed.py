@@ -1,0 +1,101 @@
+"""Pairs solved on a dask.distributed cluster: a task each, and on its machine a worker process, so that limits hold there too."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+from collections.abc import Sequence
+from threading import Lock
+from typing import Any
+from uuid import uuid4
+
+from ...errors import KincheckError
+from ..attempt import Attempt, Attempts, Failure, Pair, Solver, said
+from ..record import Outcome
+from .frames import pack
+from .limits import Limits
+from .worker import Seat
+
+# For the scheduler to answer at all [s]: a name is looked up and a port is asked, which takes milliseconds or never succeeds.
+CONNECT = 20.0
+
+
+class ClusterError(KincheckError):
+    """There is no cluster to solve on, or it has gone."""
+
+
+def on_cluster(address: str, limits: Limits) -> Solver:
+    """The solver on the workers of a scheduler. A pair whose worker is lost is solved by another; its result comes once.
+
+    Raises:
+        ClusterError: dask.distributed is not installed, the scheduler does not answer, or it has gone meanwhile.
+    """
+
+    def solve(pairs: Sequence[Pair]) -> Attempts:
+        distributed = _distributed()
+        try:
+            client: Any = distributed.Client(address, timeout=CONNECT, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            raise ClusterError(
+                f"scheduler {address}: does not answer ({said(error)}); start one with `dask scheduler` and workers with "
+                "`dask worker ADDRESS`, where kincheck and the engines are installed"
+            ) from error
+        with client:
+            yield from _gathered(distributed, client, address, pairs, limits)
+
+    return solve
+
+
+def _gathered(distributed: Any, client: Any, address: str, pairs: Sequence[Pair], limits: Limits) -> Attempts:
+    version = importlib.metadata.version("kincheck")
+    name = f"kincheck-{uuid4().hex}"  # of tasks: the scheduler takes equal names for one and the same task
+    tasks = dict[Any, int]()
+    for index, pair in enumerate(pairs):
+        try:
+            packed = pack(pair)
+        except Exception as error:  # of the engine's own ways of being pickled
+            yield index, Attempt(None, Failure(Outcome.ERROR, f"cannot be sent to a cluster: {said(error)}; define it in a module"))
+            continue
+        engine = f"{pair.engine.name} {pair.engine.mode}"
+        task = client.submit(solve_there, packed, engine, limits, version, key=f"{name}-{index}", pure=False)
+        tasks[task] = index
+    for task in distributed.as_completed(tasks, loop=client.loop):
+        try:
+            found: Attempt = task.result()
+        except distributed.scheduler.KilledWorker as error:
+            found = Attempt(None, Failure(Outcome.CRASHED, f"every worker that had it was lost: {said(error)}"))
+        except (OSError, distributed.CancelledError) as error:
+            raise ClusterError(f"scheduler {address}: has gone ({said(error)}); run again with --resume when it is back") from error
+        except Exception as error:  # raised on the cluster around the worker process: no process can be started, for one
+            found = Attempt(None, Failure(Outcome.ERROR, f"the cluster's worker cannot solve: {said(error)}"))
+        task.release()
+        yield tasks[task], found
+
+
+def _distributed() -> Any:
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError as error:
+        raise ClusterError(
+            "--scheduler needs dask.distributed, which is not installed; pip install 'kincheck[distributed]'"
+        ) from error
+    return distributed
+
+
+_idle: dict[tuple[str, Limits], list[Seat]] = {}
+_lock = Lock()
+
+
+def solve_there(packed: bytes, engine: str, limits: Limits, version: str) -> Attempt:
+    """Solve a packed pair in a process beside this one, a cluster's worker, which keeps it for the engine's next pair."""
+    mine = importlib.metadata.version("kincheck")
+    if mine != version:
+        message = f"kincheck {mine} on the cluster's worker, expected {version} as in the run; install the same there"
+        return Attempt(None, Failure(Outcome.ERROR, message))
+    with _lock:
+        idle = _idle.setdefault((engine, limits), [])
+        seat = idle.pop() if idle else Seat(limits)
+    found = seat.solve(packed)
+    with _lock:
+        idle.append(seat)
+    return found

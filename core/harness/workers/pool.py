@@ -1,0 +1,108 @@
+"""Pairs solved in worker processes of this machine, several at a time."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from queue import SimpleQueue
+from threading import Lock, Thread
+
+from ..attempt import Attempt, Attempts, Failure, Pair, Solver, said
+from ..record import Outcome
+from .frames import pack
+from .limits import Limits
+from .worker import Seat
+
+
+def in_workers(jobs: int, limits: Limits) -> Solver:
+    """The solver with so many worker processes at a time, each for one engine until there are no more pairs of it."""
+
+    def solve(pairs: Sequence[Pair]) -> Attempts:
+        waiting = _Waiting(pairs)
+        through: SimpleQueue[tuple[int, Attempt] | BaseException] = SimpleQueue()
+        slots = [_Slot(waiting, pairs, limits, through) for _ in range(min(jobs, len(pairs)))]
+        try:
+            for slot in slots:
+                slot.start()
+            for _ in pairs:
+                found = through.get()
+                if isinstance(found, BaseException):
+                    raise found
+                yield found
+        finally:
+            waiting.clear()
+            for slot in slots:
+                slot.stop()
+            for slot in slots:
+                slot.join()
+
+    return solve
+
+
+class _Waiting:
+    """The pairs that nobody has taken yet, by engine."""
+
+    def __init__(self, pairs: Sequence[Pair]) -> None:
+        self.lock = Lock()
+        self.queues: dict[str, deque[int]] = {}
+        self.takers: dict[str, int] = {}
+        for index, pair in enumerate(pairs):
+            self.queues.setdefault(f"{pair.engine.name} {pair.engine.mode}", deque()).append(index)
+
+    def take(self, engine: str | None) -> tuple[str, int] | None:
+        """The next pair of that engine; if there is none, of the one that the fewest have turned to, the first come first."""
+        with self.lock:
+            if engine is None or not self.queues.get(engine):
+                left = [name for name, queue in self.queues.items() if queue]
+                if not left:
+                    return None
+                engine = min(left, key=lambda name: self.takers.get(name, 0))
+                self.takers[engine] = self.takers.get(engine, 0) + 1
+            return engine, self.queues[engine].popleft()
+
+    def clear(self) -> None:
+        """Leave nothing to take."""
+        with self.lock:
+            self.queues.clear()
+
+
+class _Slot(Thread):
+    """Solves one pair at a time. Its worker lives and dies with it: see `Worker`."""
+
+    def __init__(
+        self,
+        waiting: _Waiting,
+        pairs: Sequence[Pair],
+        limits: Limits,
+        through: SimpleQueue[tuple[int, Attempt] | BaseException],
+    ) -> None:
+        super().__init__(daemon=True)
+        self.waiting, self.pairs, self.through = waiting, pairs, through
+        self.seat = Seat(limits)
+
+    def run(self) -> None:
+        engine: str | None = None
+        try:
+            while taken := self.waiting.take(engine):
+                if taken[0] != engine:
+                    self.seat.close()
+                engine, index = taken
+                self.through.put((index, solve_packed(self.pairs[index], self.seat)))
+        except BaseException as error:  # a defect of ours: the run must hear of it, for nobody looks at a thread's end
+            self.through.put(error)
+        finally:
+            self.seat.close()
+
+    def stop(self) -> None:
+        """Be through soon, with whatever is being solved."""
+        self.seat.stop()
+
+
+def solve_packed(pair: Pair, seat: Seat) -> Attempt:
+    """Solve a pair at a seat; what cannot be sent there fails."""
+    try:
+        packed = pack(pair)
+    except Exception as error:  # of the engine's own ways of being pickled
+        message = f"cannot be sent to a worker process: {said(error)}; define it in a module, or solve in this process (--jobs 0)"
+        return Attempt(None, Failure(Outcome.ERROR, message))
+    return seat.solve(packed)
