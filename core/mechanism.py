@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias, TypeVar
+from functools import cached_property
+from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
@@ -78,7 +80,7 @@ class Mechanism:
             _unique(what, [each.name for each in getattr(self, what)])
         if any(body.name == GROUND for body in self.bodies):
             raise MechanismError(f"body {GROUND!r} exists by itself; give the fixed body another name or leave it out", "bodies")
-        known = [GROUND, *(body.name for body in self.bodies)]
+        known = {GROUND: None} | dict.fromkeys(body.name for body in self.bodies)
         for joint in self.joints:
             for name in joint.bodies:
                 _known(f"joint {joint.name!r} ({joint.type})", "body", name, known, f"joints.{joint.name}.bodies")
@@ -93,7 +95,7 @@ class Mechanism:
         for coupler in self.couplers:
             for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
                 who, key = f"joint {coupler.name!r} ({coupler.type})", f"joints.{coupler.name}.joints"
-                _known(who, "joint", name, [joint.name for joint in self.joints], key)
+                _known(who, "joint", name, self._named["joints"], key)
                 joint = self.joint(name)
                 if freedom not in joint.freedoms:
                     raise MechanismError(
@@ -104,7 +106,7 @@ class Mechanism:
         for driver in self.drivers:
             if isinstance(driver, PointCoordinate):
                 key = f"drivers.{driver.name}.point"
-                _known(f"driver {driver.name!r}", "point", driver.point, [point.name for point in self.points], key)
+                _known(f"driver {driver.name!r}", "point", driver.point, self._named["points"], key)
                 if self.is_fixed(self.point(driver.point).body):
                     raise MechanismError(
                         f"driver {driver.name!r}: point {driver.point!r} is on {self.point(driver.point).body!r}, which is "
@@ -113,7 +115,7 @@ class Mechanism:
                     )
             elif isinstance(driver, JointDriver):
                 key = f"drivers.{driver.name}.joint"
-                _known(f"driver {driver.name!r}", "joint", driver.joint, [joint.name for joint in self.joints], key)
+                _known(f"driver {driver.name!r}", "joint", driver.joint, self._named["joints"], key)
                 driver.check(self.joint(driver.joint))
 
     def is_fixed(self, name: str) -> bool:
@@ -122,19 +124,24 @@ class Mechanism:
 
     def body(self, name: str) -> Body:
         """The body of that name."""
-        return _find(self.bodies, name)
+        return self._named["bodies"][name]
 
     def joint(self, name: str) -> Joint:
         """The joint of that name."""
-        return _find(self.joints, name)
+        return self._named["joints"][name]
 
     def point(self, name: str) -> Point:
         """The point of that name."""
-        return _find(self.points, name)
+        return self._named["points"][name]
 
     def driver(self, name: str) -> Driver:
         """The driver of that name."""
-        return _find(self.drivers, name)
+        return self._named["drivers"][name]
+
+    @cached_property
+    def _named(self) -> Mapping[str, Mapping[str, Any]]:
+        """What there is of each kind, by name."""
+        return {what: {each.name: each for each in getattr(self, what)} for what in ("bodies", "joints", "points", "drivers")}
 
     @property
     def moving(self) -> tuple[Body, ...]:
@@ -142,25 +149,15 @@ class Mechanism:
         return tuple(body for body in self.bodies if not body.fixed)
 
 
-_Named = TypeVar("_Named", Body, Joint, Point, Driver)
-
-
-def _find(items: Iterable[_Named], name: str) -> _Named:
-    for item in items:
-        if item.name == name:
-            return item
-    raise KeyError(name)
-
-
 def _unique(what: str, names: Sequence[str]) -> None:
-    twice = {name for name in names if names.count(name) > 1}
+    twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise MechanismError(f"{what}: the name {min(twice)!r} is used more than once; names must be unique", what)
 
 
-def _known(who: str, what: str, name: str, known: Sequence[str], key: str) -> None:
+def _known(who: str, what: str, name: str, known: Mapping[str, Any], key: str) -> None:
     if name in known:
         return
-    close = difflib.get_close_matches(name, known, n=1)
+    close = difflib.get_close_matches(name, list(known), n=1)
     remedy = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(sorted(known)) or 'none'}"
     raise MechanismError(f"{who}: there is no {what} {name!r}; {remedy}", key)
