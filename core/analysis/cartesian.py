@@ -7,11 +7,11 @@ dpi is in global axes, or in body axes where the row style is; the poses are the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from ..algebra import Quat, Scalar, Vec3, turned_by, vec
+from ..algebra import ZERO, Quat, Scalar, Vec3, turned_by, vec
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose, Primitive, Row
 from ..program import cos, sin, sqrt
 from .equations import Constraint, Relation
@@ -21,17 +21,28 @@ COLUMNS = 6
 """Unknowns of a moving body: dr and dpi."""
 
 
+@dataclass(frozen=True, slots=True)
+class Given:
+    """How a body moves that is solved for elsewhere."""
+
+    pose: Pose = GROUND_POSE
+    motion: Motion = GROUND_MOTION
+    acceleration: Acceleration = field(default_factory=lambda: Acceleration(ZERO, ZERO))
+
+
 @dataclass(frozen=True, eq=False)
 class Cartesian:
     """The constraints over the named moving bodies; implements `Formulation`.
 
     Attributes:
         named: coordinates that have a column whether or not a primitive is driven by them.
+        given: moving bodies that have no columns.
     """
 
     constraints: Sequence[Constraint | Relation]
     bodies: Sequence[str]
     named: Sequence[str] = ()
+    given: Mapping[str, Given] = field(default_factory=dict[str, Given])
 
     @cached_property
     def columns(self) -> Mapping[str, int]:
@@ -66,7 +77,7 @@ class Cartesian:
         return any(c.primitive.body_axes for c in self.constraints if isinstance(c, Constraint))
 
     def configuration(self, state: State) -> Configuration:
-        poses: dict[str, Pose] = {}
+        poses = {name: each.pose for name, each in self.given.items()}
         for name in self.bodies:
             e0, *e = state[f"q {name}"]
             poses[name] = Pose.of(vec(state[f"u {name}"]), Quat(e0, vec(e)))
@@ -111,13 +122,18 @@ class Cartesian:
         return found
 
     def nu(self, at: Configuration) -> list[Scalar]:
+        carried = {name: each.motion for name, each in self.given.items()}
         found: list[Scalar] = []
         for c in self.constraints:
-            found += [c.drive.c_t] if isinstance(c, Relation) else self._bound(c, at).nu(*_pair(c, at))
+            if isinstance(c, Relation):
+                found.append(c.drive.c_t)
+            else:
+                found += self._less(self._bound(c, at).nu(*_pair(c, at)), c, at, carried)
         return found
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        motions = self._own(v)
+        motions = self._own(v) | {name: each.motion for name, each in self.given.items()}
+        carried = {name: Motion(each.acceleration.v_t, each.acceleration.w_t) for name, each in self.given.items()}
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
@@ -125,7 +141,16 @@ class Cartesian:
                 continue
             rate = v[self.coordinates[c.coordinate]] if c.coordinate else 0.0
             vi, vj = motions.get(c.i, GROUND_MOTION), motions.get(c.j, GROUND_MOTION)
-            found += self._bound(c, at, rate).gamma(*_pair(c, at), vi, vj)
+            found += self._less(self._bound(c, at, rate).gamma(*_pair(c, at), vi, vj), c, at, carried)
+        return found
+
+    def _less(self, values: Sequence[Scalar], c: Constraint, at: Configuration, carried: Mapping[str, Motion]) -> list[Scalar]:
+        """Right-hand sides less what given bodies contribute to the left."""
+        found: list[Scalar] = [*values]
+        for body, place in ((c.i, "i"), (c.j, "j")):
+            if body in carried:
+                rows = self._bound(c, at).rows(*_pair(c, at))
+                found = [x - row.along(place, carried[body]) for x, row in zip(found, rows, strict=True)]
         return found
 
     def _bound(self, c: Constraint, at: Configuration, rate: Scalar = 0.0) -> Primitive:

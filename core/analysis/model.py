@@ -11,27 +11,28 @@ import numpy as np
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..program import ITERATIONS, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
+from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
 from ..program.compiled import available
 from ..trajectory import Array
-from .programs import EARLIER, FROM, TIME, Request, Tracer
+from .components import Section
+from .programs import EARLIER, FROM, RATE, RATE_T, TIME, Request, Tracer
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
 LAST_ITERATION = 1e-9
 MAX_ITERATIONS = 12
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
-TESTS = ("closure", "leftover", "branch", "pivot", ITERATIONS)
+TESTS = ("closure", "leftover", "branch", "pivot", ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
 
 
-def compile_model(mechanism: Mechanism, request: Request) -> Model:
+def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
     """Select the rows and trace the programs that the request needs.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
-    tracer = Tracer(mechanism, request)
+    tracer = Tracer(mechanism, request, section)
     programs = [tracer.newton(), tracer.predict()]
     if request.order:
         programs.append(tracer.motion("motion", request.order))
@@ -52,6 +53,7 @@ class Model:
         state: name of a vector of the state -> its value at design.
         sampled: the places of what is given at every sample: the time, and five numbers of each moving driver.
         geometry: the places of the numbers of all varied places.
+        given: name of a vector that tells how a given body moves -> its value at rest at design.
         design: all slots of a lane that stands at the design position.
         rows: name of a motion or test -> its rows among what is kept of a sample.
         kept: how many rows there are.
@@ -70,6 +72,7 @@ class Model:
         self.slots, self.vectors = tracer.layout.slots, tracer.layout.vectors
         self.state = tracer.formulation.design
         self._geometry = tracer.geometry
+        self.given = tracer.at_rest
         self.geometry = [slot for place in tracer.geometry for slot in self.vectors[place]]
         self.sampled = [self.slots[TIME]]
         self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
@@ -85,6 +88,8 @@ class Model:
             sampled=self.sampled,
             carried=carried,
             kept=[*kept, *(self.slots[name] for name in TESTS)],
+            fixed=[*(target for _, target in carried), *self.geometry, *tracer.prepared.slots],
+            taken=[slot for name in self.given for slot in self.vectors[name]],
             tolerance=LAST_ITERATION,
             most=MAX_ITERATIONS,
         )
@@ -96,7 +101,8 @@ class Model:
     def _wanted(self) -> list[str]:
         """Names of the vectors asked for, those of one motion side by side."""
         order = self.request.order + 1
-        found = [f"{label} {name}" for name in self.request.points for label in ("position", "velocity", "acceleration")[:order]]
+        found = [*self.state, *(f"predicted {name}" for name in self.state), RATE, RATE_T] if self.request.state else []
+        found += [f"{label} {name}" for name in self.request.points for label in ("position", "velocity", "acceleration")[:order]]
         labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
         return found + [f"{label} {name}" for name in self.request.bodies for group in labels for label in group]
 
@@ -170,6 +176,11 @@ class Model:
         self.start(executor, sample)
         return executor.get(every)[:, 0]
 
+    @property
+    def plan(self) -> Plan:
+        """The programs and how they are looped."""
+        return self._plan
+
     def start(self, executor: Executor, sample: Array) -> None:
         """Make solved lanes those that go on from where they stand, with the rates that a sample of the drives gives them."""
         executor.put(self.sampled, sample[:, None])
@@ -194,6 +205,8 @@ class Model:
         every = range(len(self.slots))
         executor.put(every, np.zeros((len(every), 1)))
         for name, value in self.state.items():
+            executor.put(self.vectors[name], np.array(value)[:, None])
+        for name, value in self.given.items():
             executor.put(self.vectors[name], np.array(value)[:, None])
         executor.put(self.sampled, self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))))
         if len(geometry):

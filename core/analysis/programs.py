@@ -18,7 +18,7 @@ from typing import Any
 
 from ..algebra import ZERO, Quat, Scalar, cross, rotation_less_identity, vec
 from ..mechanism import Mechanism, Vector
-from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion
+from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose
 from ..program import (
     DONE,
     MARGIN,
@@ -33,7 +33,8 @@ from ..program import (
     program,
     where_larger,
 )
-from .cartesian import Cartesian
+from .cartesian import Cartesian, Given
+from .components import Section, select_section
 from .continuity import LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
@@ -52,6 +53,7 @@ class Request:
         order: 0 positions, 1 and velocities, 2 and accelerations.
         style: how the rows are written.
         compiled: run by machine code where llvmlite is installed, else by numpy; the same results to round-off.
+        state: keep the whole state of every sample, and its rates.
         varied: places of the geometry (see `places`) that are inputs of the programs; all others are constants in them.
     """
 
@@ -61,12 +63,15 @@ class Request:
     order: int = 2
     style: Style = Style.NATIVE
     compiled: bool = True
+    state: bool = False
     varied: tuple[str, ...] = ()
 
 
 RATE, RATE_T = "rate", "rate_t"
 """The vectors that hold the rates and accelerations of the unknowns."""
 TIME = "time"
+GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
+"""The vectors that tell how a given body moves, and how many numbers each has [units and seconds]."""
 FROM, EARLIER = "from ", "earlier "
 """Before the names of what a lane is predicted from, and of what that was predicted from."""
 
@@ -98,17 +103,20 @@ class Tracer:
         SolveError: the mechanism cannot be solved as described (see `select_rows`).
     """
 
-    def __init__(self, mechanism: Mechanism, request: Request) -> None:
+    def __init__(self, mechanism: Mechanism, request: Request, section: Section | None = None) -> None:
         self.request, self.tape, self.layout = request, Tape(), Layout()
-        self.mechanism, self.frame = mechanism, frames(mechanism)
-        self.selection = select_rows(mechanism, self.frame, self._formulate({}))
+        self.mechanism, self._section = mechanism, section
+        self.frame = section.frame(mechanism) if section else frames(mechanism)
+        self.given: Mapping[str, Given] = {name: Given() for name in section.given} if section else {}
+        self.selection = (select_section if section else select_rows)(mechanism, self.frame, self._formulate({}))
         self.geometry = {place: places(mechanism)[place] for place in request.varied}
         given = {place: self._vector(place, len(value)) for place, value in self.geometry.items()}
         slots = {slot for place in given for slot in self.layout.vectors[place]}
         self.prepared = Prepared(self.tape, slots, self.layout.scalar)
         if given:
             self.mechanism = placed(mechanism, given)
-            self.frame = frames(self.mechanism, self.frame.unit)
+            self.frame = section.frame(self.mechanism) if section else frames(self.mechanism, self.frame.unit)
+        self.given = {name: self._moved(name) for name in self.given}
         self.formulation = self._formulate({name: Drive(*self._vector(f"drive {name}", 5)) for name in request.drivers})
         design = self.formulation.design
         self.at = self.formulation.configuration({name: self._vector(name, len(value)) for name, value in design.items()})
@@ -118,7 +126,12 @@ class Tracer:
         found = constraints(self.mechanism, self.frame, drives, self.request.style)
         if self.request.style is Style.RELATIVE:
             return Relative.of(self.mechanism, self.frame, found)
-        return Cartesian(found, self.frame.moving)
+        return Cartesian(found, self.frame.moving, given=self.given)
+
+    def _moved(self, name: str) -> Given:
+        """A given body, its motion read from slots."""
+        u, (e0, *e), v, w, v_t, w_t = (self._vector(f"given {label} {name}", count) for label, count in GIVEN.items())
+        return Given(Pose.of(vec(u), Quat(e0, vec(e))), Motion(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t)))
 
     def _in(self, name: str) -> Scalar:
         return self.tape.input(self.layout.scalar(name))
@@ -162,6 +175,12 @@ class Tracer:
         if order == 2:
             self._store(out, RATE_T, factor.solve(self._kept(self.formulation.gamma(self.at, v))))
         return program(name, self.tape, out, self.prepared)
+
+    @property
+    def at_rest(self) -> Mapping[str, Sequence[float]]:
+        """The vectors that tell how given bodies move, at rest at the design position."""
+        values = {label: (1.0, 0.0, 0.0, 0.0) if label == "q" else (0.0, 0.0, 0.0) for label in GIVEN}
+        return {f"given {label} {name}": value for name in self.given for label, value in values.items()}
 
     @property
     def carried(self) -> list[tuple[int, int]]:

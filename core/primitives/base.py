@@ -74,6 +74,10 @@ class Row(NamedTuple):
     rj: Vec3
     pj: Vec3
 
+    def along(self, body: str, motion: Motion) -> Scalar:
+        """The part of row . velocity that belongs to one body, "i" or "j"."""
+        return self.ri @ motion.v + self.pi @ motion.w if body == "i" else self.rj @ motion.v + self.pj @ motion.w
+
 
 @dataclass(frozen=True)
 class Drive:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .straight_line import Program
@@ -29,6 +32,8 @@ class Plan:
         sampled: slots that are given anew at every sample.
         carried: slots of a solved lane, and the slots it is predicted from that take them over.
         kept: slots that are stored of every sample.
+        fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
+        taken: slots that a part takes from what was solved before it.
         tolerance: of the residual before an iteration; that iteration is the last.
         most: iterations at most.
     """
@@ -40,6 +45,8 @@ class Plan:
     sampled: Sequence[int] = ()
     carried: Sequence[tuple[int, int]] = ()
     kept: Sequence[int] = ()
+    fixed: Sequence[int] = ()
+    taken: Sequence[int] = ()
     tolerance: float = 0.0
     most: int = 0
 
@@ -96,5 +103,16 @@ class Executor(Protocol):
             samples: `Plan.sampled`, shape (sampled, n).
             out: takes `Plan.kept`, shape (kept, columns, room), contiguous; NaN from where a lane was not accepted.
             first, step: column of the first sample, and from each to the next: 1 or -1.
+        """
+        ...
+
+    def part(self, fixed: Array, samples: Array, taken: NDArray[np.int64], world: Array, base: int) -> Callable[[], object]:
+        """A call that attempts one part of a large mechanism: all lanes alone, by what stands in these arrays when it is called.
+
+        Args:
+            fixed: values of `Plan.fixed`, shape (fixed,).
+            samples: values of `Plan.sampled`, shape (sampled, room).
+            taken: rows of the world that `Plan.taken` come from.
+            world: all that has been solved, shape (rows, room); takes `Plan.kept` from the row `base` on.
         """
         ...

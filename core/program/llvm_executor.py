@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..trajectory import Array
 from . import compiled, llvm_code, llvm_loops
@@ -24,8 +26,8 @@ class LlvmCode:
         signatures = {f"run_{name}": "pi" for name in plan.programs}
         if plan.after:  # a plan that is only run has no loops
             text += [llvm_loops.settle(plan, width), llvm_loops.over_groups("attempt", ["settle", "alone"], self.slots, width)]
-            text += [llvm_loops.follow(plan, width), llvm_loops.fan(plan, width)]
-            signatures |= {"attempt": "pi", "follow": "pppiipiii", "fan": "pipiipiiii"}
+            text += [llvm_loops.follow(plan, width), llvm_loops.fan(plan, width), llvm_loops.part(plan, width)]
+            signatures |= {"attempt": "pi", "follow": "pppiipiii", "fan": "pipiipiiii", "part": "pippippi"}
         self._owner, self.functions = compiled.load("\n".join([*text, llvm_code.declarations(width)]), signatures)
 
 
@@ -77,6 +79,11 @@ class LlvmExecutor:
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
         given = self._address, self._groups, samples.ctypes.data, stride, wanted
         self._code.functions["fan"](*given, out.ctypes.data, *out.shape[1:], first, step)
+
+    def part(self, fixed: Array, samples: Array, taken: NDArray[np.int64], world: Array, base: int) -> Callable[[], object]:
+        """See `Executor`."""
+        given = fixed.ctypes.data, samples.ctypes.data, samples.shape[1], taken.ctypes.data, world.ctypes.data, base
+        return partial(self._code.functions["part"], self._address, self._groups, *given)
 
 
 def _aligned(*shape: int) -> Array:

@@ -178,5 +178,41 @@ end:
 """
 
 
+def part(plan: Plan, width: int) -> str:
+    """See `Executor.part`."""
+    vector, begin, keep = f"<{width} x double>", Lines(width, "b"), Lines(width, "k")
+    for k, slot in enumerate(plan.fixed):
+        begin.write(slot, begin.spread(begin.let(f"load double, ptr {begin.number('%fixed', k)}, align 8")))
+    for row, slot in enumerate(plan.sampled):
+        place = begin.number("%samples", begin.sum(begin.product("%room", row), "%first"))
+        begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
+    for k, slot in enumerate(plan.taken):
+        row = begin.let(f"load i64, ptr {begin.let(f'getelementptr i64, ptr %taken, i64 {k}')}, align 8")
+        place = begin.number("%world", begin.sum(begin.product("%room", row), "%first"))
+        begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
+    for row, slot in enumerate(plan.kept):
+        place = keep.number("%world", keep.sum(keep.product("%room", keep.sum("%base", row)), "%first"))
+        keep.lines.append(f"store {vector} {keep.read(slot)}, ptr {place}, align 8")
+    return f"""define void @part(ptr %memory, i64 %groups, ptr %fixed, ptr %samples, i64 %room, ptr %taken, ptr %world, i64 %base) {{
+entry:
+  br label %group
+group:
+  %g = phi i64 [0, %entry], [%next, %group]
+  %offset = mul i64 %g, {len(plan.slots) * width}
+  %lane = getelementptr double, ptr %memory, i64 %offset
+  %first = mul i64 %g, {width}
+  {begin.text}
+  call void @settle(ptr %lane)
+  call void @alone(ptr %lane)
+  {keep.text}
+  %next = add i64 %g, 1
+  %more = icmp slt i64 %next, %groups
+  br i1 %more, label %group, label %end
+end:
+  ret void
+}}
+"""
+
+
 def _calls(names: Iterable[str]) -> str:
     return "\n  ".join(f"call void @{name}(ptr %lane)" for name in names)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .executor import DONE, ITERATIONS, MARGIN, Plan
@@ -139,6 +140,19 @@ class NumpyExecutor:
             for name in plan.onward:
                 self.run(name)
             block[target] = block[source]
+
+    def part(self, fixed: Array, samples: Array, taken: NDArray[np.int64], world: Array, base: int) -> Callable[[], object]:
+        """See `Executor`."""
+        plan, block = self._plan, self._block
+
+        def call() -> None:
+            block[list(plan.fixed)] = fixed[:, None]
+            block[list(plan.sampled)] = samples
+            block[list(plan.taken)] = world[taken]
+            self.attempt("alone")
+            world[base : base + len(plan.kept)] = block[list(plan.kept)]
+
+        return call
 
     def _bind(self, program: Program) -> list[Call]:
         """Give every operation a register; a register is free again after its last reader."""

@@ -78,6 +78,11 @@ class Prepared:
             self._kept[number] = self._slot(f"prepared {len(self._kept)}")
         return ("input", self._kept[number])
 
+    @property
+    def slots(self) -> list[int]:
+        """The slots it keeps things in."""
+        return [*self._kept.values()]
+
     def program(self) -> Program:
         """What computes all that programs have read so far."""
         return program("prepare", self.tape, {slot: Traced(self.tape, number) for number, slot in self._kept.items()})

@@ -1,0 +1,200 @@
+"""A large mechanism solved component by component: one program for all components that are built alike, samples as lanes.
+
+Every component takes how the bodies before it move from a table of all that is solved (the world), and adds its own. What it is
+predicted from is one pose for all lanes: the last sample that every component accepted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SolveError
+from ..mechanism import Mechanism, Vector
+from ..motions import Path
+from ..program import MARGIN
+from ..trajectory import Array
+from .components import Component, Section, components, section
+from .equations import frames
+from .geometry import places
+from .model import CLOSED, Model, compile_model
+from .programs import RATE, RATE_T, Request
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """Components that are built alike: one model, and numbers for each.
+
+    Attributes:
+        members: which components they are.
+        fixed: what is the same in all lanes (`Plan.fixed`), at the design position, shape (members, fixed).
+        base: first row of the first member in the world; each has `model.kept` rows.
+    """
+
+    model: Model
+    members: tuple[int, ...]
+    fixed: Array
+    base: int
+
+    def rows(self, name: str, member: int) -> range:
+        """Rows of the world that hold what the model keeps of a member under a name."""
+        rows = self.model.rows[name]
+        start = self.base + member * self.model.kept
+        return range(start + rows.start, start + rows.stop)
+
+
+class Cascade:
+    """The components of a mechanism with their programs, ready to be solved along paths.
+
+    Args:
+        request: as for `compile_model`; accelerations are computed whatever its order, to predict from.
+
+    Raises:
+        SolveError: the mechanism has couplers, is not driven enough, or does not close at the design position.
+    """
+
+    def __init__(self, mechanism: Mechanism, request: Request) -> None:
+        self.mechanism, self.request = mechanism, request
+        frame = frames(mechanism)
+        self.parts = components(mechanism, frame)
+        self.unit = max(part.extent for part in self.parts) or frame.unit
+        x: Vector
+        origins = {name: x for name, origin in frame.origins.items() if (x := _triple(frame.unit * origin))}
+        driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
+        self.points: list[list[str]] = [[] for _ in self.parts]
+        self.part_of = {name: k for k, part in enumerate(self.parts) for name in part.bodies}
+        for point in mechanism.points:
+            if (point.name in request.points or point.name in driven) and point.body in self.part_of:
+                self.points[self.part_of[point.body]].append(point.name)
+        sections = [self._section(k, part, origins) for k, part in enumerate(self.parts)]
+        alike: dict[object, list[int]] = {}
+        for k, each in enumerate(sections):
+            alike.setdefault(each.signature, []).append(k)
+        self.kinds: list[Kind] = []
+        self.rows = 0
+        for members in alike.values():
+            kind = self._kind([sections[k] for k in members], members)
+            self.kinds.append(kind)
+            self.rows += len(members) * kind.model.kept
+        self.place = {part: (kind, k) for kind in self.kinds for k, part in enumerate(kind.members)}
+
+    @property
+    def largest(self) -> int:
+        """Unknowns of the largest component."""
+        return max(kind.model.selection.account.moving_coordinates for kind in self.kinds)
+
+    def _section(self, k: int, part: Component, origins: dict[str, Vector]) -> Section:
+        points = [self.mechanism.point(name) for name in self.points[k]]
+        wanted = [self.mechanism.body(name) for name in part.bodies if name in self.request.bodies]
+        return section(part, self.unit, origins, points, wanted)
+
+    def _kind(self, sections: Sequence[Section], members: Sequence[int]) -> Kind:
+        first, values = sections[0], [places(each.mechanism) for each in sections]
+        varied = tuple(place for place, value in values[0].items() if any(each[place] != value for each in values))
+        m, part = first.mechanism, self.parts[members[0]]
+        request = Request(
+            tuple(driver.name for driver in m.drivers),
+            tuple(f"p{k}" for k in range(len(self.points[members[0]]))),
+            tuple(f"b{k}" for k, name in enumerate(part.bodies) if name in self.request.bodies),
+            compiled=self.request.compiled,
+            state=True,
+            varied=varied,
+        )
+        model = compile_model(m, request, first)
+        numbers = np.array([[x for place in varied for x in each[place]] for each in values]).reshape(len(members), -1)
+        lanes = model.standing(numbers.T)
+        if np.isnan(lanes).any():
+            worst = self.parts[members[int(np.isnan(lanes).any(axis=0).argmax())]]
+            raise SolveError(
+                f"mechanism {self.mechanism.name!r}: the component of {', '.join(worst.bodies)} does not close at the design "
+                f"position to {CLOSED:g} of its size; check points, axes and lengths"
+            )
+        source, target = np.array(model.plan.carried).T
+        lanes[target] = lanes[source]
+        return Kind(model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), self.rows)
+
+    def body_rows(self, name: str) -> list[int]:
+        """Rows of the world that tell how a body moves, in the order of `GIVEN`."""
+        kind, member = self.place[self.part_of[name]]
+        k = self.parts[kind.members[member]].bodies.index(name)
+        u, q, v, a = (kind.rows(label, member) for label in (f"u b{k}", f"q b{k}", RATE, RATE_T))
+        return [*u, *q, *v[6 * k : 6 * k + 6], *a[6 * k : 6 * k + 6]]
+
+
+class Lanes:
+    """A cascade bound to lanes: the world, and a call for every component in order.
+
+    Attributes:
+        world: all that is solved, shape (rows, room); see `Cascade`.
+    """
+
+    def __init__(self, cascade: Cascade, lanes: int) -> None:
+        self.cascade, self.lanes = cascade, lanes
+        executors = {id(kind): kind.model.executor(lanes) for kind in cascade.kinds}
+        room = max(each.room for each in executors.values())
+        self.world = np.zeros((cascade.rows, room))
+        self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
+        self._samples = [np.zeros((len(kind.model.sampled), room)) for kind in cascade.kinds]
+        number = {id(kind): k for k, kind in enumerate(cascade.kinds)}
+        self._taken: list[NDArray[np.int64]] = []  # calls know addresses, not arrays: these must live as long
+        self._calls: list[Callable[[], object]] = []
+        for index, part in enumerate(cascade.parts):
+            kind, member = cascade.place[index]
+            k, base = number[id(kind)], kind.base + member * kind.model.kept
+            self._taken.append(np.array([row for body in part.given for row in cascade.body_rows(body)], dtype=np.int64))
+            call = executors[id(kind)].part(self._fixed[k][member], self._samples[k], self._taken[-1], self.world, base)
+            self._calls.append(call)
+
+    def accept_by(self, tolerances: dict[str, float]) -> None:
+        """Set the tolerances."""
+        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
+            for name, value in tolerances.items():
+                fixed[:, list(kind.model.plan.fixed).index(kind.model.slots[name])] = value
+
+    @property
+    def anchor(self) -> list[Array]:
+        """What the lanes are predicted from; to come back to."""
+        return [fixed.copy() for fixed in self._fixed]
+
+    @anchor.setter
+    def anchor(self, anchor: Sequence[Array]) -> None:
+        for fixed, kept in zip(self._fixed, anchor, strict=True):
+            fixed[:] = kept
+
+    def attempt(self, times: Array, path: Path) -> Array:
+        """Solve all components at as many times as there are lanes, or fewer; the margin of each, positive where accepted."""
+        count = len(times)
+        for kind, samples in zip(self.cascade.kinds, self._samples, strict=True):
+            names = kind.model.request.drivers
+            drive = path.drive(names, times) if names else np.zeros((3, 0, count))
+            samples[:, :count] = kind.model.samples(times, drive)
+            samples[:, count:] = samples[:, count - 1 : count]
+        for call in self._calls:
+            call()
+        return self.each(MARGIN)[:, :count].min(axis=0)
+
+    def each(self, name: str) -> Array:
+        """A scalar of all components, shape (components, room)."""
+        found: list[Array] = []
+        for kind in self.cascade.kinds:
+            size, first = kind.model.kept, kind.base + kind.model.rows[name].start
+            found.append(self.world[first : kind.base + size * len(kind.members) : size])
+        return np.concatenate(found)
+
+    def carry(self, lane: int) -> None:
+        """Predict from a solved lane from now on."""
+        for kind, fixed, samples in zip(self.cascade.kinds, self._fixed, self._samples, strict=True):
+            size, plan, before = kind.model.kept, kind.model.plan, fixed.copy()
+            solved = self.world[kind.base : kind.base + size * len(kind.members), lane].reshape(len(kind.members), size)
+            tables = [(list(plan.kept), solved), (list(plan.sampled), samples[None, :, lane]), (list(plan.fixed), before)]
+            for source, target in plan.carried:
+                slots, values = next(each for each in tables if source in each[0])
+                fixed[:, tables[-1][0].index(target)] = values[:, slots.index(source)]
+
+
+def _triple(v: Sequence[float] | object) -> Vector:
+    x, y, z = v  # pyright: ignore[reportGeneralTypeIssues, reportUnknownVariableType]
+    return float(x), float(y), float(z)  # pyright: ignore[reportUnknownArgumentType]

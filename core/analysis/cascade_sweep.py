@@ -1,0 +1,147 @@
+"""Sweep a cascade: outwards from the design position, many samples as lanes, on from the last one that every component accepts."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import SolveError
+from ..motions import Path
+from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
+from .cascade import Cascade, Lanes
+from .march import CONSISTENT, HALVINGS, MAX_ROUNDS
+from .model import CLOSED
+
+# Samples at once: enough to share a call's overhead, few enough for the world of ten thousand bodies to stay below 100 MB.
+LANES = 32
+POINT = ("position", "velocity", "acceleration")
+BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
+
+
+class CascadeSweep:
+    """A path through a cascade; solved as often as wanted."""
+
+    def __init__(self, cascade: Cascade, path: Path) -> None:
+        self.cascade, self.path = cascade, path
+        self._lanes = Lanes(cascade, max(HALVINGS, min(LANES, len(path.times))))
+        self._outputs = self._places()
+
+    def _places(self) -> dict[str, list[int]]:
+        """Rows of the world of everything wanted, by name."""
+        cascade = self.cascade
+        found: dict[str, list[int]] = {}
+        for name in cascade.request.points:
+            body = cascade.mechanism.point(name).body
+            if body not in cascade.part_of:
+                raise SolveError(f"point {name!r} is on {body!r}, which is fixed: leave it out")
+            kind, member = cascade.place[cascade.part_of[body]]
+            own = f"p{cascade.points[cascade.part_of[body]].index(name)}"
+            found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in POINT}
+        for name in cascade.request.bodies:
+            kind, member = cascade.place[cascade.part_of[name]]
+            own = f"b{cascade.parts[kind.members[member]].bodies.index(name)}"
+            found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in BODY}
+        return found
+
+    def solve(self, tol: float) -> Trajectory:
+        """The motion at all samples; see `solve.solve`."""
+        path, lanes = self.path, self._lanes
+        n = len(path.times)
+        found = {name: np.full((n, len(rows)), np.nan) for name, rows in self._outputs.items()}
+        tests = {name: np.full(n, np.nan) for name in ("closure", "leftover", "pivot", "iterations")}
+        messages: list[str] = []
+        start, departure, message = self._departure
+        messages += [message] if message else []
+        for side in (path.times >= start, path.times < start) if not messages else ():
+            order = np.flatnonzero(side)[np.argsort(np.abs(path.times[side] - start), kind="stable")]
+
+            def keep(first: int, count: int, order: Array = order) -> None:
+                at = order[first : first + count]
+                for name, rows in self._outputs.items():
+                    found[name][at] = lanes.world[rows, :count].T
+                for name, into in tests.items():
+                    into[at] = (np.min if name == "pivot" else np.max)(lanes.each(name)[:, :count], axis=0)
+
+            lanes.anchor = departure
+            lanes.accept_by({"tolerance": tol, "consistent": max(CONSISTENT, tol)})
+            message = self._follow(path.times[order], start, path, keep)
+            messages += [message] if message else []
+        return self._trajectory(found, tests, messages)
+
+    @cached_property
+    def _departure(self) -> tuple[float, list[Array], str]:
+        """Where the sweep starts: the time, what is predicted from, and why it cannot be reached if it cannot."""
+        lanes, path, start, message = self._lanes, self.path, 0.0, ""
+        lanes.accept_by({"tolerance": CLOSED, "consistent": CONSISTENT})
+        if not path.from_design:
+            way = path.lead_in()
+            start = float(path.times[0])
+            message = self._follow(np.array([0.0, 1.0]), 0.0, way, lambda *_: None)
+            message = f"on the way to the first sample: {message}" if message else ""
+        lanes.attempt(np.array([start]), path)  # the rates of the path where the mechanism stands
+        lanes.carry(0)
+        return start, lanes.anchor, message
+
+    def _follow(self, times: Array, here: float, path: Path, keep: Any) -> str:
+        """Follow the samples outwards; empty, or why they end."""
+        lanes, at, rounds = self._lanes, 0, 0
+        while at < len(times):
+            ahead = times[at : at + lanes.lanes]
+            good = lanes.attempt(ahead, path) > 0.0
+            accepted = len(ahead) if good.all() else int(good.argmin())
+            if accepted:
+                keep(at, accepted)
+                lanes.carry(accepted - 1)
+                here, at, rounds = float(ahead[accepted - 1]), at + accepted, 0
+                continue
+            rounds += 1
+            parts: Array = here + (times[at] - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
+            good = np.flatnonzero(lanes.attempt(parts, path) > 0.0)
+            if not len(good) or rounds > MAX_ROUNDS:
+                return self._end(here, float(times[at]), path)
+            lanes.carry(int(good[0]))
+            here = float(parts[good[0]])
+        return ""
+
+    def _end(self, here: float, wanted: float, path: Path) -> str:
+        lane = HALVINGS - 1
+        closure, pivot = self._lanes.each("closure")[:, lane], self._lanes.each("pivot")[:, lane]
+        worst = int(np.nan_to_num(closure, nan=np.inf).argmax())
+        order = [part for kind in self.cascade.kinds for part in kind.members]
+        bodies = ", ".join(self.cascade.parts[order[worst]].bodies)
+        return (
+            f"cannot be followed beyond {path.where(here)} (wanted {path.where(wanted)}): the component of {bodies} is left with "
+            f"residual {closure[worst]:.3g} of its size, smallest pivot {np.nanmin(pivot):.3g} (zero at a lock-up or dead centre); "
+            "shorten the sweep or drive another coordinate"
+        )
+
+    def _trajectory(self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]) -> Trajectory:
+        request, solved = self.cascade.request, ~np.isnan(tests["closure"])
+        order, unit = request.order + 1, self.cascade.unit
+
+        def motion(name: str) -> PointMotion:
+            series = [found[f"{label} {name}"] for label in POINT[:order]]
+            return PointMotion(*series, *[None] * (3 - len(series)))
+
+        def body(name: str) -> BodyMotion:
+            v, a = (np.hstack([found[f"{label} {name}"] for label in pair]) for pair in (("rdot", "omega"), ("rddot", "omega_t")))
+            return BodyMotion(found[f"r {name}"], found[f"p {name}"], v if order > 1 else None, a if order > 2 else None)
+
+        sizes = {f"{len(kind.members)} components": kind.model.sizes for kind in self.cascade.kinds}
+        return Trajectory(
+            points={name: motion(name) for name in request.points},
+            solved=solved,
+            iterations=np.where(solved, tests["iterations"], 0.0).astype(np.int64),
+            residual=float(tests["closure"][solved].max(initial=0.0)) * unit,
+            message="; ".join(messages),
+            details={
+                "components": len(self.cascade.parts),
+                "largest_component": self.cascade.largest,
+                "programs": sizes,
+                "redundant_residual": float(tests["leftover"][solved].max(initial=0.0)) * unit,
+                "smallest_pivot": float(tests["pivot"][solved].min(initial=1.0)),
+            },
+            bodies={name: body(name) for name in request.bodies},
+        )
