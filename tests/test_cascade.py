@@ -1,0 +1,96 @@
+"""Components solved one after the other: the same motions as all at once, whatever the mechanism, and programs are shared."""
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import Gear, JointAngle, SolveError
+from kincheck.core.analysis.cascade import Cascade
+from kincheck.core.analysis.cascade_sweep import CascadeSweep
+from kincheck.core.analysis.march import Route
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.programs import Request
+from kincheck.core.analysis.solve import follow
+from kincheck.core.motions import Path, Ramp
+
+from .mechanisms import four_bar, mcpherson, slider_crank
+from .test_chain import LEAN, chain
+
+
+def both(mechanism, path, points, *, compiled=True):
+    bodies = tuple(body.name for body in mechanism.moving)
+    request = Request(tuple(path.motions), points, bodies, compiled=compiled)
+    cascade = CascadeSweep(Cascade(mechanism, request), path)
+    return cascade.solve(1e-12), follow(Route(compile_model(mechanism, request), path), 1e-12)
+
+
+def assert_alike(found, expected):
+    assert found.solved.all(), found.message
+    assert expected.solved.all()
+    for name, motion in expected.bodies.items():
+        # two orders of elimination: round-off of one times the condition, once more for each derivative (library: below 100)
+        for label, limit in (("r", 1e-14), ("p", 1e-14), ("v", 1e-13), ("a", 3e-12)):
+            assert np.abs(getattr(found.bodies[name], label) - getattr(motion, label)).max() <= limit
+    for name, motion in expected.points.items():
+        assert np.abs(found.points[name].acceleration - motion.acceleration).max() <= 3e-12
+
+
+# the redundant, the open loop of several, several drivers, a sweep that does not start at the design
+@pytest.mark.parametrize("name", ["andrews_squeezer", "mcpherson_steered", "four_bar", "rssr", "delta_robot", "bricard"])
+def test_components_give_what_one_program_gives(name):
+    case = cases.load(name)
+    assert_alike(*both(case.mechanism, case.sweep.path, case.points))
+
+
+def test_numpy_runs_components_too():
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-1.0, 1.0, 9))
+    assert_alike(*both(chain(3), path, ("end",), compiled=False))
+
+
+@pytest.mark.parametrize(
+    "times", [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 70)[::-1], np.zeros(1)], ids=["far", "back", "one"]
+)
+def test_any_samples(times):
+    for mechanism, driver in ((slider_crank(), "turn"), (four_bar(), "turn")):
+        points = tuple(point.name for point in mechanism.points)
+        assert_alike(*both(mechanism, Path({driver: Ramp(2.0)}, times), points))
+
+
+def test_components_built_alike_share_a_program():
+    cascade = Cascade(chain(40), Request(("turn",), ("end",)))
+    assert len(cascade.parts) == 41
+    assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]  # the crank, the one with the point, all others
+    assert cascade.largest == 12
+
+
+def test_a_chain_of_two_hundred_loops_closes_to_round_off():
+    loops = 200
+    turn = np.linspace(-0.3, 0.3, 33)
+    found = CascadeSweep(Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    assert found.solved.all(), found.message
+    assert found.residual <= 1e-15
+    # the end is two hundred metres away: its coordinates round at 1.4e-14 m
+    expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    assert np.abs(found.points["end"].position - expected).max() <= 3e-14
+
+
+def test_an_end_of_the_travel_is_told_with_the_component():
+    mechanism = mcpherson()
+    values = np.linspace(0.0, 0.4, 41)
+    sweep = CascadeSweep(Cascade(mechanism, Request(("stroke",), ("wheel",))), Path({"stroke": Ramp(1.0)}, values))
+    found = sweep.solve(1e-12)
+    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
+    assert np.isnan(found.points["wheel"].position[~found.solved]).all()
+    assert "cannot be followed beyond stroke = 0.293" in found.message
+    assert "knuckle" in found.message
+    assert np.array_equal(sweep.solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True)
+
+
+def test_what_it_cannot_take_apart_is_refused():
+    m = chain(2)
+    coupled = type(m)(m.name, m.bodies, m.joints, m.points, m.drivers, [Gear("gear", ("pivot0", "pivot1"), ratio=1.0)])
+    with pytest.raises(SolveError, match="couplers"):
+        Cascade(coupled, Request(("turn",), ()))
+    free = type(m)(m.name, m.bodies, m.joints, m.points, [])
+    with pytest.raises(SolveError, match="not driven enough"):
+        Cascade(free, Request((), ()))
+    assert isinstance(m.drivers[0], JointAngle)
