@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, solve
-from kincheck.core.harness.case import Case, Sweep, Truth
+from kincheck.core.harness.case import MARKER, Case, Sweep, Truth
 from kincheck.core.harness.record import Outcome, Results, Scene, SceneBody, from_json, to_json
 from kincheck.core.harness.reporting.axis import Axis, driver_axis
 from kincheck.core.harness.reporting.drawing import Drawing, drawing
@@ -79,6 +79,14 @@ def star(count: int) -> Scene:
         for k in range(count)
     ]
     return msgspec.convert({"bodies": [msgspec.to_builtins(body)], "joints": [], "points": points}, Scene)
+
+
+def test_points_that_only_show_how_a_body_turns_are_no_hardpoints():
+    shown = scene(cases.load("mcpherson_suspension"), poses=False)
+    names = [point.name for point in shown.points]
+    assert "wheel_center" in names
+    assert not [name for name in names if name.startswith(MARKER)]
+    assert "strut_top" in {text for *_, text in drawing(shown, AXIS).labels}  # a joint and a point of one name, said once
 
 
 @pytest.mark.parametrize(("count", "nodes", "links"), [(1, 2, 1), (2, 2, 1), (4, 4, 6), (7, 8, 7)])

@@ -16,7 +16,7 @@ from ..errors import KincheckError
 from ..joints import Joint, Kind
 from ..mechanism import Vector
 from ..trajectory import Array, BodyMotion
-from .case import Case
+from .case import MARKER, Case
 from .record import Record, Results, Scene, SceneBody, SceneJoint, ScenePoint
 from .run import NATIVE
 
@@ -84,6 +84,7 @@ def scene(case: Case, *, poses: bool = True) -> Scene:
         points=[
             ScenePoint(name=point.name, body=point.body, position=list(point.position), output=point.name in case.points)
             for point in mechanism.points
+            if not point.name.startswith(MARKER)
         ],
         frames=frames,
         message=message,

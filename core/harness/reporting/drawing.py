@@ -129,7 +129,8 @@ class _Draughtsman:
         """A label; what has the same place shares one."""
         for k, (*place, said) in enumerate(self.drawn.labels):
             if place == [a, b]:
-                self.drawn.labels[k] = (a, b, f"{said} · {text}")
+                if text not in said.split(" · "):
+                    self.drawn.labels[k] = (a, b, f"{said} · {text}")
                 return
         self.drawn.labels.append((a, b, text))
 
