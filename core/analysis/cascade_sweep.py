@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SolveError
 from ..motions import Path
@@ -57,7 +58,7 @@ class CascadeSweep:
         for side in (path.times >= start, path.times < start) if not messages else ():
             order = np.flatnonzero(side)[np.argsort(np.abs(path.times[side] - start), kind="stable")]
 
-            def keep(first: int, count: int, order: Array = order) -> None:
+            def keep(first: int, count: int, order: NDArray[np.intp] = order) -> None:
                 at = order[first : first + count]
                 for name, rows in self._outputs.items():
                     found[name][at] = lanes.world[rows, :count].T
@@ -78,13 +79,13 @@ class CascadeSweep:
         if not path.from_design:
             way = path.lead_in()
             start = float(path.times[0])
-            message = self._follow(np.array([0.0, 1.0]), 0.0, way, lambda *_: None)
+            message = self._follow(np.array([0.0, 1.0]), 0.0, way, _nothing)
             message = f"on the way to the first sample: {message}" if message else ""
         lanes.attempt(np.array([start]), path)  # the rates of the path where the mechanism stands
         lanes.carry(0)
         return start, lanes.anchor, message
 
-    def _follow(self, times: Array, here: float, path: Path, keep: Any) -> str:
+    def _follow(self, times: Array, here: float, path: Path, keep: Callable[[int, int], None]) -> str:
         """Follow the samples outwards; empty, or why they end."""
         lanes, at, rounds = self._lanes, 0, 0
         while at < len(times):
@@ -145,3 +146,7 @@ class CascadeSweep:
             },
             bodies={name: body(name) for name in request.bodies},
         )
+
+
+def _nothing(first: int, count: int) -> None:
+    """Keep none of the samples."""

@@ -193,7 +193,8 @@ def part(plan: Plan, width: int) -> str:
     for row, slot in enumerate(plan.kept):
         place = keep.number("%world", keep.sum(keep.product("%room", keep.sum("%base", row)), "%first"))
         keep.lines.append(f"store {vector} {keep.read(slot)}, ptr {place}, align 8")
-    return f"""define void @part(ptr %memory, i64 %groups, ptr %fixed, ptr %samples, i64 %room, ptr %taken, ptr %world, i64 %base) {{
+    inputs = "ptr %memory, i64 %groups, ptr %fixed, ptr %samples, i64 %room"
+    return f"""define void @part({inputs}, ptr %taken, ptr %world, i64 %base) {{
 entry:
   br label %group
 group:
