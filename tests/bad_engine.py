@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -27,6 +28,8 @@ class Weird(Exception):
 
 def deaf(case):
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    if told := os.environ.get("KINCHECK_TEST_DEAF"):  # a file, for who waits for it to be so
+        Path(told).touch()
     while True:
         time.sleep(0.01)
 

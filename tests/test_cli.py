@@ -34,6 +34,7 @@ def kincheck_main(monkeypatch):
     def main(*argv, engines=(RIGHT,), cases=None, jobs="0"):
         cases = {"crank": crank(), "crank_two": crank("crank_two")} if cases is None else cases
         by_name = {engine.name: engine for engine in engines}
+        monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
         monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
         monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
         monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, RIGHT))

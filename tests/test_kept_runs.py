@@ -33,7 +33,7 @@ def kincheck(*arguments, limit=None, **environment):
     restrict = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit})); " if limit else ""
     command = [sys.executable, "-c", f"{restrict}import sys; from tests.drill import main; sys.exit(main())", *map(str, arguments)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, cwd=ROOT, env={**os.environ, **environment}, **pipes)
+    return subprocess.Popen(command, cwd=ROOT, env={**os.environ, "KINCHECK_HISTORY": "", **environment}, **pipes)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="limits the size of files as POSIX does")
@@ -76,7 +76,7 @@ def test_a_run_killed_at_any_moment_is_resumed_to_the_same_records(tmp_path):
     """The moments are drawn over the whole of a run and its ways in and out; one run in three is killed twice."""
     arguments = ["run", "--jobs", "2", "--history"]
     begin = time.monotonic()
-    undisturbed = kincheck(*arguments, tmp_path / "undisturbed.sqlite", KINCHECK_HISTORY="")
+    undisturbed = kincheck(*arguments, tmp_path / "undisturbed.sqlite")
     undisturbed.communicate()
     lasted = time.monotonic() - begin
     with Store(tmp_path / "undisturbed.sqlite") as store:

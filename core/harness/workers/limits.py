@@ -6,12 +6,12 @@ import os
 import sys
 from dataclasses import dataclass
 
-# A pair of the built-in cases takes a second, a simulator that is loaded from a cold disk a few, and the largest mechanism that
-# is solved by hand-written loops a minute. Five of those are no answer, and ten hung pairs are still over before breakfast.
+# The slowest pair of the built-in cases takes 3 s. A hundred times that leaves room for a large mechanism on a busy machine, and
+# ten pairs that hang are still over within the hour.
 TIMEOUT = 300.0
 
-# A simulator with its libraries takes 0.1 to 0.2 GB, a large mechanism with all samples as much again. Ten times that is a leak
-# or a wrong size, and a usual machine has it to spare.
+# A simulator that has solved all built-in cases may write to 0.15 to 0.25 GB, as the data limit counts. Sixteen times that is a
+# leak or a wrong size, and most machines have it to spare.
 MEMORY = 4.0
 
 # For an interpreter to start and load numpy on a machine that is busy with other things [s]; it takes a third of a second.
