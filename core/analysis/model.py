@@ -90,6 +90,7 @@ class Model:
             kept=[*kept, *(self.slots[name] for name in TESTS)],
             fixed=[*(target for _, target in carried), *self.geometry, *tracer.prepared.slots],
             taken=[slot for name in self.given for slot in self.vectors[name]],
+            loops=("part",) if self.request.state else ("follow", "fan") if self.request.varied else ("follow",),
             tolerance=LAST_ITERATION,
             most=MAX_ITERATIONS,
         )

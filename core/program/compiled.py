@@ -47,18 +47,18 @@ def vector_width() -> int:
     return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 
 
-def load(text: str, signatures: Mapping[str, str]) -> tuple[Any, dict[str, Callable[..., int]]]:
-    """Compile, or fetch from the cache, and load; (what owns the code, the functions by name).
+def load(content: str, text: Callable[[], str], signatures: Mapping[str, str]) -> tuple[Any, dict[str, Callable[..., int]]]:
+    """Compile the text, or fetch from the cache what the content meant before; (what owns the code, the functions by name).
 
     A signature has a letter for each argument: p for an address, i for a whole number; all return a whole number, or nothing of
     sense. The functions release Python's lock while they run.
     """
     llvm = _llvm()
     machine, identity = _target()
-    entry = _folder() / hashlib.sha256(f"{identity}\n{text}".encode()).hexdigest()
+    entry = _folder() / hashlib.sha256(f"{identity}\n{content}".encode()).hexdigest()
     code = _read(entry)
     if code is None:
-        module = llvm.parse_assembly(text)
+        module = llvm.parse_assembly(text())
         code = machine.emit_object(module)
         _write(entry, code)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())

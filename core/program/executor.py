@@ -34,6 +34,7 @@ class Plan:
         kept: slots that are stored of every sample.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
         taken: slots that a part takes from what was solved before it.
+        loops: methods of the executor that are used besides `run` and `attempt`: "follow", "fan" or "part".
         tolerance: of the residual before an iteration; that iteration is the last.
         most: iterations at most.
     """
@@ -47,6 +48,7 @@ class Plan:
     kept: Sequence[int] = ()
     fixed: Sequence[int] = ()
     taken: Sequence[int] = ()
+    loops: Sequence[str] = ()
     tolerance: float = 0.0
     most: int = 0
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -14,21 +15,34 @@ from . import compiled, llvm_code, llvm_loops
 from .executor import Plan
 
 
+LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], str]] = {
+    "follow": (llvm_loops.follow, "pppiipiii"),
+    "fan": (llvm_loops.fan, "pipiipiiii"),
+    "part": (llvm_loops.part, "pippippi"),
+}
+"""Loop -> what writes it, and the kinds of its arguments (see `compiled.load`)."""
+
+
 class LlvmCode:
     """A plan compiled for this processor. Raises ImportError where llvmlite is missing."""
 
     def __init__(self, plan: Plan) -> None:
         self.width, self.slots = compiled.vector_width(), len(plan.slots)
-        self.sampled, self.kept = len(plan.sampled), len(plan.kept)
+        signatures = {f"run_{name}": "pi" for name in plan.programs} | {loop: LOOPS[loop][1] for loop in plan.loops}
+        if plan.after:
+            signatures["attempt"] = "pi"
+        # what determines the text; writing that takes longer than loading the code it means
+        content = [plan, self.width, *(inspect.getsource(each) for each in (llvm_code, llvm_loops))]
+        self._owner, self.functions = compiled.load(repr(content), lambda: self._text(plan), signatures)
+
+    def _text(self, plan: Plan) -> str:
         width = self.width
         text = [llvm_code.function(program, width) for program in plan.programs.values()]
         text += [llvm_loops.over_groups(f"run_{name}", [name], self.slots, width) for name in plan.programs]
-        signatures = {f"run_{name}": "pi" for name in plan.programs}
-        if plan.after:  # a plan that is only run has no loops
+        if plan.after:  # a plan that is only run makes no attempt
             text += [llvm_loops.settle(plan, width), llvm_loops.over_groups("attempt", ["settle", "alone"], self.slots, width)]
-            text += [llvm_loops.follow(plan, width), llvm_loops.fan(plan, width), llvm_loops.part(plan, width)]
-            signatures |= {"attempt": "pi", "follow": "pppiipiii", "fan": "pipiipiiii", "part": "pippippi"}
-        self._owner, self.functions = compiled.load("\n".join([*text, llvm_code.declarations(width)]), signatures)
+        text += [LOOPS[loop][0](plan, width) for loop in plan.loops]
+        return "\n".join([*text, llvm_code.declarations(width)])
 
 
 class LlvmExecutor:
