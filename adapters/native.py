@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..core.analysis.march import Route
-from ..core.analysis.model import LAST_ITERATION, compile_model
-from ..core.analysis.programs import Request
+from ..core.analysis.model import compile_model
+from ..core.analysis.programs import LAST_ITERATION, Request
 from ..core.analysis.solve import follow
 from ..core.harness.case import Case
 from ..core.program.compiled import available
 from ..core.trajectory import Trajectory
 
+# Residuals from which Newton's last step starts, by effort: what that step leaves is about its square.
+EFFORTS: Mapping[str, float] = {
+    "1 Newton step": math.inf,
+    "last step from below 1e-4": 1e-4,
+    "last step from below 1e-6": 1e-6,
+    "until converged": LAST_ITERATION,
+}
 
+
+@dataclass(frozen=True)
 class Native:
-    """Geometric constraints in global axes, traced, run over lanes of samples by machine code, or by numpy without llvmlite."""
+    """Geometric constraints in global axes, traced, run over lanes of samples by machine code, or by numpy without llvmlite.
 
+    Attributes:
+        last_iteration: the step that starts from a residual below this is a sample's last [units of the mechanism's size]; above
+            the default, what it leaves is accepted whatever it is.
+    """
+
+    last_iteration: float = LAST_ITERATION
     name = "native"
     mode = "projection"
 
@@ -30,7 +47,8 @@ class Native:
     def settings(self) -> Mapping[str, Any]:
         """Formulation, executor and how the loop ends."""
         executor = "llvm, vectors of lanes" if available() else "numpy, one call an operation over all lanes"
-        return {"row_style": "native (global axes)", "executor": executor, "last_iteration_below": LAST_ITERATION}
+        last = self.last_iteration if math.isfinite(self.last_iteration) else "any"
+        return {"row_style": "native (global axes)", "executor": executor, "last_iteration_below": last}
 
     def version(self) -> str | None:
         """Version of kincheck."""
@@ -46,15 +64,16 @@ class Native:
     def build(self, case: Case) -> Route:
         """Select the rows, trace the programs for the points that the outputs read, and lay out the samples."""
         path = case.sweep.path
-        return Route(compile_model(case.mechanism, Request(tuple(path.motions), case.points)), path)
+        request = Request(tuple(path.motions), case.points, last_iteration=self.last_iteration)
+        return Route(compile_model(case.mechanism, request), path)
 
     def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""
-        return follow(model, tol)
+        return follow(model, tol if self.last_iteration <= LAST_ITERATION else math.inf)
 
     def efforts(self) -> Mapping[str, Native]:
-        """One: its iteration ends by itself, and what a coarser end would save is less than a microsecond."""
-        return {"until converged": self}
+        """By how near to the solution Newton's last step starts; the predictor is the same."""
+        return {label: Native(last) for label, last in EFFORTS.items()}
 
     def floor(self, case: Case) -> None:
         """None: its loop is compiled."""

@@ -1,6 +1,7 @@
 """kincheck.core: describe a mechanism, solve it, compare engines."""
 
 from .analysis.assemble import assemble
+from .analysis.designs import solve_designs
 from .analysis.solve import solve
 from .drivers import JointAngle, JointDisplacement, PointCoordinate
 from .errors import CaseError, KincheckError, MechanismError, SolveError
@@ -64,4 +65,5 @@ __all__ = [
     "Universal",
     "assemble",
     "solve",
+    "solve_designs",
 ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 
 from .drivers import JointDriver
 from .joints import Joint
@@ -37,20 +39,37 @@ def spanning_tree(mechanism: Mechanism) -> SpanningTree:
     """
     named = {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
     named |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
-    placed = {GROUND} | {body.name for body in mechanism.bodies if body.fixed}
-    waiting = {body.name: None for body in mechanism.moving}  # a dict keeps the order
     candidates = [joint for joint in mechanism.joints if joint.rows >= 3]
+    ranks = [(joint.name not in named, -joint.rows, k) for k, joint in enumerate(candidates)]  # the least is taken first
+    touching: dict[str, list[int]] = {}
+    for k, joint in enumerate(candidates):
+        for body in joint.bodies:
+            touching.setdefault(body, []).append(k)
+    placed = {GROUND} | {body.name for body in mechanism.bodies if body.fixed}
+    # a heap of the joints with one end placed, and some with both; a search through all joints for every body is quadratic
+    reaching = [ranks[k] for body in placed for k in touching.get(body, ())]
+    heapify(reaching)
+    waiting, count = iter(mechanism.moving), len(mechanism.moving)
     branches: list[Branch] = []
     used: set[str] = set()
-    while waiting:
-        reaching = [joint for joint in candidates if (joint.i in placed) != (joint.j in placed)]
-        if reaching:
-            joint = max(reaching, key=lambda each: (each.name in named, each.rows))
+    while len(branches) < count:
+        joint = _next(reaching, candidates, placed)
+        if joint is not None:
             parent, child = joint.bodies if joint.i in placed else (joint.j, joint.i)
             used.add(joint.name)
         else:
-            joint, parent, child = None, GROUND, next(iter(waiting))
+            parent, child = GROUND, next(body.name for body in waiting if body.name not in placed)
         placed.add(child)
-        del waiting[child]
+        for k in touching.get(child, ()):
+            heappush(reaching, ranks[k])
         branches.append(Branch(GROUND if mechanism.is_fixed(parent) else parent, child, joint))
     return SpanningTree(tuple(branches), tuple(joint for joint in mechanism.joints if joint.name not in used))
+
+
+def _next(reaching: list[tuple[bool, int, int]], candidates: Sequence[Joint], placed: Collection[str]) -> Joint | None:
+    """The first joint of the heap that leads from a placed body to another."""
+    while reaching:
+        joint = candidates[heappop(reaching)[-1]]
+        if joint.i not in placed or joint.j not in placed:
+            return joint
+    return None

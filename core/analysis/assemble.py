@@ -3,6 +3,10 @@
 The mixed rows are used, because their only zero is the intended one of every joint: simplified rows lead from any misalignment
 back to it, where exact rows end on spurious branches (formulation sections 3 and 4). They do not choose between the legitimate
 assemblies of a loop; the estimate does.
+
+Each step is a damped one, (J^T J + mu I) s = -J^T phi with mu proportional to |phi|^2: far away, where the Jacobian may be singular
+and says little, it is short; near the solution it is Newton's. Undamped steps of the strut, bodies perturbed by 0.8 rad and 0.08 m,
+reach the intended assembly from 89 % of the estimates, damped ones from all, and from 79 % (21 %) with 1 m of offset.
 """
 
 from __future__ import annotations
@@ -13,20 +17,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import ZERO, Quat, vec
-from ..drivers import JointAngle
-from ..joints import AxialJoint
-from ..joints.base import unit
 from ..mechanism import Mechanism
-from ..primitives.base import GROUND_POSE, Pose
-from ..program import NumpyExecutor, Plan
+from ..primitives.base import Pose
+from ..program import NumpyExecutor, Plan, Program, program
 from ..trajectory import Array, BodyMotion
 from .equations import Style
+from .march import CONSISTENT
+from .poses import displaced, state_of
 from .programs import Request, Tracer
 
 # Longer steps than this [rad] leave the range in which rows computed at one pose say anything of another.
 LONGEST_TURN = 0.3
 MAX_ITERATIONS = 100
+# mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies far, more takes twice the steps.
+DAMPING = 0.1
+# Below this residual the redundant rows have done their work, which is to lead there; Newton's own steps end it, as in a sweep.
+NEAR = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +42,14 @@ class Assembled:
     Attributes:
         bodies: poses of the moving bodies; those that did not converge are NaN.
         converged: whether each estimate ended in an assembly, on the intended branch of every joint, shape (n,).
+        spurious: whether it ended where the rows are zero and yet no assembly is: axes turned over, or redundant rows contradicted.
         residual: largest constraint residual, relative to the mechanism's size, shape (n,).
         iterations: shape (n,).
     """
 
     bodies: Mapping[str, BodyMotion]
     converged: NDArray[np.bool_]
+    spurious: NDArray[np.bool_]
     residual: Array
     iterations: NDArray[np.int64]
 
@@ -58,6 +66,7 @@ def assemble(
 
     Args:
         estimates: by body, origin r [m], shape (n, 3), and Euler parameters p [-], shape (n, 4); bodies left out start at design.
+            Where their poses are not known at all, `find_assemblies` tries many.
         values: of the drivers, from their design values [m or rad]; those left out hold theirs.
         tol: largest accepted residual, relative to the mechanism's size.
         style: how the rows are written; "mixed" leads to the intended branch from farthest.
@@ -65,65 +74,83 @@ def assemble(
     Raises:
         SolveError: drivers and degrees of freedom do not match.
     """
-    moving = tuple(body.name for body in mechanism.moving)
-    request = Request(tuple(values or {}), (), moving, order=0, style=Style(style))
-    tracer = Tracer(mechanism, request)
-    programs = {each.name: each for each in (tracer.newton(longest_turn=LONGEST_TURN), tracer.outputs())}
-    slots, vectors = tracer.layout.slots, tracer.layout.vectors
-    n = len(next(iter(estimates.values()))[0])
-    executor = NumpyExecutor(Plan(programs, slots), n)
-    for name, value in _state(tracer, estimates, values or {}).items():
-        executor.put(vectors[name], value)
-    for name, value in (values or {}).items():
-        angle = mechanism.driver(name).type == "joint_angle"
-        c = value if angle else value / tracer.frame.unit
-        drive = np.array([[c], [0.0], [0.0], [np.cos(0.5 * value)], [np.sin(0.5 * value)]])
-        executor.put(vectors[f"drive {name}"], drive)
-    iterations, done = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
-    for _ in range(MAX_ITERATIONS):
-        executor.run("newton")
-        iterations += ~done
-        (residual,) = executor.get([slots["residual"]])
-        done |= residual < tol
-        if (done | ~np.isfinite(residual)).all():
-            break
-    executor.run("outputs")
-    block = executor.get(range(len(slots)))
-    converged = done & (block[slots["closure"]] <= tol) & (block[slots["branch"]] > 0.0)
-    found = np.where(converged, block, np.nan)
-    bodies = {name: BodyMotion(found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None) for name in moving}
-    return Assembled(bodies, converged, block[slots["closure"]].copy(), iterations)
+    closing = Closing(mechanism, values or {}, style)
+    return closing.run(displaced(mechanism, closing.tracer.frame, estimates), len(next(iter(estimates.values()))[0]), tol)
 
 
-def _state(tracer: Tracer, estimates: Mapping[str, tuple[Array, Array]], values: Mapping[str, float]) -> dict[str, Array]:
-    """The state that the estimates mean, joint coordinates included, each of shape (components, n)."""
-    poses: dict[str, Pose] = {}
-    state = {name: np.array(value)[:, None] for name, value in tracer.formulation.design.items()}
-    for name, (r, p) in estimates.items():
-        body = tracer.mechanism.body(name)
-        e0, *e = p.T
-        d0, *d = body.euler_parameters
-        q = Quat(e0, vec(e)) * Quat(d0, vec(d)).conjugate()
-        arm = tracer.frame.arm(name, body.origin)
-        turned = Pose.of(ZERO, q)
-        shift = (np.asarray(r) - np.array(body.origin)).T / tracer.frame.unit
-        u = vec([*shift]) - turned.swing(arm)
-        poses[name] = Pose.of(u, q)
-        state[f"u {name}"], state[f"q {name}"] = np.array([*u]), np.array([*q])
-    angles = (driver for driver in tracer.mechanism.drivers if isinstance(driver, JointAngle))
-    driven = {driver.joint: values.get(driver.name, 0.0) for driver in angles}
-    for joint in tracer.mechanism.joints:
-        if not isinstance(joint, AxialJoint):
-            continue
-        i, j = (poses.get(body, GROUND_POSE) for body in joint.bodies)
-        h = unit(joint.axis)
-        relative = i.q.conjugate() * j.q
-        s_i, s_j = (tracer.frame.arm(body, joint.point) for body in joint.bodies)
-        apart = (j.u - i.u) + (j.swing(s_j) - i.swing(s_i))
-        angle: Array = 2.0 * np.arctan2(h @ relative.e, relative.e0)
-        # Euler parameters know an angle up to two turns: the one nearest to what the joint is driven to
-        angle = angle + 4.0 * np.pi * np.round((driven.get(joint.name, 0.0) - angle) / (4.0 * np.pi))
-        for freedom, value in (("rotation", angle), ("translation", i.turn(h) @ apart)):
-            if f"x {joint.name}.{freedom}" in state:
-                state[f"x {joint.name}.{freedom}"] = np.atleast_2d(value)
-    return state
+class Closing:
+    """The programs that close a mechanism at values of its drivers."""
+
+    def __init__(self, mechanism: Mechanism, values: Mapping[str, float], style: str = "mixed") -> None:
+        self.values, self.moving = values, tuple(body.name for body in mechanism.moving)
+        self.tracer = tracer = Tracer(mechanism, Request(tuple(values), (), self.moving, order=0, style=Style(style)))
+        self.kept, self.dropped = list(tracer.selection.kept), list(tracer.selection.dropped)
+        phi, rows = tracer.formulation.phi(tracer.at), tracer.formulation.rows(tracer.at)
+        slot, vector = tracer.layout.scalar, tracer.layout.vector
+        self._phi, self._step, self._turn = vector("phi", len(phi)), vector("step", tracer.unknowns), vector("turn", 3 * len(self.moving))
+        self._entries = np.array([(k, column) for k, row in enumerate(rows) for column in row])
+        self._rows = [slot(f"entry {k} {column}") for k, column in self._entries.tolist()]
+        entries = [x for row in rows for x in row.values()]
+        step = [tracer.tape.input(each) for each in self._step]
+        turns = [x for motion in tracer.formulation.motions(tracer.at, step).values() for x in motion.w]
+        after = tracer.formulation.retract(tracer.at, step)
+        state = {slot: x for name, value in after.items() for slot, x in zip(vector(name, len(value)), value, strict=True)}
+        self._programs: list[Program] = [
+            program("rows", tracer.tape, dict(zip([*self._phi, *self._rows], [*phi, *entries], strict=True))),
+            program("turns", tracer.tape, dict(zip(self._turn, turns, strict=True))),
+            program("retract", tracer.tape, state),
+            tracer.outputs(),
+        ]
+
+    def run(self, poses: Mapping[str, Pose], n: int, tol: float) -> Assembled:
+        """Close from n poses of each body, scalars of shape (n,); bodies left out start at design."""
+        slots, vectors, frame = self.tracer.layout.slots, self.tracer.layout.vectors, self.tracer.frame
+        executor = NumpyExecutor(Plan({each.name: each for each in self._programs}, slots), n)
+        mechanism = self.tracer.mechanism
+        for name, value in state_of(self.tracer.formulation, mechanism, frame, poses, self.values).items():
+            executor.put(vectors[name], np.array([np.broadcast_to(x, (n,)) for x in value]))
+        for name, value in self.values.items():
+            c = value if mechanism.driver(name).type == "joint_angle" else value / frame.unit
+            executor.put(vectors[f"drive {name}"], np.array([[c], [0.0], [0.0], [np.cos(0.5 * value)], [np.sin(0.5 * value)]]))
+        iterations, done = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+        for _ in range(MAX_ITERATIONS):
+            executor.run("rows")
+            phi = executor.get(self._phi).T
+            active = np.flatnonzero(~done & np.isfinite(phi).all(axis=1))
+            if not len(active):
+                break
+            iterations[active] += 1
+            done |= np.abs(phi[:, self.kept]).max(axis=1) < tol  # and this step, still taken, makes it round-off
+            matrix = np.zeros((len(active), phi.shape[1], self.tracer.unknowns))
+            matrix[:, self._entries[:, 0], self._entries[:, 1]] = executor.get(self._rows).T[active]
+            step = np.zeros((n, self.tracer.unknowns))
+            step[active] = self._steps(phi[active], matrix)
+            executor.put(self._step, step.T)
+            executor.run("turns")
+            turn = np.abs(executor.get(self._turn)).max(axis=0)
+            executor.put(self._step, (np.minimum(1.0, LONGEST_TURN / np.maximum(turn, LONGEST_TURN))[:, None] * step).T)
+            executor.run("retract")
+        executor.run("outputs")
+        block = executor.get(range(len(slots)))
+        closes = done & (block[slots["closure"]] <= tol)
+        sound = (block[slots["branch"]] > 0.0) & (block[slots["leftover"]] <= max(CONSISTENT, tol))
+        found = np.where(closes & sound, block, np.nan)
+        bodies = {name: BodyMotion(found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None) for name in self.moving}
+        return Assembled(bodies, closes & sound, closes & ~sound, block[slots["closure"]].copy(), iterations)
+
+    def _steps(self, phi: Array, matrix: Array) -> Array:
+        """Steps of lanes, shape (n, unknowns), from their residuals, shape (n, rows), and Jacobians."""
+        step = np.empty((len(phi), matrix.shape[2]))
+        near = np.abs(phi).max(axis=1) < NEAR
+        far, identity = ~near, np.eye(matrix.shape[2])
+        if far.any():
+            J, f = matrix[far], phi[far]
+            damped = J.swapaxes(1, 2) @ J + (DAMPING * (f * f).sum(axis=1))[:, None, None] * identity
+            step[far] = -np.linalg.solve(damped, J.swapaxes(1, 2) @ f[:, :, None])[:, :, 0]
+        if near.any():  # normal equations would square the condition; a damping at round-off keeps R regular at singular poses
+            J, f = matrix[near][:, self.kept], phi[near][:, self.kept]
+            floor = np.broadcast_to(np.finfo(np.float64).eps * identity, (len(J), *identity.shape))
+            Q, R = np.linalg.qr(np.concatenate([J, floor], axis=1))
+            rotated = Q[:, : J.shape[1]].swapaxes(1, 2) @ f[:, :, None]
+            step[near] = -np.linalg.solve(R, rotated)[:, :, 0]
+        return step

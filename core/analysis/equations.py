@@ -68,11 +68,14 @@ def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
         extent = max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=1.0)
         length_unit = 2.0 ** round(math.log2(extent)) if extent > 0.0 else 1.0
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
+    touching: dict[str, list[Joint]] = {}
+    for joint in mechanism.joints:
+        for body in joint.bodies:
+            touching.setdefault(body, []).append(joint)
     for branch in spanning_tree(mechanism).branches:
         at = joint_points(branch.joint) if branch.joint is not None else []
         if not at:  # a free body, or a joint without a point: the first point any joint has on it
-            touching = (joint for joint in mechanism.joints if branch.child in joint.bodies)
-            at = [q for joint in touching for q in joint_points(joint, branch.child)]
+            at = [q for joint in touching.get(branch.child, ()) for q in joint_points(joint, branch.child)]
         position = at[0] if at else mechanism.body(branch.child).origin
         origins[branch.child] = (1.0 / length_unit) * vec(position)
     return Frames(length_unit, origins, tuple(body.name for body in mechanism.moving))
@@ -113,7 +116,7 @@ def constraints(
         found += [Constraint(body.name, p.Ground(), GROUND, body.name) for body in mechanism.bodies if body.fixed]
     for original in mechanism.joints:
         if isinstance(original, AxialJoint):
-            found += _axial(original, frame, coupled, mixed)
+            found += _axial(original, frame, coupled, mixed=mixed, fixed_last=mechanism.is_fixed(original.j))
             continue
         # the ground as body i: its rows are constant and the simplified ones need nothing of body j
         joint = original.reversed() if original.symmetric and mechanism.is_fixed(original.j) else original
@@ -127,11 +130,12 @@ def constraints(
     return _restyled(found, style)
 
 
-def _axial(original: AxialJoint, frame: Frames, coupled: Collection[str], mixed: bool) -> list[Constraint | Relation]:
+def _axial(
+    original: AxialJoint, frame: Frames, coupled: Collection[str], *, mixed: bool, fixed_last: bool
+) -> list[Constraint | Relation]:
     """An axial joint; its coordinates are named where they are coupled, related to each other, or the style names all."""
     related = {f"{original.name}.{freedom}" for relation in original.relations for freedom in relation}
-    named = [f for f in original.freedoms if mixed or f"{original.name}.{f}" in {*coupled, *related}]
-    fixed_last = original.j not in frame.moving
+    named = [f for f in original.freedoms if mixed or (name := f"{original.name}.{f}") in coupled or name in related]
     # the ground as body i: its rows are constant; but a named coordinate is that of body j relative to body i, in this order
     joint = original.reversed() if fixed_last and not named else original
     i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])

@@ -17,8 +17,6 @@ from ..trajectory import Array
 from .components import Section
 from .programs import EARLIER, FROM, RATE, RATE_T, TIME, Request, Tracer
 
-# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
-LAST_ITERATION = 1e-9
 MAX_ITERATIONS = 12
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
@@ -91,7 +89,7 @@ class Model:
             fixed=[*(target for _, target in carried), *self.geometry, *tracer.prepared.slots],
             taken=[slot for name in self.given for slot in self.vectors[name]],
             loops=("part",) if self.request.state else ("follow", "fan") if self.request.varied else ("follow",),
-            tolerance=LAST_ITERATION,
+            tolerance=self.request.last_iteration,
             most=MAX_ITERATIONS,
         )
         compiled = self.request.compiled and available()

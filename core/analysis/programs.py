@@ -43,6 +43,10 @@ from .geometry import placed, places
 from .relative import Relative
 
 
+# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
+LAST_ITERATION = 1e-9
+
+
 @dataclass(frozen=True)
 class Request:
     """What a sweep is to give.
@@ -55,6 +59,7 @@ class Request:
         compiled: run by machine code where llvmlite is installed, else by numpy; the same results to round-off.
         state: keep the whole state of every sample, and its rates.
         varied: places of the geometry (see `places`) that are inputs of the programs; all others are constants in them.
+        last_iteration: of a sample, the one that starts from a residual below this [units of the mechanism's size].
     """
 
     drivers: tuple[str, ...]
@@ -65,6 +70,7 @@ class Request:
     compiled: bool = True
     state: bool = False
     varied: tuple[str, ...] = ()
+    last_iteration: float = LAST_ITERATION
 
 
 RATE, RATE_T = "rate", "rate_t"

@@ -54,6 +54,26 @@ def solve(
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
             argument makes no sense.
     """
+    path, request = asked(mechanism, driver, values, rate, points, bodies, order, style, motions)
+    return sweep(compile_model(mechanism, request), path, tol)
+
+
+def asked(
+    mechanism: Mechanism,
+    driver: str,
+    values: Sequence[float] | Array,
+    rate: float,
+    points: Sequence[str] | None,
+    bodies: Sequence[str],
+    order: int,
+    style: str,
+    motions: Mapping[str, Motion] | None,
+) -> tuple[Path, Request]:
+    """The path and the request that the arguments of `solve` mean.
+
+    Raises:
+        SolveError: an argument makes no sense.
+    """
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
     _require(order in (0, 1, 2), f"order is {order}, expected 0, 1 or 2")
     _require(math.isfinite(rate) and rate != 0.0, f"rate is {rate}, expected driver units per second other than 0; 1 serves")
@@ -69,8 +89,7 @@ def solve(
                 require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
             _require(name in there, f"there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
     path = Path({**(motions or {}), driver: Ramp(rate)}, np.asarray(values, dtype=np.float64) / rate)
-    model = compile_model(mechanism, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style)))
-    return sweep(model, path, tol)
+    return path, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style))
 
 
 def _require(holds: bool, otherwise: str) -> None:

@@ -12,8 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..motions import Path
+from ..program import Executor
 from ..trajectory import Array
 from .march import CONSISTENT, Route, march
+from .programs import FROM
+
+# Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
+# it is too long is solved again alone.
+LEAD = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +41,12 @@ class Variants:
 
 
 def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
-    """Solve all variants at all samples.
+    """Solve all variants at all samples. Drivers are measured from the design position of each variant.
+
+    A variant's numbers depend on its own geometry only, not on which others are solved with it.
 
     Args:
-        route: of a model with varied places, from the design position.
+        route: of a model with varied places.
         geometry: numbers of the varied places in their order, shape (numbers, V).
         tol: as for `solve`.
     """
@@ -46,6 +55,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     lanes[[model.slots[name] for name in ("tolerance", "consistent")]] = np.array([[tol], [max(CONSISTENT, tol)]])
     executor = model.executor(count)
     executor.put(range(len(lanes)), lanes)
+    arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
     model.start(executor, route.origin)
     start = executor.get(model.ahead)
     whole = np.empty((model.kept, n, executor.room))
@@ -54,6 +64,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         samples = np.ascontiguousarray(side.samples[:, : len(side.times)])
         executor.fan(samples, whole, side.first, side.step)
     kept = whole[:, :, :count]
+    kept[:, :, ~arrived] = np.nan
     solved = ~np.isnan(kept[model.rows["closure"].start])
     failed = np.flatnonzero(~solved.all(axis=0))
     messages: dict[int, str] = {}
@@ -62,7 +73,20 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
             continue
         found = march(replace(route, design=lanes[:, k]), tol)
-        kept[:, route.order, k], solved[route.order, k] = found.kept, found.solved
+        kept[:, :, k], solved[:, k] = found.kept[:, route.order], found.solved[route.order]
         if found.messages:
             messages[k] = "; ".join(found.messages)
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
+
+
+def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
+    """Take lanes from the design to the first sample; which of them arrived there."""
+    model, last = route.model, route.path.lead_in()
+    way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
+    model.start(executor, way.origin)
+    found = np.empty((model.kept, LEAD, executor.room))
+    (side,) = way.sides
+    executor.fan(np.ascontiguousarray(side.samples[:, :LEAD]), found, side.first, side.step)
+    for name in model.state:  # what the lanes were predicted from is where they stand
+        executor.put(model.vectors[name], executor.get(model.vectors[FROM + name]))
+    return ~np.isnan(found[model.rows["closure"].start, -1, :count])

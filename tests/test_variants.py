@@ -1,0 +1,140 @@
+"""Variants as lanes: the same as solving each variant alone, whatever the path, and whichever are solved beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.cases import load
+from kincheck.core import Ramp, Sine, SolveError, solve, solve_designs
+from kincheck.core.analysis.geometry import placed, places
+from kincheck.core.analysis.march import Route
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.programs import Request
+from kincheck.core.analysis.solve import follow
+from kincheck.core.analysis.variants import solve_variants
+from kincheck.core.motions import Path
+
+TOL = 1e-12
+# Two ways to the same pose: the variant's lanes and a model of its own differ in the order of operations, not in equations.
+SAME = 1e-13
+
+
+def strut():
+    case = load("mcpherson_strut")
+    return case.mechanism, tuple(name for name in places(case.mechanism) if "axis" not in name)
+
+
+def drawn(mechanism, varied, count, spread, seed=0):
+    nominal = np.array([x for name in varied for x in places(mechanism)[name]])
+    return nominal[:, None] + np.random.default_rng(seed).normal(size=(len(nominal), count)) * spread
+
+
+def variant(mechanism, varied, numbers):
+    values, at = {}, 0
+    for name in varied:
+        size = len(places(mechanism)[name])
+        values[name] = tuple(numbers[at : at + size])
+        at += size
+    return placed(mechanism, values)
+
+
+PATHS = {
+    "from design, both ways": Path({"stroke": Ramp(1.0)}, np.linspace(-0.06, 0.06, 13)),
+    "in no order": Path({"stroke": Ramp(1.0)}, np.array([0.02, -0.03, 0.0, 0.05, -0.01, 0.04])),
+    "one side": Path({"stroke": Ramp(2.0)}, np.linspace(0.01, 0.03, 5)),
+    "not through the design": Path({"stroke": Sine(0.04, 1.0, 0.7)}, np.linspace(0.1, 0.5, 9)),
+}
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("path", PATHS.values(), ids=PATHS)
+def test_a_lane_is_what_a_model_of_its_own_gives(path, compiled):
+    mechanism, varied = strut()
+    request = Request(("stroke",), ("wheel_center",), varied=varied, compiled=compiled)
+    model = compile_model(mechanism, request)
+    numbers = drawn(mechanism, varied, 11, 2e-3)
+    found = solve_variants(Route(model, path), numbers, TOL)
+    assert found.solved.all()
+    assert not found.messages
+    for k in (0, 7, 10):
+        own = compile_model(variant(mechanism, varied, numbers[:, k]), replace(request, varied=()))
+        alone = follow(Route(own, path), TOL).points["wheel_center"]
+        for label in ("position", "velocity", "acceleration"):
+            lanes = found.kept[model.rows[f"{label} wheel_center"], :, k].T
+            scale = max(1.0, np.abs(getattr(alone, label)).max())
+            np.testing.assert_allclose(lanes, getattr(alone, label), rtol=0, atol=SAME * scale)
+
+
+def test_a_lane_does_not_see_its_neighbours():
+    mechanism, varied = strut()
+    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), order=0, varied=varied))
+    route = Route(model, PATHS["from design, both ways"])
+    numbers = drawn(mechanism, varied, 40, 2e-3)
+    together = solve_variants(route, numbers, TOL).kept
+    for columns in (slice(3, 4), slice(17, 40), [5, 2, 31]):
+        apart = solve_variants(route, numbers[:, columns], TOL).kept
+        rows = slice(0, model.rows["iterations"].start)
+        np.testing.assert_array_equal(apart[rows], together[rows][:, :, columns])
+
+
+@pytest.mark.parametrize("times", [np.linspace(-0.25, 0.25, 11), np.array([0.1, -0.2, 0.25, 0.0, -0.25, 0.2, -0.1])])
+def test_what_cannot_be_followed_is_nan_with_the_reason_and_the_others_are_there(times):
+    """A ball 0.28 m higher shortens the way of the arm; samples in no order find their places."""
+    mechanism, _ = strut()
+    varied = ("joints.ball.point",)
+    numbers = np.repeat(np.array(places(mechanism)[varied[0]])[:, None], 3, axis=1)
+    numbers[2, 1] += 0.28
+    path = Path({"stroke": Ramp(1.0)}, times)
+    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), varied=varied))
+    found = solve_variants(Route(model, path), numbers, TOL)
+    own = follow(
+        Route(compile_model(variant(mechanism, varied, numbers[:, 1]), Request(("stroke",), ("wheel_center",))), path), TOL
+    )
+    assert 0 < own.solved.sum() < len(times)
+    np.testing.assert_array_equal(found.solved[:, 1], own.solved)
+    lanes = found.kept[model.rows["position wheel_center"], :, 1].T
+    np.testing.assert_allclose(lanes, own.points["wheel_center"].position, rtol=0, atol=SAME)
+    assert set(found.messages) >= {1}
+    assert "cannot be followed beyond" in found.messages[1]
+    np.testing.assert_array_equal(found.kept[:14, :, 0], found.kept[:14, :, 2])
+
+
+def test_a_variant_that_does_not_close_says_so():
+    """A rod that is a third of the distance it has to span."""
+    case = load("mcpherson_strut")
+    joints = [replace(joint, length=0.32) if joint.name == "tie_rod" else joint for joint in case.mechanism.joints]
+    mechanism = replace(case.mechanism, joints=joints)
+    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), varied=("joints.tie_rod.length",)))
+    found = solve_variants(Route(model, PATHS["one side"]), np.array([[0.32, 0.05]]), TOL)
+    assert found.solved.all(axis=0).tolist() == [True, False]
+    assert found.messages[1].startswith("does not close at its design position; check")
+
+
+def test_designs_are_solved_as_one_by_one():
+    mechanism, _ = strut()
+    values = np.linspace(-0.05, 0.05, 7)
+    moved = np.array([1.115, 0.665, 0.118]) + np.random.default_rng(3).normal(size=(300, 3)) * 1e-3
+    found = solve_designs(mechanism, "stroke", values, {"joints.tie_rod.points.0": moved}, order=1)
+    assert found.points["wheel_center"].position.shape == (300, 7, 3)
+    assert found.points["wheel_center"].acceleration is None
+    assert found.solved.all()
+    assert found.messages == {}
+    for k in (0, 255, 256, 299):
+        own = solve(placed(mechanism, {"joints.tie_rod.points.0": tuple(moved[k])}), "stroke", values)
+        np.testing.assert_allclose(found.points["wheel_center"].position[k], own.points["wheel_center"].position, rtol=0, atol=SAME)
+        np.testing.assert_allclose(found.points["wheel_center"].velocity[k], own.points["wheel_center"].velocity, rtol=0, atol=SAME)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "message"),
+    [
+        ({"joints.tie_rod.end": np.zeros((4, 3))}, "no place 'joints.tie_rod.end' to vary; known: joints.lca_pivot.point, "),
+        ({"joints.ball.point": np.zeros((4, 2))}, r"has shape \(4, 2\), expected \(designs, 3\)"),
+        ({"joints.ball.point": np.full((4, 3), np.nan)}, "is not finite everywhere"),
+        ({"joints.ball.point": np.ones((4, 3)), "joints.strut_top.point": np.ones((5, 3))}, r"found \[4, 5\] designs"),
+        ({}, r"found \[\] designs"),
+    ],
+)
+def test_designs_that_make_no_sense_are_refused(geometry, message):
+    with pytest.raises(SolveError, match=message):
+        solve_designs(strut()[0], "stroke", [0.0], geometry)
