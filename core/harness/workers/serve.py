@@ -34,6 +34,7 @@ class Setup:
 def serve() -> None:
     """Answer pairs until there is no parent any more. Ends the process, without the simulators' own ways of going down."""
     requests, answers = _channel()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a parent in the background has it ignored; engines shall not differ
     faulthandler.enable()  # a crash then tells the line of Python it came from
     setup: Setup = pickle.loads(read(requests))
     sys.path[:] = setup.path
