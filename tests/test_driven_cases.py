@@ -17,6 +17,7 @@ from kincheck.core.harness.run import run
 from kincheck.core.motions import Absolute, Ramp, Sine, Table
 
 from .case_texts import edited, write
+from .test_report import Page
 
 STRUT = (cases.FOLDER / "mcpherson_strut.toml").read_text()
 RACK = """[joints.rack_guide]
