@@ -82,6 +82,7 @@ FROM, EARLIER = "from ", "earlier "
 """Before the names of what a lane is predicted from, and of what that was predicted from."""
 
 
+EULER_PARAMETERS = 4
 ABOUT = 1.5
 """A step may be this much longer than the one it learns from."""
 
@@ -221,9 +222,10 @@ class Tracer:
             self._store(out, f"predicted {name}", value)  # kept, to see what the iteration makes of it
             solved, predicted = start[name], self._vector(f"{FROM}predicted {name}", len(value))
             corrected[name] = [x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)]
-        # a step of zero makes Euler parameters of them again
-        still = [0.0] * self.unknowns
-        self._store_state(out, self.formulation.retract(self.formulation.configuration(corrected), still))
+            if len(value) == EULER_PARAMETERS:  # of length one again, up to the square of what is lacking now
+                k = 1.5 - 0.5 * sum((x * x for x in corrected[name]), 0.0)
+                corrected[name] = [k * x for x in corrected[name]]
+        self._store_state(out, corrected)
         return program("predict", self.tape, out, self.prepared)
 
     def test(self, name: str, *, neighbours: bool) -> Program:

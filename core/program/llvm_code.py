@@ -83,7 +83,8 @@ class Lines:
     def call(self, name: str, *operands: str) -> str:
         """One of LLVM's own vector functions."""
         arguments = ", ".join(f"{self.vector} {x}" for x in operands)
-        return self.let(f"call {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
+        # nsz: which of two zeros is the larger does not matter, and costs three more instructions
+        return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
 
     def arithmetic(self, op: str, a: str, b: str) -> str:
         """a op b."""
