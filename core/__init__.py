@@ -1,33 +1,38 @@
 """kincheck.core: describe a mechanism, solve it, compare engines."""
 
-from .analysis.assemble import assemble
-from .analysis.designs import solve_designs
-from .analysis.solve import solve
-from .drivers import JointAngle, JointDisplacement, PointCoordinate
-from .errors import CaseError, KincheckError, MechanismError, SolveError
-from .joints import (
-    ConstantVelocity,
-    Cylindrical,
-    Distance,
-    Fixed,
-    Gear,
-    Inline,
-    InPlane,
-    Joint,
-    OrientationLock,
-    ParallelAxes,
-    PerpendicularAxes,
-    Planar,
-    RackPinion,
-    Revolute,
-    RevoluteSpherical,
-    Screw,
-    Spherical,
-    Translational,
-    Universal,
-)
-from .mechanism import GROUND, Body, Mechanism, Point
-from .motions import Ramp, Sine, Table
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .analysis.assemble import assemble
+    from .analysis.assemblies import find_assemblies
+    from .analysis.designs import solve_designs
+    from .analysis.solve import solve
+    from .drivers import JointAngle, JointDisplacement, PointCoordinate
+    from .errors import CaseError, KincheckError, MechanismError, SolveError
+    from .joints import (
+        ConstantVelocity,
+        Cylindrical,
+        Distance,
+        Fixed,
+        Gear,
+        Inline,
+        InPlane,
+        Joint,
+        OrientationLock,
+        ParallelAxes,
+        PerpendicularAxes,
+        Planar,
+        RackPinion,
+        Revolute,
+        RevoluteSpherical,
+        Screw,
+        Spherical,
+        Translational,
+        Universal,
+    )
+    from .mechanism import GROUND, Body, Mechanism, Point
+    from .motions import Ramp, Sine, Table
 
 __all__ = [
     "GROUND",
@@ -64,6 +69,22 @@ __all__ = [
     "Translational",
     "Universal",
     "assemble",
+    "find_assemblies",
     "solve",
     "solve_designs",
 ]
+
+_ROOMS = (
+    *(".errors", ".mechanism", ".drivers", ".motions", ".joints"),
+    *(f".analysis.{name}" for name in ("solve", "assemble", "assemblies", "designs")),
+)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is asked for: pytest loads its plugins every time, and would wait for numpy and the solver else."""
+    if name in __all__:
+        for room in _ROOMS:  # what is quick to import first
+            found = getattr(import_module(room, __name__), name, None)
+            if found is not None:
+                return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -19,26 +19,60 @@ def turned(body, angle, shift, rng):
     return np.array(body.origin) + shift * rng.normal(size=(STARTS, 3)), p
 
 
-def found_from(mechanism, angle, style="mixed"):
-    """(share that converges, share that ends at the design) from estimates perturbed in all bodies."""
-    rng = np.random.default_rng(3)
-    found = assemble(mechanism, {b.name: turned(b, angle, 0.1 * angle, rng) for b in mechanism.moving}, style=style)
-    home = found.converged.copy()
-    for body in mechanism.moving:
-        home &= np.abs(np.nan_to_num(found.bodies[body.name].r, nan=9.0) - np.array(body.origin)).max(axis=1) < 1e-9
+def at_design(mechanism):
+    """The poses at design, as an estimate."""
+    return {body.name: (np.array(body.origin), np.array(body.euler_parameters)) for body in mechanism.moving}
+
+
+def perturbed(mechanism, angle, shift, rng, n=STARTS):
+    """Estimates of all bodies from poses at design, turned and shifted."""
+    return {body.name: tuple(each[:n] for each in turned(body, angle, shift, rng)) for body in mechanism.moving}
+
+
+def is_home(mechanism, origins):
+    """Whether the origins, of each body an array of shape (..., 3), are those at design; NaN is not."""
+    apart = [np.abs(origins[body.name] - np.array(body.origin)).max(axis=-1) for body in mechanism.moving]
+    return np.max(apart, axis=0) < 1e-9
+
+
+def found_from(mechanism, angle, shift, style="mixed"):
+    """Shares (that converge, that end at the design, that are spurious) from estimates perturbed in all bodies."""
+    found = assemble(mechanism, perturbed(mechanism, angle, shift, np.random.default_rng(3)), style=style)
+    home = is_home(mechanism, {name: motion.r for name, motion in found.bodies.items()})
     assert (found.residual[found.converged] <= 1e-12).all()
-    return found.converged.mean(), home.mean()
+    return found.converged.mean(), home.mean(), found.spurious.mean()
 
 
-def test_small_errors_are_always_mended():
-    assert found_from(mcpherson(), 0.3) == (1.0, 1.0)
+@pytest.mark.parametrize(("angle", "shift"), [(0.01, 0.01), (0.3, 0.03), (0.8, 0.08), (0.8, 0.2), (1.2, 0.12)])
+def test_errors_up_to_a_radian_are_always_mended(angle, shift):
+    assert found_from(mcpherson(), angle, shift) == (1.0, 1.0, 0.0)
 
 
-def test_large_errors_are_mostly_mended_and_exact_rows_do_worse():
-    converged, home = found_from(mcpherson(), 0.8)
+@pytest.mark.parametrize(("angle", "shift", "share"), [(0.8, 1.0, 0.7), (0.8, 2.0, 0.5), (1.2, 1.0, 0.6), (2.0, 0.2, 0.4)])
+def test_metres_of_offset_are_mostly_mended_and_the_rest_are_other_assemblies(angle, shift, share):
+    """Measured 79, 58, 68 and 46 %; the rest ends in other assemblies or, rarely, nowhere: never on a zero that is none."""
+    converged, home, spurious = found_from(mcpherson(), angle, shift)
     assert converged >= 0.95
-    assert home >= 0.8  # 84 % by formulation section 3, with its other mix of errors
-    assert found_from(mcpherson(), 0.8, "conventional")[1] < home - 0.1
+    assert home >= share
+    assert spurious == 0.0
+
+
+def test_half_a_turn_away_nothing_is_spurious():
+    converged, _, spurious = found_from(mcpherson(), 3.0, 1.0)
+    assert converged >= 0.3
+    assert spurious == 0.0
+
+
+def test_exact_rows_do_worse_and_their_spurious_zeros_are_told():
+    _, home, spurious = found_from(mcpherson(), 0.8, 0.08, "conventional")
+    assert home < 0.9
+    assert spurious > 0.1  # formulation section 3
+
+
+def test_damping_is_what_mends_offsets(monkeypatch):
+    damped = found_from(mcpherson(), 0.8, 1.0)[1]
+    monkeypatch.setattr("kincheck.core.analysis.assemble.DAMPING", 1e-9)
+    assert found_from(mcpherson(), 0.8, 1.0)[1] < damped - 0.2
 
 
 def test_poses_close_in_the_papers_variables():

@@ -351,7 +351,6 @@ def test_bad_destinations_are_named_before_the_work(tmp_path, monkeypatch, capsy
     for options in (["--out", tmp_path / "file"], ["--out", tmp_path], ["--json", tmp_path / "no" / "x.json"]):
         assert cli.main(["bench", "formulation", *map(str, options)]) == 2
         assert "file" in capsys.readouterr().err
-    assert cli.main(["bench"]) == 2
 
 
 def test_page_escapes():

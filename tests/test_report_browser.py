@@ -213,7 +213,7 @@ def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: An
     assert curve == ["one", ["2026-11-01", "2026-11-02", "2026-11-03"], [1e-12, None, None]]
     assert zeros[1] == ["2026-11-02"]
     assert drawn["case-0-trend-time"] == [["one", ["2026-11-01", "2026-11-02", "2026-11-03"], [10, 10, 10]]]
-    curves = {meta: (x, y) for meta, x, y in drawn["case-0-precision"]}
+    curves = {meta: (x, y) for meta, x, y in drawn["case-0-precision-projection"]}
     assert curves["one"] == ([9, 20], [1e-4, 1e-7])
     assert "gone" in curves
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import Ramp, Sine, SolveError, solve, solve_designs
+from kincheck.core.analysis import variants
 from kincheck.core.analysis.geometry import placed, places
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
@@ -97,6 +98,23 @@ def test_what_cannot_be_followed_is_nan_with_the_reason_and_the_others_are_there
     assert set(found.messages) >= {1}
     assert "cannot be followed beyond" in found.messages[1]
     np.testing.assert_array_equal(found.kept[:14, :, 0], found.kept[:14, :, 2])
+
+
+def test_a_lane_that_gets_lost_on_the_way_to_the_first_sample_is_solved_again_alone(monkeypatch):
+    """Half a turn of the crank in one step instead of sixteen."""
+    monkeypatch.setattr(variants, "LEAD", 1)
+    mechanism, varied = load("rssr").mechanism, ("joints.rod.points.0",)
+    path = Path({"crank": Sine(3.0, 1.0, 1.5)}, np.linspace(0.0, 0.02, 5))
+    model = compile_model(mechanism, Request(("crank",), ("rocker_pin",), varied=varied))
+    numbers = drawn(mechanism, varied, 5, 2e-3)
+    found = solve_variants(Route(model, path), numbers, TOL)
+    assert found.retried == 5
+    assert found.solved.all()
+    monkeypatch.undo()
+    usual = solve_variants(Route(model, path), numbers, TOL)
+    assert usual.retried == 0
+    rows = model.rows["position rocker_pin"]
+    np.testing.assert_allclose(found.kept[rows], usual.kept[rows], rtol=0, atol=SAME)
 
 
 def test_a_variant_that_does_not_close_says_so():

@@ -5,8 +5,8 @@ back to it, where exact rows end on spurious branches (formulation sections 3 an
 assemblies of a loop; the estimate does.
 
 Each step is a damped one, (J^T J + mu I) s = -J^T phi with mu proportional to |phi|^2: far away, where the Jacobian may be singular
-and says little, it is short; near the solution it is Newton's. Undamped steps of the strut, bodies perturbed by 0.8 rad and 0.08 m,
-reach the intended assembly from 89 % of the estimates, damped ones from all, and from 79 % (21 %) with 1 m of offset.
+and says little, it is short; near the solution it is Newton's. With every body of the strut turned by 0.8 rad and shifted by about
+0.2 m, damped steps reach the intended assembly from all of 200 estimates, undamped ones from 92 %; with 1 m, from 79 % and 21 %.
 """
 
 from __future__ import annotations
@@ -87,7 +87,11 @@ class Closing:
         self.kept, self.dropped = list(tracer.selection.kept), list(tracer.selection.dropped)
         phi, rows = tracer.formulation.phi(tracer.at), tracer.formulation.rows(tracer.at)
         slot, vector = tracer.layout.scalar, tracer.layout.vector
-        self._phi, self._step, self._turn = vector("phi", len(phi)), vector("step", tracer.unknowns), vector("turn", 3 * len(self.moving))
+        self._phi, self._step, self._turn = (
+            vector("phi", len(phi)),
+            vector("step", tracer.unknowns),
+            vector("turn", 3 * len(self.moving)),
+        )
         self._entries = np.array([(k, column) for k, row in enumerate(rows) for column in row])
         self._rows = [slot(f"entry {k} {column}") for k, column in self._entries.tolist()]
         entries = [x for row in rows for x in row.values()]
@@ -135,7 +139,9 @@ class Closing:
         closes = done & (block[slots["closure"]] <= tol)
         sound = (block[slots["branch"]] > 0.0) & (block[slots["leftover"]] <= max(CONSISTENT, tol))
         found = np.where(closes & sound, block, np.nan)
-        bodies = {name: BodyMotion(found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None) for name in self.moving}
+        bodies = {
+            name: BodyMotion(found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None) for name in self.moving
+        }
         return Assembled(bodies, closes & sound, closes & ~sound, block[slots["closure"]].copy(), iterations)
 
     def _steps(self, phi: Array, matrix: Array) -> Array:
@@ -144,13 +150,13 @@ class Closing:
         near = np.abs(phi).max(axis=1) < NEAR
         far, identity = ~near, np.eye(matrix.shape[2])
         if far.any():
-            J, f = matrix[far], phi[far]
-            damped = J.swapaxes(1, 2) @ J + (DAMPING * (f * f).sum(axis=1))[:, None, None] * identity
-            step[far] = -np.linalg.solve(damped, J.swapaxes(1, 2) @ f[:, :, None])[:, :, 0]
+            rows, f = matrix[far], phi[far]
+            damped = rows.swapaxes(1, 2) @ rows + (DAMPING * (f * f).sum(axis=1))[:, None, None] * identity
+            step[far] = -np.linalg.solve(damped, rows.swapaxes(1, 2) @ f[:, :, None])[:, :, 0]
         if near.any():  # normal equations would square the condition; a damping at round-off keeps R regular at singular poses
-            J, f = matrix[near][:, self.kept], phi[near][:, self.kept]
-            floor = np.broadcast_to(np.finfo(np.float64).eps * identity, (len(J), *identity.shape))
-            Q, R = np.linalg.qr(np.concatenate([J, floor], axis=1))
-            rotated = Q[:, : J.shape[1]].swapaxes(1, 2) @ f[:, :, None]
+            rows, f = matrix[near][:, self.kept], phi[near][:, self.kept]
+            floor = np.broadcast_to(np.finfo(np.float64).eps * identity, (len(rows), *identity.shape))
+            Q, R = np.linalg.qr(np.concatenate([rows, floor], axis=1))
+            rotated = Q[:, : rows.shape[1]].swapaxes(1, 2) @ f[:, :, None]
             step[near] = -np.linalg.solve(R, rotated)[:, :, 0]
         return step

@@ -63,7 +63,8 @@ class CascadeSweep:
                 for name, rows in self._outputs.items():
                     found[name][at] = lanes.world[rows, :count].T
                 for name, into in tests.items():
-                    into[at] = (np.min if name == "pivot" else np.max)(lanes.each(name)[:, :count], axis=0)
+                    each = lanes.each(name)[:, :count]
+                    into[at] = np.abs(each).min(axis=0) if name == "pivot" else each.max(axis=0)
 
             lanes.anchor = departure
             lanes.accept_by({"tolerance": tol, "consistent": max(CONSISTENT, tol)})
@@ -114,7 +115,7 @@ class CascadeSweep:
         bodies = ", ".join(self.cascade.parts[order[worst]].bodies)
         return (
             f"cannot be followed beyond {path.where(here)} (wanted {path.where(wanted)}): the component of {bodies} is left with "
-            f"residual {closure[worst]:.3g} of its size, smallest pivot {np.nanmin(pivot):.3g} (zero at a lock-up or dead centre); "
+            f"residual {closure[worst]:.3g} of its size, smallest pivot {np.nanmin(np.abs(pivot)):.3g} (zero at a lock-up or dead centre); "
             "shorten the sweep or drive another coordinate"
         )
 

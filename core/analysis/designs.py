@@ -84,14 +84,14 @@ def solve_designs(
     solved, messages = np.empty((count, n), dtype=np.bool_), dict[int, str]()
     for first in range(0, count, LANES):
         here = slice(first, min(first + LANES, count))
-        found = solve_variants(route, lanes[:, here], tol)
-        solved[here] = found.solved.T
-        messages |= {first + k: message for k, message in found.messages.items()}
+        part = solve_variants(route, lanes[:, here], tol)
+        solved[here] = part.solved.T
+        messages |= {first + k: message for k, message in part.messages.items()}
         for name, each in motion.items():
             for label, values_of in each.items():
-                values_of[here] = found.kept[model.rows[f"{label} {name}"]].T
-    absent = dict.fromkeys(("velocity", "acceleration"))
-    return Designs({name: PointMotion(**{**absent, **each}) for name, each in motion.items()}, solved, messages)
+                values_of[here] = part.kept[model.rows[f"{label} {name}"]].T
+    found = {name: PointMotion(each["position"], each.get("velocity"), each.get("acceleration")) for name, each in motion.items()}
+    return Designs(found, solved, messages)
 
 
 def _numbers(place: str, given: Array, size: int) -> Array:

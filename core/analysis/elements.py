@@ -28,7 +28,7 @@ Indices = NDArray[np.intp]
 SIDES = ("i", "j")
 WHERE, HOW = "where", "how"
 """The programs of a kind: what follows from where its bodies are, and gamma, which needs to know how they move."""
-QUANTITIES = ("phi", "nu", "gamma", "branch", "entries")
+QUANTITIES: tuple[str, ...] = ("phi", "nu", "gamma", "branch", "entries")
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,9 @@ class Elements:
         rows, columns: where the entries belong, same shape.
     """
 
-    def __init__(self, constraints: Sequence[Constraint | Relation], bodies: Sequence[str], drivers: int, *, compiled: bool) -> None:
+    def __init__(
+        self, constraints: Sequence[Constraint | Relation], bodies: Sequence[str], drivers: int, *, compiled: bool
+    ) -> None:
         members: list[Member] = []
         self.owners: list[tuple[str, str]] = []
         for k, c in enumerate(constraints, drivers - len(constraints)):  # the drivers come last
@@ -120,18 +122,25 @@ class Elements:
         for member in members:
             kinds.setdefault(member.kind(self.numbering.bodies), []).append(member)
         self._kinds = [_Kind(each, self.numbering) for each in kinds.values()]
-        self.rows, self.columns = (np.concatenate([getattr(kind, name).ravel() for kind in self._kinds]) for name in ("rows", "columns"))
+        self.rows, self.columns = (
+            np.concatenate([getattr(kind, name).ravel() for kind in self._kinds]) for name in ("rows", "columns")
+        )
         sizes = dict.fromkeys(QUANTITIES, len(self.owners))
         sizes |= {name: sum(kind.size(name) for kind in self._kinds) for name in ("branch", "entries")}
         ends = np.cumsum(list(sizes.values()))
         # one array, so that each kind writes once
         self._results = np.zeros(ends[-1])
         self.phi, self.nu, self.gamma, self.branch, self.entries = np.split(self._results, ends[:-1])
-        starts = dict(zip(QUANTITIES, [0, *ends[:-1].tolist()], strict=True))
+        starts: dict[str, int] = dict(zip(QUANTITIES, [0, *ends[:-1].tolist()], strict=True))
         for kind in self._kinds:
             kind.bind(self._results, starts, compiled=compiled)
             starts["branch"] += kind.size("branch")
             starts["entries"] += kind.size("entries")
+
+    @property
+    def sizes(self) -> list[dict[str, int]]:
+        """Of each kind: how many constraints there are, and the flops of one."""
+        return [kind.sizes for kind in self._kinds]
 
     def evaluate(self, state: Array, drives: Array) -> None:
         """Update phi, nu, branch and entries.
@@ -173,7 +182,9 @@ class _Kind:
         self._first_geometry = self._inputs[HOW].stop
         formulation = self._formulation(members, moving)
         given = iter(self._inputs[WHERE])
-        state = {f"{part} {side}": self._next(given, count) for side in first.bodies(moving) for part, count in (("u", 3), ("q", 4))}
+        state = {
+            f"{part} {side}": self._next(given, count) for side in first.bodies(moving) for part, count in (("u", 3), ("q", 4))
+        }
         state |= {f"x {name}": self._next(given, 1) for name in formulation.coordinates}
         at = formulation.configuration(state)
         rows = [(k, column, value) for k, row in enumerate(formulation.rows(at)) for column, value in row.items()]
@@ -242,8 +253,11 @@ class _Kind:
             if wanted:
                 programs[name] = program(name, self._tape, wanted)
                 self._outputs[name] = range(end, end := end + len(wanted)), np.array(places)
+        self.sizes = {"constraints": self._lanes} | {f"flops {name}": each.flops for name, each in programs.items()}
         plan = Plan(programs, {str(k): k for k in range(end)})
-        self._executor: Executor = LlvmExecutor(LlvmCode(plan), self._lanes) if compiled and available() else NumpyExecutor(plan, self._lanes)
+        self._executor: Executor = (
+            LlvmExecutor(LlvmCode(plan), self._lanes) if compiled and available() else NumpyExecutor(plan, self._lanes)
+        )
         if self._geometry:
             self._executor.put(range(self._first_geometry, self._first_geometry + len(self._geometry)), np.array(self._geometry))
 

@@ -6,8 +6,8 @@ costs steps; where no part of a step succeeds the motion ends, and a message say
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..program import MARGIN
 from ..trajectory import Array
 from .model import Model
 from .programs import FROM, TIME
+from .system import System
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
@@ -37,13 +38,37 @@ class March:
         kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not reached.
         last: all slots of where the last side ended.
         solved: shape (n,).
-        messages: one for each side that ended before its last sample.
+        ends: one for each side that ended before its last sample.
+        visited: by sample, all slots of a lane that stands there and goes on from it; those asked for.
     """
 
     kept: Array
     last: Array
     solved: NDArray[np.bool_]
-    messages: tuple[str, ...]
+    ends: tuple[End, ...]
+    visited: Mapping[int, Array] = field(default_factory=dict[int, Array])
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """Why samples are missing."""
+        return tuple(end.message for end in self.ends)
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a side ended before its last sample.
+
+    Attributes:
+        message: where, and why.
+        route: on which: the one asked for, or the way to its first sample.
+        lane: all slots of the last pose that was reached.
+        wanted: time of the sample that was not.
+    """
+
+    message: str
+    route: Route
+    lane: Array
+    wanted: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,21 +87,28 @@ class Route:
 
     Attributes:
         design: all slots of a lane at the design position of a variant; the model's own unless given.
+        since: the time at which that lane stands on the path, where that is not at the design position but on the way.
     """
 
     model: Model
     path: Path
     design: Array | None = None
+    since: float | None = None
 
     @cached_property
     def from_design(self) -> bool:
-        """Whether it starts at the design position, at time zero."""
-        return self.path.from_design
+        """Whether the lane it starts from stands on the path: at the design position at time zero, or on the way."""
+        return self.since is not None or self.path.from_design
 
     @cached_property
     def start(self) -> float:
-        """The time it starts at: zero, where the mechanism is at its design position, or else the first sample."""
-        return 0.0 if self.from_design else float(self.path.times[0])
+        """The time it starts at: where its lane stands, or else the first sample."""
+        return self.since or 0.0 if self.from_design else float(self.path.times[0])
+
+    @cached_property
+    def system(self) -> System:
+        """The equations of the model, for poses that the march cannot judge."""
+        return System(self.model)
 
     @cached_property
     def order(self) -> NDArray[np.intp]:
@@ -103,6 +135,11 @@ class Route:
         return self.model.moving(self.model.design if self.design is None else self.design, self.origin)
 
     @cached_property
+    def ahead(self) -> bool:
+        """Whether the determinant of the rows is positive at the start."""
+        return bool(self.departure[self.model.slots[FROM + "pivot"]] > 0.0)
+
+    @cached_property
     def sides(self) -> tuple[Side, ...]:
         """The side after the start and the side before it, as far as there are samples."""
         times = self.path.times[self.order]
@@ -127,26 +164,35 @@ class Route:
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
 
 
-def march(route: Route, tol: float) -> March:
-    """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance."""
+def march(route: Route, tol: float, visit: Collection[int] = ()) -> March:
+    """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance.
+
+    Args:
+        visit: samples at which the lane that stands there is wanted.
+    """
     model, path = route.model, route.path
     tolerances = {"tolerance": tol, "consistent": max(CONSISTENT, tol)}
     if route.from_design:
-        return _Marcher(route, route.departure, tolerances).run()
+        return _Marcher(route, route.departure, tolerances, visit).run()
     way = Route(model, path.lead_in(), route.design)
     found = _Marcher(way, way.departure, tolerances).run()
     if not found.solved.all():
         n = len(path.times)
-        message = f"on the way to the first sample: {found.messages[0]}"
-        return March(np.full((len(found.kept), n), np.nan), found.last, np.zeros(n, np.bool_), (message,))
-    arrived = found.last.copy()
-    for name in model.state:  # what the lanes were predicted from is where they stand
-        arrived[model.vectors[name]] = arrived[model.vectors[FROM + name]]
-    return _Marcher(route, model.moving(arrived, route.origin), tolerances).run()
+        end = replace(found.ends[0], message=f"on the way to the first sample: {found.messages[0]}")
+        return March(np.full((len(found.kept), n), np.nan), found.last, np.zeros(n, np.bool_), (end,))
+    return _Marcher(route, model.moving(arrived(model, found.last), route.origin), tolerances, visit).run()
+
+
+def arrived(model: Model, lane: Array) -> Array:
+    """A lane that stands where the given one would be predicted from."""
+    found = lane.copy()
+    for name in model.state:
+        found[model.vectors[name]] = lane[model.vectors[FROM + name]]
+    return found
 
 
 class _Marcher:
-    def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float]) -> None:
+    def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float], visit: Collection[int] = ()) -> None:
         self.route, self.model, self.slots = route, route.model, route.model.slots
         self.start = start.copy()
         for name, value in tolerances.items():
@@ -159,33 +205,54 @@ class _Marcher:
         self.whole = np.empty((self.model.kept, self.n + 2 * self.executor.margin))
         self.kept = self.whole[:, self.executor.margin : self.executor.margin + self.n]
         self.solved = np.ones(self.n, dtype=np.bool_)
+        self.visit, self.visited = visit, dict[int, Array]()
 
     def run(self) -> March:
-        messages: list[str] = []
+        ends: list[End] = []
         last = self.start
         for side in self.route.sides:
             last = self.start.copy()
-            message = self._side(side, last)
-            if message:
-                messages.append(message)
+            end = self._side(side, last)
+            if end:
+                ends.append(end)
         back = self.route.back
-        return March(self.kept[:, back], last, self.solved[back], tuple(messages))
+        return March(self.kept[:, back], last, self.solved[back], tuple(ends), self.visited)
 
-    def _side(self, side: Side, anchor: Array) -> str:
-        """Follow one side to its end, the anchor going along; empty, or why it ends before."""
-        n, at, rounds = len(side.times), 0, 0
+    def _side(self, side: Side, anchor: Array) -> End | None:
+        """Follow one side to its last sample, the anchor going along; None, or where and why it ends before."""
+        n, at, rounds, margin = len(side.times), 0, 0, self.executor.margin
+        stops = self._stops(side)
         while True:
-            first = side.first + side.step * at + self.executor.margin
-            went = self.executor.follow(anchor, side.samples[:, at:], self.whole, first, side.step)
+            first = side.first + side.step * at + margin
+            went = self.executor.follow(anchor, side.samples[:, at : stops[0] + margin], self.whole, first, side.step)
             at += went
-            if at == n:
-                return ""
+            if at == stops[0]:
+                self._stand(side, stops.pop(0), anchor)
+                if not stops:
+                    return None
+                continue
             rounds = 0 if went else rounds + 1
             failed = self._divide(anchor, float(side.times[at]))
             if failed or rounds > MAX_ROUNDS:
                 columns = side.first + side.step * np.arange(at, n)
                 self.kept[:, columns], self.solved[columns] = np.nan, False
-                return self._end(side, at, anchor, failed or "the parts of the step get smaller and smaller")
+                message = self._end(side, at, anchor, failed or "the parts of the step get smaller and smaller")
+                return End(message, self.route, anchor.copy(), float(side.times[at]))
+
+    def _stops(self, side: Side) -> list[int]:
+        """How many samples of a side have passed where one to visit has; its end is the last."""
+        n = len(side.times)
+        if not self.visit:
+            return [n]
+        place = np.argsort(self.route.order)
+        passed = {int((place[k] - side.first) * side.step) + 1 for k in self.visit}
+        return sorted({count for count in passed if 1 <= count <= n} | {n})
+
+    def _stand(self, side: Side, passed: int, anchor: Array) -> None:
+        if self.visit:
+            sample = int(self.route.order[side.first + side.step * (passed - 1)])
+            if sample in self.visit:
+                self.visited[sample] = anchor.copy()
 
     def _divide(self, anchor: Array, aim: float) -> str:
         """Go a part of the step to a sample that could not be reached; empty, or why there is none."""
@@ -209,7 +276,7 @@ class _Marcher:
         last = f"last reachable sample at {where(float(side.times[at - 1]))}" if at else "no sample reached on this side"
         return (
             f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest pivot there "
-            f"{anchor[self.slots[FROM + 'pivot']]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "
+            f"{abs(anchor[self.slots[FROM + 'pivot']]):.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "
             "another coordinate"
         )
 

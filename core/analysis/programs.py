@@ -1,7 +1,8 @@
 """The programs of a sweep, traced from the equations: they share one layout of slots.
 
     predict   from state, v, a and time; time    -> state        Taylor step of second order
-    newton    state, drives                      -> state, residual, pivot   one Newton-Raphson iteration; residual is that before
+    newton    state, drives                      -> state, residual, pivot   one Newton-Raphson iteration; residual is that before,
+                                                    pivot the smallest, with the sign of the determinant
     motion    state, drives' rates               -> v, a         one factorisation at the converged pose, solved for nu and gamma
     outputs   state, v, a                        -> wanted motions, closure, leftover, branch
     alone, joined   all that, and the tolerance  -> margin         positive where a lane may be accepted
@@ -41,7 +42,6 @@ from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
 from .geometry import placed, places
 from .relative import Relative
-
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
 LAST_ITERATION = 1e-9
@@ -163,7 +163,7 @@ class Tracer:
         factor = Elimination(self._kept(self.formulation.rows(self.at)))
         out: dict[int, Scalar] = {
             self.layout.scalar("residual"): _largest(phi),
-            self.layout.scalar("pivot"): reduce(minimum, (absolute(x) for x in factor.pivots), 1.0),
+            self.layout.scalar("pivot"): factor.signed_pivot,
         }
         step = factor.solve(phi)
         if longest_turn is not None:

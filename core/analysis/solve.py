@@ -16,6 +16,7 @@ from .freedom import require_driven
 from .march import March, Route, march
 from .model import Model, compile_model
 from .programs import Request
+from .scrutiny import doubtful, scrutinise
 
 
 def solve(
@@ -105,20 +106,36 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
     model, found = route.model, march(route, tol)
-    tests = found.kept[model.rows["closure"].start : model.rows["pivot"].stop]
-    solved = tests if not found.messages else tests[:, found.solved]
-    closure, leftover = solved[:2].max(axis=1, initial=0.0).tolist()
+    closure, leftover, pivot = _tests(route, found, whole=not found.ends)
+    details, message = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)}, ""
+    if found.ends or (math.isfinite(tol) and doubtful(pivot, closure, tol)):
+        findings = scrutinise(route, found, tol)
+        closure, leftover, pivot = _tests(route, found, whole=False)
+        details |= {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)} | findings.details
+        message = "; ".join(findings.messages)
     iterations = found.kept[model.rows["iterations"].start]
     return Trajectory(
         points={name: _point(model, found, name) for name in model.request.points},
         solved=found.solved,
-        iterations=(np.where(found.solved, iterations, 0.0) if found.messages else iterations).astype(np.int64),
+        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
         residual=closure * model.frame.unit,
-        message="; ".join(found.messages),
-        details=model.details
-        | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": float(solved[3].min(initial=1.0))},
+        message=message,
+        details=details,
         bodies={name: _body(model, found, name) for name in model.request.bodies},
     )
+
+
+def _tests(route: Route, found: March, *, whole: bool) -> tuple[float, float, float]:
+    """Of all solved samples: the largest residuals of kept and redundant rows, and the smallest pivot, negative where any is.
+
+    A pivot is negative beyond a singular pose, where the determinant's sign is not that of the start.
+    """
+    rows = route.model.rows
+    tests = found.kept[rows["closure"].start : rows["pivot"].stop]
+    solved = tests if whole else tests[:, found.solved]
+    closure, leftover = solved[:2].max(axis=1, initial=0.0).tolist()
+    pivots = solved[3]
+    return closure, leftover, float(pivots.min(initial=1.0) if route.ahead else -pivots.max(initial=-1.0))
 
 
 def _point(model: Model, found: March, name: str) -> PointMotion:

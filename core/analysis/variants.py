@@ -16,7 +16,6 @@ from ..motions import Path
 from ..program import Executor
 from ..trajectory import Array
 from .march import CONSISTENT, Route, march
-from .programs import FROM
 
 # Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
 # it is too long is solved again alone.
@@ -80,13 +79,11 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
 
 
 def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
-    """Take lanes from the design to the first sample; which of them arrived there."""
+    """Take lanes from the design to the first sample, where they stand afterwards; which of them arrived there."""
     model, last = route.model, route.path.lead_in()
     way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
     model.start(executor, way.origin)
     found = np.empty((model.kept, LEAD, executor.room))
     (side,) = way.sides
     executor.fan(np.ascontiguousarray(side.samples[:, :LEAD]), found, side.first, side.step)
-    for name in model.state:  # what the lanes were predicted from is where they stand
-        executor.put(model.vectors[name], executor.get(model.vectors[FROM + name]))
     return ~np.isnan(found[model.rows["closure"].start, -1, :count])

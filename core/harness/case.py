@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from functools import reduce
+from operator import add
 from typing import Any, Protocol
 
-from ..algebra import Vec3, vec
+from ..algebra import Vec3
 from ..jet import Jet
 from ..mechanism import Mechanism, Vector
 from ..motions import Absolute, Motion, Path, Ramp
@@ -164,9 +166,9 @@ class Output:
         return asdict(self)
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The coordinate [m]."""
-        position = at[self.point]
-        return vec(self.direction) @ (position - design[self.point] if self.relative else position)
+        """The coordinate [m]; of components that do not count nothing is computed, for there may be very many samples."""
+        each = zip(self.direction, at[self.point], design[self.point], strict=True)
+        return reduce(add, [along * (x - start if self.relative else x) for along, x, start in each if along])
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from ..motions import Absolute, Motion
 from .case import TIME, Case, Truth
 from .compare import as_numbers
 from .record import OutputSeries, Record, Results
+from .waiting import waited
 
 
 def results(
@@ -100,22 +101,28 @@ def git_state(folder: Path) -> dict[str, Any] | None:
     }
 
 
+def conditions() -> dict[str, Any]:
+    """What a later run is compared by, and takes a moment to find out: the state of the files, and how fast this machine is now."""
+    return {"git": git_state(Path.cwd()), "calibration_seconds": calibration()}
+
+
 def calibration() -> float:
     """Seconds of a fixed piece of work, the median of five: what times are divided by to be compared with another day's.
 
-    About 20 ms: interpreter steps and small linear solves in turn, which is what the engines' loops consist of.
+    Without those in which others had the processor. About 20 ms: interpreter steps and small linear solves in turn, which is what
+    the engines' loops consist of.
     """
     matrix, column = np.eye(12) + 0.01 * np.arange(144.0).reshape(12, 12) / 144.0, np.ones(12)
     times: list[float] = []
     for _ in range(5):
-        begin = perf_counter()
+        before, begin = waited(), perf_counter()
         for _ in range(700):
             column = np.linalg.solve(matrix, column)
             column /= np.abs(column).max()
             total = 0.0
             for step in range(500):
                 total += step * 0.5
-        times.append(perf_counter() - begin)
+        times.append(perf_counter() - begin - (waited() - before))
     return statistics.median(times)
 
 

@@ -25,7 +25,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # argparse has said why
         return int(end.code or 0)
     try:
-        return int(options.do(options, _house()))
+        return int(options.do(options, house()))
     except KincheckError as error:
         complain(str(error).splitlines())
     except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
@@ -35,7 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return Status.FAILED
 
 
-def _house() -> House:
+def house() -> House:
+    """The engines, cases and writers there are."""
     from ... import adapters, cases
 
     writers = adapters.WRITERS, adapters.writer

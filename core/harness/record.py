@@ -77,12 +77,16 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
     """Wall-clock seconds: making the model, the first solve, a solve after it (median of several), and judging the answer.
 
     A phase that was not reached is null, and so are those after it.
+
+    Attributes:
+        waited: the part of `warm` in which others had the processor.
     """
 
     build: float | None = None
     first: float | None = None
     warm: float | None = None
     compare: float | None = None
+    waited: float | None = None
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +14,13 @@ import numpy as np
 
 from ..trajectory import Array
 from .case import Case, Quantity, Series, Truth
-from .reading.document import fault, read_text
+from .reading.document import fault, read_text, shown
 
 LARGEST_FILE = 256_000_000
 # Twelve digits of a driver value, as for reference tables: what is off by less moves no output by as much as a tolerance.
 SAME_GRID = 1e-12
+# Not all that Python takes for a number: not 1_0, not nan.
+_DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)
 
 
 class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
@@ -100,7 +104,7 @@ def read(file: Path) -> Reference:
     text = read_text(file, LARGEST_FILE, "give a file that kincheck reference wrote")
     try:
         return msgspec.json.decode(text, type=Reference)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, RecursionError) as error:
         raise fault(file, "", f"found {error}, expected a proved reference; make one with kincheck reference CASE") from None
 
 
@@ -121,20 +125,25 @@ def series(file: Path, found: Reference, values: Array, outputs: Sequence[Quanti
     proved = {name: each for name, each in found.outputs.items() if each.reason is None}
     for output in outputs:
         if output.name in proved and (proved[output.name].unit, proved[output.name].signs) != (output.unit, output.signs):
-            raise fault(file, f"outputs.{output.name}", "found another unit or convention of signs, expected that of the case")
+            raise fault(file, f"outputs.{output.name}", "found another unit or convention of signs, expected that of the case; make it anew")
     names = [output.name for output in outputs if output.name in proved]
     if not names:
         raise fault(file, "outputs", f"found {', '.join(proved) or 'none'}, expected outputs of the case; make the reference anew")
-    return {name: _series(proved[name]) for name in names}
+    return {name: _series(file, name, proved[name], len(values)) for name in names}
 
 
-def _series(found: ProvedSeries) -> Series:
-    velocity, acceleration = (_numbers(column) for column in (found.velocity, found.acceleration))
-    known = (column if np.isfinite(column).any() else None for column in (velocity, acceleration))
-    return Series(_numbers(found.position), *known)
+def _series(file: Path, name: str, found: ProvedSeries, count: int) -> Series:
+    columns = {quantity: getattr(found, quantity) for quantity in ("position", "velocity", "acceleration")}
+    position, *derivatives = (_numbers(file, f"outputs.{name}.{each}", columns[each], count) for each in columns)
+    return Series(position, *(column if np.isfinite(column).any() else None for column in derivatives))
 
 
-def _numbers(column: Sequence[str | None]) -> Array:
+def _numbers(file: Path, key: str, column: Sequence[str | None], count: int) -> Array:
+    if len(column) != count:
+        raise fault(file, key, f"found {len(column)} samples, expected {count} as in the sweep; make the reference anew")
+    for k, text in enumerate(column):
+        if text is not None and not (_DECIMAL.fullmatch(text) and math.isfinite(float(text))):
+            raise fault(file, f"{key}[{k}]", f"found {shown(text)}, expected a decimal number; make the reference anew")
     return np.array([np.nan if text is None else float(text) for text in column])
 
 

@@ -209,6 +209,7 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
     if outcome is Outcome.PASS:
         messages += _not_compared(errors)
     details = dict(answer.details)
+    messages += details.pop("notes", [])  # a right answer that passed a singular pose says so
     return _made(
         case,
         engine,

@@ -55,7 +55,7 @@ def load(content: str, text: Callable[[], str], signatures: Mapping[str, str]) -
     """
     llvm = _llvm()
     machine, identity = _target()
-    entry = _folder() / hashlib.sha256(f"{identity}\n{content}".encode()).hexdigest()
+    entry = folder() / hashlib.sha256(f"{identity}\n{content}".encode()).hexdigest()
     code = _read(entry)
     if code is None:
         module = llvm.parse_assembly(text())
@@ -69,7 +69,8 @@ def load(content: str, text: Callable[[], str], signatures: Mapping[str, str]) -
     return engine, {name: kind(engine.get_function_address(name)) for name, kind in types.items()}
 
 
-def _folder() -> Path:
+def folder() -> Path:
+    """Where compiled code is kept; below XDG_CACHE_HOME where that is set."""
     home = os.environ.get("XDG_CACHE_HOME")
     return (Path(home) if home else Path.home() / ".cache") / "kincheck"
 

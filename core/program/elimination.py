@@ -12,12 +12,14 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from graphlib import TopologicalSorter
+from operator import mul
 
 import numpy as np
 
 from ..algebra import Scalar
-from .trace import Traced, where_larger
+from .trace import Traced, absolute, minimum, where_larger
 
 SAFE_LITERAL = 0.5
 # Up to this order looking for blocks costs more than it can save.
@@ -64,6 +66,16 @@ class Elimination:
         self._cores = [_Core(entries, *block) for block in _blocks(entries, left_rows, left_columns)]
         for core in self._cores:
             self.pivots += core.pivots
+
+    @property
+    def signed_pivot(self) -> Scalar:
+        """The pivot of the smallest size, at most one, with the sign of the determinant: in all lanes, or in all the opposite."""
+        smallest = reduce(minimum, (absolute(x) for x in self.pivots), 1.0)
+        signs = [where_larger(x, y, -1.0, 1.0) for core in self._cores for step in core.steps for _, x, y in step.exchanges]
+        # few at a time: a product of many pivots could fall below the smallest number
+        products = (reduce(mul, self.pivots[k : k + 8]) for k in range(0, len(self.pivots), 8))
+        signs += [where_larger(x + absolute(x), 0.0, 1.0, -1.0) for x in products]
+        return reduce(mul, signs, smallest)
 
     @property
     def core_size(self) -> int:

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import importlib
+import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import msgspec
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from ...errors import KincheckError
 from ..record import to_json
+from ..reporting.report import packed
 from ..reporting.table import LOG_WIDTH
+from ..reporting.wording import known, number
+
+if TYPE_CHECKING:
+    from .diagrams import Diagram
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,7 @@ class Section:
         verdict: what the figures say, in sentences.
         notes: how the figures were made.
         columns: headings; the first `labels` of them are over words, the others over numbers.
+        diagrams: drawn above the table, on the page only.
     """
 
     title: str
@@ -35,6 +43,7 @@ class Section:
     columns: Sequence[str]
     labels: int
     rows: Sequence[Sequence[str]]
+    diagrams: Sequence[Diagram] = ()
 
 
 @dataclass(frozen=True)
@@ -77,8 +86,8 @@ def print_report(report: Report, file: TextIO) -> None:
     console.print(Text(" · ".join(report.facts)), soft_wrap=True)
     for section in report.sections:
         table = Table(box=None, pad_edge=False, header_style="bold")
-        for number, heading in enumerate(section.columns):
-            table.add_column(Text(heading), justify="left" if number < section.labels else "right")
+        for column, heading in enumerate(section.columns):
+            table.add_column(Text(heading), justify="left" if column < section.labels else "right")
         for row in section.rows:
             table.add_row(*(Text(cell) for cell in row))
         console.print()
@@ -92,9 +101,21 @@ def print_report(report: Report, file: TextIO) -> None:
 
 def page(report: Report) -> str:
     """The report as one HTML file, in the look of a run's."""
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     here = Path(__file__).parent
-    # the style sheet of the run's report, so that there is one
-    _, style = (here.parent / "reporting" / "report.html").read_text("utf-8").split("<style>")
-    style = environment.from_string(style.partition("</style>")[0]).render()
-    return environment.from_string((here / "bench.html").read_text("utf-8")).render(report=report, style=style)
+    reporting = here.parent / "reporting"  # its style sheet, macros and script, so that there is one of each
+    environment = Environment(
+        loader=FileSystemLoader([here, reporting]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    cast("dict[str, Any]", environment.filters).update(number=number, known=known)  # which the macros use
+    figures = {diagram.plot.figure: diagram.figure for section in report.sections for diagram in section.diagrams}
+    shown: dict[str, str] = {}
+    if figures:
+        plotly: Any = importlib.import_module("plotly.offline")
+        data = json.dumps({"drivers": {}, "figures": figures, "scenes": {}}, allow_nan=False, separators=(",", ":"))
+        shown = {
+            "data": packed(data),
+            "plotlyjs": packed(plotly.get_plotlyjs()),
+            "script": (reporting / "report.js").read_text("utf-8"),
+        }
+    style = (reporting / "report.css").read_text("utf-8")
+    return environment.get_template("bench.html").render(report=report, style=style, shown=shown)

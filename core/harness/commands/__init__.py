@@ -3,5 +3,19 @@
 A new command is one such file and its name in `COMMANDS`. What is slow to import is imported when the command is carried out.
 """
 
-COMMANDS = ("run", "list", "bench", "check_joint", "export", "reference")
+COMMANDS = (
+    "run",
+    "sweep",
+    "list",
+    "bench",
+    "check_joint",
+    "export",
+    "reference",
+    "explain",
+    "assemblies",
+    "trace",
+    "doctor",
+    "history",
+    "report",
+)
 """Modules of this room, in the order of the help."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,17 +41,25 @@ def _export(options: argparse.Namespace, house: House) -> int:
         raise KincheckError(unknown("format", options.to, house.writers))
     case = house.find_case(options.case, foreign.supplied(options))
     foreign.tell_left_out([case])
-    texts = written(case, house.writer(options.to), options.at)
+    keep_texts(written(case, house.writer(options.to), options.at), case.name, options.out)
+    return Status.WITHIN
+
+
+def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, *, quiet: bool = False) -> None:
+    """Write texts, given by the endings of their files, beside each other, and print the files' names.
+
+    Raises:
+        KincheckError: a file cannot be written, or without `out` would be written over.
+    """
     first = next(iter(texts))
-    main: Path = options.out or Path(case.name + first)
+    main: Path = out or Path(name + first)
     files = {main if ending == first else main.with_suffix(ending): text for ending, text in texts.items()}
     for file in files:
-        if options.out is None and file.exists():
+        if out is None and file.exists():
             raise KincheckError(f"{file} is there already; name a file with --out to write over it")
     for file, text in files.items():
         try:
             file.write_text(text, encoding="utf-8")
         except OSError as error:
             raise KincheckError(f"{file}: cannot be written ({error.strerror}); name another with --out") from error
-        print(file)
-    return Status.WITHIN
+        print(file, file=sys.stderr if quiet else sys.stdout)

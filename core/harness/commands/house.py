@@ -49,8 +49,10 @@ class House:
     writer: Callable[[str], Writer]
     simulations: Sequence[str] = ()
 
-    def find_case(self, name: str, supplied: Supplied = NOTHING) -> Case:
+    def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
         """The case of that name or in that file; `supplied` is what a file of another tool does not say.
+
+        Unless it must be driven, its drivers need not match its freedom.
 
         Raises:
             KincheckError: there is none, its file does not make sense, or its drivers do not match its freedom.
@@ -67,6 +69,8 @@ class House:
             case = load(Path(name), supplied)
         else:
             raise KincheckError(unknown("case", name, known) + "; a case file ends in .toml or .json")
+        if not driven:
+            return case
         try:
             require_driven(case.mechanism)
         except SolveError as error:  # it names the mechanism; the file is what the reader has to open

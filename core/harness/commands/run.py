@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ..engine import Engine
     from ..history.keeping import Keeping
     from ..record import Record
+    from ..reporting.measures import Past
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized coordinates, and a thousandth of
 # the 1e-9 m that outputs are held to, so that a residual amplified a hundredfold by the mechanism still cannot be seen.
@@ -46,6 +47,7 @@ def add(commands: Any) -> None:
         "--tol", type=positive, default=TOL, metavar="X", help=f"largest constraint residual [m or -]; default {TOL:g}"
     )
     run.add_argument("--out", type=Path, metavar="DIR", help="write results.json and report.html there")
+    run.add_argument("--bench", type=Path, metavar="FILE", help="show the work-precision data of this bench.json in the report")
     run.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
     run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     run.add_argument("--markdown", type=Path, metavar="FILE", help="write the table of cases and engines as Markdown")
@@ -104,6 +106,8 @@ def _run(options: argparse.Namespace, house: House) -> int:
     problems: list[str] = isolation.contradictions(options)
     if options.resume and options.history is None:
         problems.append(f"--resume needs a history: give --history FILE, or set {HISTORY}")
+    if options.bench is not None and options.out is None:
+        problems.append("--bench is for the report: give --out DIR")
     _return_cases(options, house)
     foreign.return_cases(options)
     named: list[str] = options.case or ([] if options.joints else [*house.cases()])
@@ -119,6 +123,11 @@ def _run(options: argparse.Namespace, house: House) -> int:
     if problems:  # all of them, and before anything is computed
         raise KincheckError("\n".join(problems))
 
+    precision: Any = None
+    if options.bench is not None:
+        from ..bench.engines import efforts_in
+
+        precision = efforts_in(options.bench)
     solver, settings = isolation.solver(options, engines)
     keeping = _keeping(options, cases, engines, settings)
     made = [*keeping.made] if keeping else []
@@ -130,6 +139,10 @@ def _run(options: argparse.Namespace, house: House) -> int:
             keeping.add(record)
         tell(record, done, total)
 
+    if keeping is None and (options.out or options.json):  # results that may be compared with later ones
+        from ..circumstances import conditions
+
+        settings |= conditions()
     common: dict[str, Any] = {"tol": options.tol, "command": options.command, "facts": keeping.facts if keeping else settings}
     started = datetime.now(UTC)
     stopped = False
@@ -143,10 +156,16 @@ def _run(options: argparse.Namespace, house: House) -> int:
             stopped = True
             records.sort(key=lambda each: plan.index((each.case, each.engine, each.mode)))
             results = running.results(cases, records, started=started, **common)
+    if options.out or options.json or keeping:
+        from ..scene import with_scenes
+
+        results = with_scenes(results, cases)
+    history: Any = None
     if keeping:
         keeping.end(results, interrupted=stopped)
         problems += keeping.problems
-    delivery.deliver(results, problems, matrix=options.joints, **files)
+        history = _trends(keeping) if options.out and not keeping.problems else None
+    delivery.deliver(results, problems, matrix=options.joints, precision=precision, history=history, **files)
     if options.explain:
         from ..explain import explain
 
@@ -176,6 +195,16 @@ def _keeping(
             file=sys.stderr,
         )
     return keeping
+
+
+def _trends(keeping: Keeping) -> dict[str, list[Past]]:
+    """The runs up to this one, for its report."""
+    from ..history.series import NIGHTS, read
+    from ..history.store import Store
+    from ..history.trends import trends
+
+    with Store(keeping.store.path, writable=False) as store:
+        return trends(read(store, before=keeping.run + 1, last=NIGHTS))
 
 
 def _return_cases(options: argparse.Namespace, house: House) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..case import Case
-from ..circumstances import calibration, circumstances, git_state, plain
+from ..circumstances import circumstances, conditions, plain
 from ..engine import Engine
 from ..record import Record, Results
 from ..run import planned
@@ -84,7 +84,7 @@ def keep(
         earlier = store.resume_run(identity) if resume else None
         if earlier is not None:
             return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
-        facts = known | plain({**settings, "git": git_state(Path.cwd()), "calibration_seconds": calibration()})
+        facts = known | plain({**settings, **conditions()})
         run = store.begin_run(identity, plan, facts)
     except BaseException:
         store.close()

@@ -2,6 +2,7 @@
 
 `runs`: a row a run. `records`: a row a (case, engine, mode) of a run; the columns are what trends and tables read, the whole record
 is in `record`. `documents`: what belongs to a run's case besides, references above all, each text once however many runs have it.
+`measured`: all of it in one flat table, a row a case, engine, mode, output and motion of a run, for other programs and for export.
 """
 
 from __future__ import annotations
@@ -60,6 +61,35 @@ MIGRATIONS = (
         digest TEXT NOT NULL REFERENCES documents (digest),
         PRIMARY KEY (run_id, kind, case_name)
     );
+    """,
+    """
+    ALTER TABLE records ADD COLUMN waited_seconds REAL;  -- as Seconds.waited; null in runs from before it was measured
+    CREATE VIEW measured AS
+    WITH facts AS MATERIALIZED (  -- once a run, not once a row: the text is long
+        SELECT id, started, status,
+            json_extract(circumstances, '$.kincheck') AS kincheck,
+            json_extract(circumstances, '$.python') AS python,
+            json_extract(circumstances, '$.numpy') AS numpy,
+            json_extract(circumstances, '$.host') AS host,
+            json_extract(circumstances, '$.processor') AS processor,
+            json_extract(circumstances, '$.git.commit') AS git_commit,
+            json_extract(circumstances, '$.git.branch') AS git_branch,
+            json_extract(circumstances, '$.git.changed') AS git_changed,
+            json_extract(circumstances, '$.calibration_seconds') AS calibration_seconds
+        FROM runs
+    ), motions (motion) AS (VALUES ('position'), ('velocity'), ('acceleration'))
+    SELECT facts.id AS run, started, status, kincheck, python, numpy, host, processor, git_commit, git_branch, git_changed,
+        calibration_seconds, case_name AS "case", engine, mode, version, outcome, message, truth, validated, solved, samples,
+        residual_max, build_seconds, first_seconds, warm_seconds, waited_seconds, compare_seconds, us_per_step,
+        error.key AS output, motion,
+        json_extract(error.value, '$.' || motion || '.max_abs') AS max_abs,
+        json_extract(error.value, '$.' || motion || '.rms') AS rms,
+        json_extract(error.value, '$.' || motion || '.worst_step') AS worst_step,
+        json_extract(error.value, '$.' || motion || '.tolerance') AS tolerance,
+        json_extract(error.value, '$.' || motion || '.against') AS against,
+        json_extract(error.value, '$.' || motion || '.within') AS within
+    FROM records JOIN facts ON facts.id = records.run_id LEFT JOIN json_each(records.errors) AS error CROSS JOIN motions
+    ORDER BY run, "case", engine, mode, output;
     """,
 )
 """One text for each version of the schema, which brings the tables from the one before it. A text that was published stays."""

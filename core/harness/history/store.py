@@ -66,7 +66,7 @@ class Store:
 
     def __init__(self, path: Path, *, writable: bool = True) -> None:
         self.path = path
-        with self._explained("opened"):
+        with self.explained("opened"):
             self.connection = self._writable() if writable else self._readable()
 
     def __enter__(self) -> Self:
@@ -129,6 +129,7 @@ class Store:
             "build_seconds": seconds and seconds.build,
             "first_seconds": seconds and seconds.first,
             "warm_seconds": seconds and seconds.warm,
+            "waited_seconds": seconds and seconds.waited,
             "compare_seconds": seconds and seconds.compare,
             "us_per_step": record.us_per_step,
             "errors": _json(record.errors),
@@ -148,7 +149,7 @@ class Store:
 
     def runs(self) -> list[RunRow]:
         """All runs, the latest first."""
-        with self._explained("read"):
+        with self.explained("read"):
             return [self.run(number) for (number,) in self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()]
 
     def run(self, run: int) -> RunRow:
@@ -157,7 +158,7 @@ class Store:
         Raises:
             HistoryError: there is none.
         """
-        with self._explained("read"):
+        with self.explained("read"):
             query = "SELECT id, started, finished, status, command, plan, circumstances FROM runs WHERE id = ?"
             row = self.connection.execute(query, (run,)).fetchone()
         if row is None:
@@ -168,7 +169,7 @@ class Store:
     def records(self, run: int) -> list[Record]:
         """The records of a run, in the order of its plan."""
         place = {pair: k for k, pair in enumerate(self.run(run).plan)}
-        with self._explained("read"):
+        with self.explained("read"):
             rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
             records = [msgspec.json.decode(zlib.decompress(blob), type=Record) for (blob,) in rows]
         return sorted(records, key=lambda each: place[each.case, each.engine, each.mode])
@@ -177,7 +178,7 @@ class Store:
         """A run as the command wrote it; of one without an end, what there is."""
         records = self.records(run)
         attached: dict[str, dict[str, Any]] = {}
-        with self._explained("read"):
+        with self.explained("read"):
             query = "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest) WHERE run_id = ?"
             for kind, case, content in self.connection.execute(query, (run,)):
                 attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
@@ -230,7 +231,7 @@ class Store:
 
     @contextmanager
     def _transaction(self) -> Generator[None]:
-        with self._explained("written"):
+        with self.explained("written"):
             self.connection.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -241,7 +242,8 @@ class Store:
                 raise
 
     @contextmanager
-    def _explained(self, what: str) -> Generator[None]:
+    def explained(self, what: str) -> Generator[None]:
+        """What goes wrong meanwhile is a HistoryError that names the file; `what` was to be done with it, a participle."""
         try:
             yield
         except (sqlite3.Error, OSError, ValueError, zlib.error, msgspec.MsgspecError) as error:

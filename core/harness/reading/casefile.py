@@ -32,6 +32,9 @@ from .suspension import SuspensionTable, read_output, read_suspension, with_mark
 from .tolerance import DEFAULT_ATOL, DEFAULT_WHY, tolerance
 
 LARGEST_FILE = 4_000_000
+# Twice as many bodies as the largest mechanism that was measured, and joints and points beside them.
+MOST_PARTS = 60_000
+_PARTS = ("bodies", "joints", "points", "drivers", "outputs")
 
 LENGTHS: Mapping[str, Convert] = {"m": float, "mm": lambda x: x / 1000.0}
 ANGLES: Mapping[str, Convert] = {"rad": float, "deg": math.radians}
@@ -50,6 +53,9 @@ def load_case(path: str | Path) -> Case:
         found = shown(tables["schema"]) if "schema" in tables else "none"
         raise fault(file, "schema", f'found {found}, expected "{SCHEMA}"; write schema = "{SCHEMA}"')
     keys = typed(file, "", tables, CaseKeys)
+    for what in _PARTS:
+        if (count := len(getattr(keys, what))) > MOST_PARTS:
+            raise fault(file, what, f"found {count}, expected {MOST_PARTS} at most; divide the mechanism into several cases")
     units = typed(file, "units", keys.units, UnitsKeys)
     length, angle = LENGTHS[units.length], ANGLES[units.angle]
     mechanism = _mechanism(file, keys, length)

@@ -8,21 +8,38 @@ from __future__ import annotations
 import difflib
 import json
 import math
+import re
 import reprlib
 import tomllib
+from collections import Counter
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
+from functools import cache
+from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
+from typing import Annotated, Any, TypeAlias, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
 from ...errors import CaseError, MechanismError
+from ..visible import visible
 
 # Numbers are squared and multiplied on the way: within these bounds that neither overflows nor underflows.
 LARGEST, SMALLEST = 1e100, 1e-100
 # Tables of a case are three deep, rows of numbers two more; what nests beyond that only hides in a message.
 DEEPEST = 16
+# Names are of parts of a mechanism, texts say where numbers come from; what is longer hides the rest of a message.
+LONGEST_NAME, LONGEST_TEXT = 200, 10_000
+# A message that lists all names of a large file is not read. The search for a similar name is cubic in their lengths at worst.
+MOST_NAMED, MOST_SEARCHED = 30, 10_000
+LONGEST_MESSAGE = 3_000
+# Python's bound for decimal integers, which keeps their conversion from taking hours, is 4300 digits.
+_TOO_MANY_DIGITS = "Exceeds the limit"
+# tomllib takes the square of a dotted key's length, in time and in memory: gigabytes for one of a hundred kilobytes.
+_TOML_TEXT = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*+"*+|\'\'\'(?:[^\']|\'(?!\'\'))*+\'*+|"(?:[^"\\\n]|\\.)*+"?|\'[^\'\n]*+\'?|#[^\n]*+', re.DOTALL
+)
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST + 1}}}")
 
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 60
@@ -33,8 +50,10 @@ _Class = TypeVar("_Class", bound=type)
 
 
 def fault(file: Path, key: str, problem: str) -> CaseError:
-    """The error to raise: 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' where no key is to blame."""
-    return CaseError(": ".join(filter(None, (str(file), key, problem))))
+    """The error to raise: 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' where no key is to blame; of a long one both ends."""
+    whole = visible(": ".join(filter(None, (str(file), key, problem))))
+    half = LONGEST_MESSAGE // 2
+    return CaseError(whole if len(whole) <= LONGEST_MESSAGE else f"{whole[:half]} [...] {whole[-half:]}")
 
 
 @contextmanager
@@ -60,8 +79,20 @@ def join(key: str, name: str) -> str:
 def remedy(name: str, known: Iterable[str]) -> str:
     """What to write instead of a name that is not known."""
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(names) or 'none'}"
+    close = similar(name, names)
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f"did you mean {close!r}?" if close else f"known: {', '.join(map(brief, names[:MOST_NAMED])) or 'none'}{more}"
+
+
+def similar(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """The known name that is most like another one; empty where none is."""
+    short = islice((each for each in known if len(each) <= LONGEST_NAME), MOST_SEARCHED)
+    return next(iter(difflib.get_close_matches(name, short, 1, cutoff)), "") if len(name) <= LONGEST_NAME else ""
+
+
+def brief(text: str) -> str:
+    """The beginning of a text."""
+    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 6]} [...]"
 
 
 def read_text(file: Path, limit: int, why_limit: str) -> str:
@@ -95,10 +126,15 @@ def parse(file: Path, text: str) -> dict[str, Any]:
     """
     suffix = file.suffix.lower()
     is_json = suffix == ".json" or (suffix != ".toml" and text.lstrip().startswith("{"))
+    if not is_json and (found := _LONG_KEY.search(_TOML_TEXT.sub(_blank, text))):
+        line = text.count("\n", 0, found.start()) + 1
+        raise fault(file, f"line {line}", f"found a key nested more than {DEEPEST} deep, expected two or three parts; correct it")
     try:
         data = json.loads(text, object_pairs_hook=_once) if is_json else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        if what.startswith(_TOO_MANY_DIGITS):
+            raise fault(file, "", "found an integer of thousands of digits, expected numbers of a size; correct it") from None
         raise fault(file, "", f"not valid {'JSON' if is_json else 'TOML'}: {what}; correct the syntax") from None
     if not isinstance(data, dict):
         raise fault(file, "", f"found {shown(data)}, expected the keys of a case; write an object {{...}}")
@@ -107,38 +143,64 @@ def parse(file: Path, text: str) -> dict[str, Any]:
     return tables
 
 
+def _blank(found: re.Match[str]) -> str:
+    """A quoted key in place of a text, and nothing of a comment; its lines stay, and what is after it keeps its place."""
+    part = found.group()
+    return re.sub(r"[^\n]", " " if part.startswith("#") else "_", part)
+
+
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
-        names = [name for name, _ in pairs]
-        raise ValueError(f"the key {min(name for name in names if names.count(name) > 1)!r} is given twice")
+        counts = Counter(name for name, _ in pairs)
+        raise ValueError(f"the key {shown(min(name for name, count in counts.items() if count > 1))} is given twice")
     return table
+
+
+_Path: TypeAlias = "tuple[_Path, str | int] | None"
+"""The way to a value: that to what holds it, and its name or index there. Written out only where something is wrong."""
+
+
+def _written(path: _Path) -> str:
+    steps: list[str | int] = []
+    while path is not None:
+        path, step = path
+        steps.append(step)
+    key = ""
+    for step in reversed(steps):
+        key = f"{key}[{step}]" if isinstance(step, int) else join(key, step)
+    return key
 
 
 def _check_values(file: Path, tables: Mapping[str, Any]) -> None:
     """Numbers must be usable, and text printable: it ends up in terminals and reports."""
-    waiting: list[tuple[str, Any, int]] = [("", tables, 0)]  # a stack: nesting may be deeper than Python recurses
+    waiting: list[tuple[_Path, Any, int]] = [(None, tables, 0)]  # a stack: nesting may be deeper than Python recurses
     while waiting:
-        key, value, depth = waiting.pop()
+        path, value, depth = waiting.pop()
         if depth > DEEPEST:
-            raise fault(file, key, f"nested more than {DEEPEST} deep, expected tables and rows of numbers; correct the table")
+            problem = f"nested more than {DEEPEST} deep, expected tables and rows of numbers; correct the table"
+            raise fault(file, _written(path), problem)
         if isinstance(value, dict):
             table = cast("dict[str, Any]", value)
             for name in table:
-                if not name or not name.isprintable():
-                    raise fault(file, key, f"found the name {name!r}, expected printable characters; rename it")
-            waiting += [(join(key, name), each, depth + 1) for name, each in table.items()]
+                if not name or not name.isprintable() or len(name) > LONGEST_NAME:
+                    expected = f"expected 1 to {LONGEST_NAME} printable characters"
+                    raise fault(file, _written(path), f"found the name {shown(name)}, {expected}; rename it")
+            waiting += [((path, name), each, depth + 1) for name, each in table.items()]
         elif isinstance(value, list):
-            waiting += [(f"{key}[{k}]", each, depth + 1) for k, each in enumerate(cast("list[Any]", value))]
+            waiting += [((path, k), each, depth + 1) for k, each in enumerate(cast("list[Any]", value))]
         elif isinstance(value, str):
             if not all(letter.isprintable() or letter in "\n\t" for letter in value):
-                raise fault(file, key, f"found {shown(value)}, expected printable text; remove the control characters")
+                problem = f"found {shown(value)}, expected printable text; remove the control characters"
+                raise fault(file, _written(path), problem)
+            if len(value) > LONGEST_TEXT:
+                problem = f"found a text of {len(value)} characters, expected {LONGEST_TEXT} at most; shorten it"
+                raise fault(file, _written(path), problem)
         elif isinstance(value, int | float) and not usable(value):
             # the digits of a huge integer are not shown: Python refuses to print them
             found = "a huge integer" if isinstance(value, int) else repr(value)
-            raise fault(
-                file, key, f"found {found}, expected 0 or a finite number of {SMALLEST:g} to {LARGEST:g}; correct the number"
-            )
+            problem = f"found {found}, expected 0 or a finite number of {SMALLEST:g} to {LARGEST:g}; correct the number"
+            raise fault(file, _written(path), problem)
 
 
 def usable(number: float) -> bool:
@@ -176,7 +238,7 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
         CaseError: not a table, an unknown key, a missing key, or a value of another type or shape than described.
     """
     table = as_table(file, key, value)
-    fields = {field.encode_name: field for field in msgspec.structs.fields(struct)}
+    fields = _fields(struct)
     for name in table:
         if name not in fields:
             raise fault(file, join(key, name), f"unknown key, expected one of {', '.join(fields)}; {_key_remedy(name, fields)}")
@@ -192,9 +254,15 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
     return msgspec.convert(table, struct)
 
 
+@cache
+def _fields(struct: type[msgspec.Struct]) -> Mapping[str, msgspec.structs.FieldInfo]:
+    """By key; looked up once, not for each of ten thousand bodies."""
+    return {field.encode_name: field for field in msgspec.structs.fields(struct)}
+
+
 def _key_remedy(name: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f"did you mean {close[0]!r}?" if close else "remove it"
+    close = similar(name, known)
+    return f"did you mean {close!r}?" if close else "remove it"
 
 
 def description(annotation: Any) -> str:

@@ -41,6 +41,8 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
     if kind == CASE:
         return load_case(file)
     text = _text(file)
+    if not file.stem.isprintable():  # it becomes the name of the case
+        raise fault(file, "", "found a file name with control characters, expected printable ones; rename the file")
     if kind == MODEL:
         from .mjcf.read import read_mjcf
 

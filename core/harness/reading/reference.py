@@ -13,6 +13,8 @@ from __future__ import annotations
 import csv
 import math
 import re
+from array import array
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +31,8 @@ from ..suspension import PerTravel, SuspensionOutput
 from .document import fault, read_text, remedy, shown
 
 LARGEST_FILE = 64_000_000
+# As many samples as a sweep can have, and as many lines between them.
+MOST_LINES = 2_000_000
 DERIVATIVES = (".velocity", ".acceleration")
 # Twelve digits of a driver value: what is off by less moves no output by as much as a tolerance; a rounded table is off by more.
 SAME_GRID = 1e-12
@@ -130,23 +134,30 @@ def _inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> _Sa
 def _from_csv(case_file: Path, keys: ReferenceKeys) -> _Samples:
     file = _only_beside(case_file, keys)
     text = read_text(file, LARGEST_FILE, "thin out the samples")
+    lines = text.splitlines()
+    if len(lines) > MOST_LINES:
+        raise fault(file, "", f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the samples")
+    signs = next((found[1] for line in lines if (found := SIGNS.match(line))), "")
     # comment lines are blanked, not dropped, so that the reader's line numbers are those of the file
-    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
+    lines = ["" if line.lstrip().startswith("#") else line for line in lines]
     reader = csv.reader(lines, skipinitialspace=True, strict=True)
+    samples: _Samples | None = None
+    rows: list[tuple[str, Sequence[float]]] = []
     try:
-        table = [(f"line {reader.line_num}", [cell.strip() for cell in cells]) for cells in reader if cells]
+        for cells in filter(None, reader):
+            where = f"line {reader.line_num}"
+            if samples is None:
+                samples = _Samples(file, where, [cell.strip() for cell in cells], rows, signs)
+                continue
+            _check_width(samples, where, len(cells))
+            # numbers at once: the cells of a large file as texts would take many times its size
+            numbers = (_number(file, where, name, cell) for name, cell in zip(samples.columns, cells, strict=True))
+            rows.append((where, array("d", numbers)))
     except csv.Error as error:
         raise fault(file, f"line {reader.line_num}", f"not valid CSV: {error}; correct the line") from None
-    if not table:
+    if samples is None:
         raise fault(file, "", "found no samples, expected a line of column names and rows of numbers; add them")
-    (header, columns), *body = table
-    samples = _Samples(file, header, columns, [])
-    rows: list[tuple[str, Sequence[float]]] = []
-    for where, cells in body:
-        _check_width(samples, where, len(cells))
-        rows.append((where, [_number(file, f"{where}, column {name}", cell) for name, cell in zip(columns, cells, strict=True)]))
-    signs = next((found[1] for line in text.splitlines() if (found := SIGNS.match(line))), "")
-    return _Samples(file, header, columns, rows, signs)
+    return samples
 
 
 def _only_beside(case_file: Path, keys: ReferenceKeys) -> Path:
@@ -174,13 +185,15 @@ def _beside(case_file: Path, name: str) -> Path:
     return file
 
 
-def _number(file: Path, where: str, cell: str) -> float:
+def _number(file: Path, line: str, column: str, cell: str) -> float:
     try:
         number = float(cell)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise fault(file, where, f"found {shown(cell)}, expected a finite number; correct it or leave the column out")
+        raise fault(
+            file, f"{line}, column {column}", f"found {shown(cell)}, expected a finite number; correct it or leave the column out"
+        )
     return number
 
 
@@ -191,20 +204,21 @@ def _check_width(samples: _Samples, where: str, found: int) -> None:
 
 
 def _check_columns(samples: _Samples, names: Sequence[str], outputs: Sequence[str]) -> None:
-    known = [name + suffix for name in outputs for suffix in ("", *DERIVATIVES)]
+    known = {name + suffix: None for name in outputs for suffix in ("", *DERIVATIVES)}
+    counts = Counter(names)
     if not names:
         raise fault(samples.file, samples.header, f"found no column of an output, expected some of {', '.join(outputs)}; add one")
     if samples.columns[0] in known:
         problem = f"found {samples.columns[0]!r} first, expected the driver values; put their column first"
         raise fault(samples.file, samples.header, problem)
     for name in names:
-        if names.count(name) > 1:
+        if counts[name] > 1:
             raise fault(samples.file, samples.header, f"found the column {name!r} twice, expected it once; remove one")
         if name not in known:
             problem = f"found the column {shown(name)}, expected outputs of the case; {remedy(name, known)}"
             raise fault(samples.file, samples.header, problem)
         stem = name.removesuffix(".velocity").removesuffix(".acceleration")
-        if stem not in names:
+        if stem not in counts:
             problem = f"found {name!r} alone, expected its positions too; add the column {stem!r}"
             raise fault(samples.file, samples.header, problem)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
 from ..record import Results, to_json
+from .measures import Effort, Past
 
 
 def check_destinations(
@@ -63,6 +64,8 @@ def deliver(
     json: str | None,
     junit: Path | None,
     markdown: Path | None,
+    precision: Mapping[str, Sequence[Effort]] | None = None,
+    history: Mapping[str, Sequence[Past]] | None = None,
 ) -> None:
     """Print the table and write what was asked for; a file that cannot be written does not keep back the others.
 
@@ -72,6 +75,8 @@ def deliver(
         json: a file, or "-" for standard output, which then has nothing else.
         junit: a file.
         markdown: a file, for the matrix of cases and engines.
+        precision: error against time at several efforts, by case, for report.html.
+        history: what the engines made of each case in the runs up to this one, likewise.
     """
     from .matrix import print_matrix, to_markdown
     from .table import print_table
@@ -102,4 +107,4 @@ def deliver(
     if out is not None:
         from .report import write_report
 
-        write(out / "report.html", lambda path: write_report(results, path))
+        write(out / "report.html", lambda path: write_report(results, path, history=history, precision=precision))

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 from ..compare import describe
 from ..record import Deviations, Outcome, Record, Results
 
-# What XML 1.0 cannot hold, not even escaped; a simulator's message may.
-_FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
 
 
 def to_junit(results: Results) -> bytes:
@@ -38,7 +38,7 @@ def _test(suite: ElementTree.Element, record: Record, output: str, deviations: D
     )
     verdict, message = _verdict(record, output, deviations)
     if verdict:
-        ElementTree.SubElement(test, verdict, message=_FORBIDDEN.sub("\ufffd", message))
+        ElementTree.SubElement(test, verdict, message=FORBIDDEN.sub("\ufffd", message))
 
 
 def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:

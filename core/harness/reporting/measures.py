@@ -34,6 +34,8 @@ class Effort:
     """What one engine reached at one effort setting.
 
     Attributes:
+        engine: as the report names it.
+        mode: of the engine; each has a diagram of its own.
         setting: in words, "tol 1e-6" for one.
         error: largest position error over all outputs [m].
         us_per_sample: warm time of a sample [us].
@@ -43,6 +45,7 @@ class Effort:
     setting: str
     error: float
     us_per_sample: float
+    mode: str = "projection"
 
 
 def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[str, Figure]:

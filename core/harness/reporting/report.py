@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from ..record import Outcome, Record, Results
 from .caveats import COMPARED, caveats
@@ -33,6 +34,7 @@ def write_report(
     *,
     history: Mapping[str, Sequence[Past]] | None = None,
     precision: Mapping[str, Sequence[Effort]] | None = None,
+    changes: Markup | None = None,
 ) -> None:
     """Write the report as one HTML file with all scripts, styles and data inside.
 
@@ -42,14 +44,15 @@ def write_report(
         path: the file to write, in a folder that exists.
         history: what the engines made of each case in earlier runs and this one, oldest first, by case name.
         precision: error against time at several efforts, by case name.
+        changes: a section to come first: what changed since another run.
 
     Raises:
         OSError: the file cannot be written.
     """
-    path.write_text(render(Material(results, history or {}, precision or {})), encoding="utf-8")
+    path.write_text(render(Material(results, history or {}, precision or {}), changes), encoding="utf-8")
 
 
-def render(given: Material) -> str:
+def render(given: Material, changes: Markup | None = None) -> str:
     """The report as HTML text."""
     # Loaded here, for runs that write no report; the package has no types.
     plotly: Any = importlib.import_module("plotly.offline")
@@ -69,6 +72,7 @@ def render(given: Material) -> str:
         .get_template("report.html")
         .render(
             headline=headline(records),
+            changes=changes,
             worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
             counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
             unjudged=sum(record.outcome in COMPARED and not judged([record]) for record in records),

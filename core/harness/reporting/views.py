@@ -75,7 +75,7 @@ class CaseView:
         account: the degrees of freedom, counted as in the paper and by rank.
         scene: the mechanism to be drawn; None where the results have none.
         trends: error and time over earlier runs; empty where there is no history.
-        precision: error against time at several effort settings; None where that was not measured.
+        precision: error against time at several effort settings, by mode; empty where that was not measured.
     """
 
     name: str
@@ -89,7 +89,7 @@ class CaseView:
     account: Mapping[str, Any] | None
     scene: Drawing | None
     trends: list[Plot]
-    precision: Plot | None
+    precision: list[Plot]
 
     def by_engine(self, name: str) -> list[Record]:
         """The records of the engine of that name."""
@@ -175,13 +175,14 @@ def _trends(anchor: str, history: Sequence[Past], styles: Mapping[str, Style], f
     return [Plot(f"{anchor}-trend-{what}", f"{what} over {runs} runs, log axis", f"{runs} runs, oldest first.") for what in made]
 
 
-def _precision(anchor: str, efforts: Sequence[Effort], styles: Mapping[str, Style], figures: dict[str, Figure]) -> Plot | None:
-    if not efforts:
-        return None
-    key = f"{anchor}-precision"
-    figures[key] = precision_figure(efforts, styles)
-    caption = "Left is faster, down is more exact; a point is one effort setting."
-    return Plot(key, "error against time per sample, both log axes", caption)
+def _precision(anchor: str, efforts: Sequence[Effort], styles: Mapping[str, Style], figures: dict[str, Figure]) -> list[Plot]:
+    plots: list[Plot] = []
+    for mode in dict.fromkeys(each.mode for each in efforts):
+        key = f"{anchor}-precision-{mode}"
+        figures[key] = precision_figure([each for each in efforts if each.mode == mode], styles)
+        caption = f"Mode {mode}. Left is faster, down is more exact; a point is one effort setting."
+        plots.append(Plot(key, f"{mode}: error against time per sample, both log axes", caption))
+    return plots
 
 
 def _standard(

@@ -224,7 +224,8 @@ def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
     """The quotient by the speed of travel, NaN where that is as good as zero beside the fastest of the points."""
     travel = np.abs(corner.center.z.v)
     speeds = [np.sqrt(sum(component.v * component.v for component in point)) for point in at.values()]
-    fastest = float(np.max(np.nan_to_num(np.array(speeds)), initial=0.0))
+    # over points and samples, not over lanes: variants of a design may be side by side, and are not to be judged by one another
+    fastest = np.max(np.nan_to_num(np.array(speeds)), axis=(0, 1), initial=0.0)
     still = ~(travel > STILL * fastest)
 
     def masked(values: Array) -> Array:

@@ -32,18 +32,26 @@ def on_cluster(address: str, limits: Limits) -> Solver:
     """
 
     def solve(pairs: Sequence[Pair]) -> Attempts:
-        distributed = _distributed()
-        try:
-            client: Any = distributed.Client(address, timeout=CONNECT, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
-            raise ClusterError(
-                f"scheduler {address}: does not answer ({said(error)}); start one with `dask scheduler` and workers with "
-                "`dask worker ADDRESS`, where kincheck and the engines are installed"
-            ) from error
-        with client:
+        distributed = loaded()
+        with connected(distributed, address) as client:
             yield from _gathered(distributed, client, address, pairs, limits)
 
     return solve
+
+
+def connected(distributed: Any, address: str) -> Any:
+    """A client of the scheduler, to be used in a `with`.
+
+    Raises:
+        ClusterError: the scheduler does not answer.
+    """
+    try:
+        return distributed.Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise ClusterError(
+            f"scheduler {address}: does not answer ({said(error)}); start one with `dask scheduler` and workers with "
+            "`dask worker ADDRESS`, where kincheck and the engines are installed"
+        ) from error
 
 
 def _gathered(distributed: Any, client: Any, address: str, pairs: Sequence[Pair], limits: Limits) -> Attempts:
@@ -72,7 +80,12 @@ def _gathered(distributed: Any, client: Any, address: str, pairs: Sequence[Pair]
         yield tasks[task], found
 
 
-def _distributed() -> Any:
+def loaded() -> Any:
+    """The package distributed.
+
+    Raises:
+        ClusterError: it is not installed.
+    """
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError as error:

@@ -40,8 +40,8 @@ def read_adams(file: Path, text: str) -> HardpointTable:
             columns = COLUMNS
             continue
         sections[section] = sections.get(section, 0) + 1
-        if section == "UNITS" and (found := re.fullmatch(r"LENGTH\s*=\s*'?([^']*)'?", row, re.IGNORECASE)):
-            unit = found.group(1).strip()
+        if section == "UNITS" and (found := re.fullmatch(r"LENGTH\s*=(.*)", row, re.IGNORECASE)):
+            unit = found.group(1).strip().removeprefix("'").removesuffix("'").strip()
         elif section == "HARDPOINT" and row.startswith("{"):
             columns = tuple(row.strip("{}").split())
             if sorted(columns) != sorted(COLUMNS):
@@ -67,6 +67,8 @@ def _row(file: Path, where: str, row: str, columns: tuple[str, ...]) -> tuple[st
         raise fault(file, where, f"found {len(fields)} fields, expected {len(columns)}: {' '.join(columns)}; complete the row")
     cells = dict(zip(columns, fields, strict=True))
     name, symmetry = cells["hardpoint_name"], cells["symmetry"].lower()
+    if not name or not name.isprintable():
+        raise fault(file, where, f"found the name {name!r}, expected printable characters; name the point")
     if symmetry not in (*LEFT, RIGHT):
         raise fault(file, where, f"{name}: found symmetry {shown(symmetry)}, expected a side; {remedy(symmetry, (*LEFT, RIGHT))}")
     x, y, z = (number(file, f"{where}: {name}: {axis}", cells[axis]) for axis in COLUMNS[2:])

@@ -15,7 +15,8 @@ from .table import Hardpoint, HardpointTable, number
 WHEEL_CENTER = "Spindle/COM"
 """The centre of mass of the spindle, which is where Chrono has its wheel."""
 
-_STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
+# What is open goes on to the end of the line or file: were it no match, every quote and every /* would be searched from anew.
+_STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*+"?|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
 
 
 def without_comments(text: str) -> str:

@@ -35,12 +35,12 @@ def read_plain(file: Path, text: str) -> HardpointTable:
         raise fault(file, "", f"is empty, expected a table of hardpoints; begin it with {','.join(HEAD)}")
     delimiter = max(",;\t", key=rows[0][1].count)
     where, head = rows[0]
-    unit = _head(file, where, _cells(head, delimiter))
+    unit = _head(file, where, _cells(file, where, head, delimiter))
     if unit and said.get("unit", unit) != unit:
         raise fault(file, where, f"found coordinates in {unit}, and {said['unit']} in a comment, expected one unit; correct either")
     points: dict[str, Hardpoint] = {}
     for where, line in rows[1:]:
-        cells = _cells(line, delimiter)
+        cells = _cells(file, where, line, delimiter)
         if len(cells) != len(HEAD):
             raise fault(file, where, f"found {len(cells)} fields, expected {len(HEAD)}: {', '.join(HEAD)}; complete the row")
         name, *numbers = cells
@@ -55,8 +55,11 @@ def read_plain(file: Path, text: str) -> HardpointTable:
     return HardpointTable(file, "CSV", points, unit or said.get("unit"), said.get("axes"))
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+def _cells(file: Path, where: str, line: str, delimiter: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+    except csv.Error as error:
+        raise fault(file, where, f"not valid CSV: {error}; correct the line") from None
 
 
 def _head(file: Path, where: str, cells: list[str]) -> str | None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ..casefile import AXES
 from ..coordinates import all_coordinates
-from ..document import explained, fault, remedy, shown
+from ..document import MOST_NAMED, brief, explained, fault, remedy, shown, similar
 from ..supplied import LEFT_OUT, Supplied
 from .table import HardpointTable, placed, require_size
 from .templates import TEMPLATES, Template
@@ -26,6 +25,8 @@ Reader = Callable[[Path, str], HardpointTable]
 # The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every 2.5 mm.
 TRAVEL, SAMPLES = 0.05, 41
 WHEEL = "wheel_center"
+# Cars have some tens of hardpoints at a corner; names of many more are not searched for those that are missing.
+MOST_POINTS = 10_000
 
 
 def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -> Case:
@@ -35,6 +36,10 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
         CaseError: the file cannot be read, does not say enough, or does not fill the roles of the template.
     """
     table = reader(file, text)
+    if len(table.points) > MOST_POINTS:
+        raise fault(
+            file, "", f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most; take out the others"
+        )
     template = _template(table, supplied.template)
     points = placed(table, supplied.units, supplied.axes)
     named = _filled(table, template)
@@ -50,7 +55,7 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
         mechanism = Mechanism(file.stem, [Body(name) for name in bodies], joints, watched, [stroke])
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x forward, y left, z up{LEFT_OUT}"
-    source += ", ".join(others) or "nothing"
+    source += _listed(others)
     return Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), all_coordinates(watched))
 
 
@@ -66,7 +71,8 @@ def _template(table: HardpointTable, said: str | None) -> Template:
             )
         return known[normal(said)]
     if normal(table.template) not in known:
-        raise fault(table.file, "Template", f"found {shown(table.template)}, expected one there is a template for: {names}")
+        problem = f"found {shown(table.template)}, expected one of those that there is a template for; known: {names}"
+        raise fault(table.file, "Template", problem)
     written = known[normal(table.template)]
     if said is not None and known[normal(said)] is not written:
         problem = f"found {said}, but the file is of a {table.template}, expected {written.name}; leave out --template"
@@ -93,7 +99,7 @@ def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
     unused = {normal(name): name for name in table.points if name not in filled.values()}
     lines: list[str] = []
     for role in missing:
-        close = [near for each in role.names for near in difflib.get_close_matches(each, unused, n=1, cutoff=0.75)]
+        close = [near for each in role.names if (near := similar(each, unused, 0.75))]
         advice = ""
         if close:
             name = unused[close[0]]
@@ -101,7 +107,13 @@ def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
             advice = f" (is it {name!r}{'' if where == name else f', {where}'}?)"
         lines.append(f"{role.name}, {role.meaning}{advice}")
     problem = f"template {template.name}: missing {'; '.join(lines)}"
-    raise fault(table.file, "", f"{problem}; found beside: {', '.join(unused.values()) or 'nothing'}; rename or add them")
+    raise fault(table.file, "", f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names to read: all of those that a file of a suspension has."""
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(map(brief, names[:MOST_NAMED])) + more or "nothing"
 
 
 def _require_left_and_upright(

@@ -87,7 +87,8 @@ def parse_xml(file: Path, text: str) -> Element:
     Raises:
         CaseError: not well-formed, nested too deeply, or with a document type, which MJCF has none of and which may hold entities.
     """
-    parser = expat.ParserCreate()
+    # a declared encoding is not looked up: the text has been decoded, and Python knows encodings that expat cannot take
+    parser = expat.ParserCreate("utf-8")
     roots: list[Element] = []
     open_: list[Element] = []
 

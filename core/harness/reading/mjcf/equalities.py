@@ -46,7 +46,7 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Connect | Relation]:
     Raises:
         CaseError: one that refers to what does not exist, is open at qpos0, is not linear, or is of a kind there is no joint for.
     """
-    tendons = _tendons(root)
+    tendons, names = _tendons(root), set[str]()
     off = any(flag.attributes.get("equality") == "disable" for option in root.only("option") for flag in option.only("flag"))
     for section in root.only("equality"):
         for k, bare in enumerate(section.children, 1):
@@ -58,7 +58,11 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Connect | Relation]:
             if off or element.choice("active", ("true", "false"), "true") == "false":
                 tree.count("equalities that are not active")
                 continue
-            yield _READERS[element.tag](element.attributes.get("name", f"{element.tag}{k}"), element, tree, tendons)
+            name = element.attributes.get("name", f"{element.tag}{k}")
+            if name in names:
+                raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the equalities")
+            names.add(name)
+            yield _READERS[element.tag](name, element, tree, tendons)
 
 
 _Tendons = Mapping[str, Element]

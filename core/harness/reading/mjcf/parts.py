@@ -31,8 +31,9 @@ class Parts:
 
     def name(self, wanted: str) -> str:
         """A name for a joint that none has yet: equalities and joints of a model may share names."""
-        taken = (*self.joints, *self.couplers)
-        return wanted if wanted not in taken else self.name(f"{wanted}'")
+        while wanted in self.joints or wanted in self.couplers:
+            wanted += "'"
+        return wanted
 
 
 def parts_of(tree: Tree, equalities: Sequence[Connect | Relation], driving: Driving) -> Parts:
@@ -43,6 +44,7 @@ def parts_of(tree: Tree, equalities: Sequence[Connect | Relation], driving: Driv
     """
     parts = Parts(dict(tree.moving), {tree.free[name] for name in driving.fixed if name in tree.free})
     rods = _rods(tree, equalities, driving)
+    replaced = {id(connect) for _, connect in rods.values()}
     for name, (rod, connect) in rods.items():
         del parts.bodies[rod.inner]
         ends = rod.outer, connect.j if connect.i == rod.inner else connect.i
@@ -55,7 +57,7 @@ def parts_of(tree: Tree, equalities: Sequence[Connect | Relation], driving: Driv
     for each in equalities:
         if isinstance(each, Relation):
             _couple(tree, parts, each)
-        elif all(each is not connect for _, connect in rods.values()):
+        elif id(each) not in replaced:
             name = parts.name(each.name)
             kind = Fixed if each.weld else Spherical
             parts.joints[name] = kind(name, each.i, each.j, coordinates(each.point))
@@ -75,19 +77,25 @@ def _joint(joint: ModelJoint) -> Joint:
 
 def _rods(tree: Tree, equalities: Sequence[Connect | Relation], driving: Driving) -> Mapping[str, tuple[ModelJoint, Connect]]:
     """Bodies between a ball joint and one connect, by the joint's name: they can turn about themselves, which nothing drives."""
-    connects = [each for each in equalities if isinstance(each, Connect)]
+    connects: dict[str, list[Connect]] = {}
+    for each in equalities:
+        if isinstance(each, Connect):
+            connects.setdefault(each.i, []).append(each)
+            connects.setdefault(each.j, []).append(each)
     outer = {joint.outer for joint in tree.joints.values()}
     found: dict[str, tuple[ModelJoint, Connect]] = {}
+    inner: set[str] = set()
     for name, joint in tree.joints.items():
-        held = [each for each in connects if joint.inner in (each.i, each.j)]
+        held = connects.get(joint.inner, [])
         alone = joint.type == "ball" and joint.inner not in outer and joint.outer not in tree.massless
         if not alone or name in driving.fixed or len(held) != 1 or held[0].weld:
             continue
         other = held[0].j if held[0].i == joint.inner else held[0].i
         arm = held[0].point - joint.point
         # a rod to the body it hangs on moves nothing, and two of them end to end are a chain that only bodies can carry
-        if other != joint.outer and arm @ arm > 0.0 and all(rod.inner != other for rod, _ in found.values()):
+        if other != joint.outer and arm @ arm > 0.0 and other not in inner:
             found[name] = joint, held[0]
+            inner.add(joint.inner)
     return found
 
 

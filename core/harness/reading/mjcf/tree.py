@@ -16,6 +16,8 @@ from .elements import Element
 from .frames import HERE, Compiler, Place, joint_axis, read_place
 
 WORLD = "world"
+# Ten times as many as robots and hands have.
+MOST_BODIES = 2_000
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,8 @@ class Tree:
         name = element.attributes.get("name", f"body{len(self.places)}")
         if name in self.places:
             raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the bodies")
+        if len(self.places) > MOST_BODIES:
+            raise element.fault(f"found more than {MOST_BODIES} bodies, expected fewer; take out what does not move")
         place = around.then(read_place(element, self.compiler))
         childclass = _class(element, childclass)
         elements = list(element.only("joint", "freejoint"))
@@ -116,6 +120,8 @@ class Tree:
             if name in self.joints or (kind == "free" and name in self.free):
                 raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the joints")
             inner = body if last else f"{body}.{name}"
+            if len(self.moving) > MOST_BODIES:
+                raise element.fault(f"is one of more than {MOST_BODIES} joints, expected fewer; take out what does not move")
             self.moving[inner] = place
             if not last:
                 self.massless.add(inner)

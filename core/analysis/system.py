@@ -1,0 +1,151 @@
+"""The equations of a model at poses of any kind, outside the march: residuals, Jacobian and right-hand sides as plain matrices.
+
+For what is rare: a pose that is nearly singular, a curve that turns back. Many poses at once are lanes, run by numpy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..algebra import Scalar
+from ..primitives.base import Motion
+from ..program import NumpyExecutor, Plan, program
+from ..trajectory import Array
+from .model import Model
+from .programs import FROM, RATE, RATE_T, TIME, Tracer
+
+EULER = 4
+"""Numbers of a vector of a state that is Euler parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The kept rows at m poses, in the order of `System.owners`.
+
+    Attributes:
+        phi: residuals, shape (m, n).
+        jacobian: by the unknowns, shape (m, n, n).
+        nu: right-hand sides of the velocity equations: the residuals' loss by time where the pose stands, shape (m, n).
+    """
+
+    phi: Array
+    jacobian: Array
+    nu: Array
+
+    @property
+    def closure(self) -> Array:
+        """Largest residual of each pose, shape (m,); infinite where it is not a number."""
+        return np.nan_to_num(np.abs(self.phi).max(axis=1), nan=np.inf)
+
+
+class System:
+    """The equations of a model whose geometry is given in numbers.
+
+    A state is one column of numbers [units, rad, -]; what moves the drivers is a sample, as `Model.samples` gives it.
+
+    Attributes:
+        owners: joint or driver of every kept row.
+        driven: which kept rows are drivers', shape (n,).
+        unknowns: n.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model, self._tracer = model, Tracer(model.mechanism, replace(model.request, compiled=False))
+        tracer, kept = self._tracer, self._tracer.selection.kept
+        formulation, at, vector = tracer.formulation, tracer.at, tracer.layout.vector
+        self.unknowns = tracer.unknowns
+        self.owners = [formulation.owners[k][0] for k in kept]
+        joint_rows = len(formulation.owners) - len(model.mechanism.drivers)
+        self.driven: NDArray[np.bool_] = np.array(kept) >= joint_rows
+        self._names = {name: vector(name, len(value)) for name, value in formulation.design.items()}
+        self._state = [slot for slots in self._names.values() for slot in slots]
+        self._phi, self._nu, self._gamma, self._step = (vector(name, self.unknowns) for name in ("phi", "nu", "gamma", "step"))
+        every, phi, nu = formulation.rows(at), formulation.phi(at), formulation.nu(at)
+        rows = [every[k] for k in kept]
+        self._entries = np.array([(i, j) for i, row in enumerate(rows) for j in row])
+        self._values = [tracer.layout.scalar(f"entry {i} {j}") for i, j in self._entries.tolist()]
+        gamma = formulation.gamma(at, [tracer.tape.input(k) for k in vector(RATE, self.unknowns)])
+        after = formulation.retract(at, [tracer.tape.input(k) for k in self._step])
+        wanted: dict[str, tuple[Sequence[int], list[Scalar]]] = {
+            "rows": (
+                [*self._phi, *self._nu, *self._values],
+                [*(phi[k] for k in kept), *(nu[k] for k in kept), *(x for row in rows for x in row.values())],
+            ),
+            "gamma": (self._gamma, [gamma[k] for k in kept]),
+            "retract": (self._state, [x for name in self._names for x in after[name]]),
+        }
+        programs = [program(name, tracer.tape, dict(zip(*each, strict=True))) for name, each in wanted.items()]
+        self._vectors, slots = tracer.layout.vectors, tracer.layout.slots
+        self._plan = Plan({each.name: each for each in [*programs, tracer.outputs()]}, slots)
+        self._sampled = [tracer.layout.scalar(TIME), *(k for name in model.request.drivers for k in self._vectors[f"drive {name}"])]
+        self._executors: dict[int, NumpyExecutor] = {}
+
+    def state(self, lanes: Array, ahead: str = FROM) -> Array:
+        """States of lanes of the model, where they are predicted from unless said otherwise; shape (numbers, lanes)."""
+        return np.concatenate([lanes[self.model.vectors[f"{ahead}{name}"]] for name in self._names])
+
+    def equations(self, state: Array, sample: Array) -> Equations:
+        """The kept rows at states, shape (numbers, m), and samples, shape (sampled, m)."""
+        executor = self._at(state, sample)
+        executor.run("rows")
+        m = state.shape[1]
+        jacobian = np.zeros((m, self.unknowns, self.unknowns))
+        jacobian[:, self._entries[:, 0], self._entries[:, 1]] = executor.get(self._values).T
+        return Equations(executor.get(self._phi).T, jacobian, executor.get(self._nu).T)
+
+    def gamma(self, state: Array, sample: Array, rate: Array) -> Array:
+        """Right-hand sides of the acceleration equations at rates of the unknowns, shape (m, n)."""
+        executor = self._at(state, sample)
+        executor.put(self._vectors[RATE], rate.T)
+        executor.run("gamma")
+        return executor.get(self._gamma).T
+
+    def stepped(self, state: Array, step: Array) -> Array:
+        """States after steps of the unknowns, shape (m, n)."""
+        executor = self._executor(state.shape[1])
+        executor.put(self._state, state)
+        executor.put(self._step, step.T)
+        executor.run("retract")
+        return executor.get(self._state)
+
+    def outputs(self, state: Array, sample: Array, rate: Array, rate_t: Array) -> dict[str, Array]:
+        """The wanted motions by name, shape (components, m) each, and the tests "closure", "leftover" and "branch"."""
+        executor = self._at(state, sample)
+        executor.put(self._vectors[RATE], rate.T)
+        executor.put(self._vectors[RATE_T], rate_t.T)
+        executor.run("outputs")
+        slots = {name: self._vectors[name] for name in self.model.rows if name in self._vectors}
+        slots |= {name: [self._plan.slots[name]] for name in ("closure", "leftover", "branch")}
+        return {name: executor.get(each) for name, each in slots.items()}
+
+    def apart(self, a: Array, b: Array) -> float:
+        """The largest difference between two states as poses: Euler parameters p and -p are the same."""
+        found, first = 0.0, 0
+        for slots in self._names.values():
+            x, y = (each[first : first + len(slots)] for each in (a, b))
+            first += len(slots)
+            same = float(np.abs(x - y).max())
+            found = max(found, min(same, float(np.abs(x + y).max())) if len(slots) == EULER else same)
+        return found
+
+    def motions(self, state: Array, rate: Array) -> Mapping[str, Motion]:
+        """How the bodies move in one state, shape (numbers,), at rates of the unknowns, shape (n,)."""
+        formulation = self._tracer.formulation
+        numbers = iter(state.tolist())
+        named = {name: [next(numbers) for _ in slots] for name, slots in self._names.items()}
+        return formulation.motions(formulation.configuration(named), rate.tolist())
+
+    def _executor(self, lanes: int) -> NumpyExecutor:
+        if lanes not in self._executors:  # kept: binding costs more than running
+            self._executors[lanes] = NumpyExecutor(self._plan, lanes)
+        return self._executors[lanes]
+
+    def _at(self, state: Array, sample: Array) -> NumpyExecutor:
+        executor = self._executor(state.shape[1])
+        executor.put(self._state, state)
+        executor.put(self._sampled, sample)
+        return executor

@@ -1,0 +1,116 @@
+"""The native engine in detail: by what is asked of it, by executor, and with and without the Python around its loops."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...analysis.march import CONSISTENT, Route
+from ...analysis.model import Model, compile_model
+from ...analysis.programs import Request
+from ...analysis.solve import follow
+from ...errors import SolveError
+from ...program.compiled import available
+from ...trajectory import Trajectory
+from ..case import Case
+
+EVERYTHING = "every body and point: position, velocity, acceleration"
+"""The level that all others are compared with."""
+ALONE = f"{EVERYTHING}; loops alone"
+NUMPY = f"{EVERYTHING}; numpy executor"
+
+
+@dataclass(frozen=True)
+class Level:
+    """The native engine, asked for more or less; see `Engine`.
+
+    Attributes:
+        order: 0 positions, 1 and velocities, 2 and accelerations.
+        bodies: of every body too, in the paper's variables, and not of the compared points only.
+        compiled: by machine code, else by numpy.
+    """
+
+    order: int = 2
+    bodies: bool = True
+    compiled: bool = True
+    name = "native"
+    mode = "projection"
+
+    @property
+    def loop(self) -> str:
+        """Where the loop over samples and iterations runs."""
+        return "compiled" if self.compiled and available() else "python"
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What is asked for, and the executor."""
+        return {"order": self.order, "every_body": self.bodies, "executor": "llvm" if self.loop == "compiled" else "numpy"}
+
+    def version(self) -> str | None:
+        """Version of kincheck."""
+        return importlib.metadata.version("kincheck")
+
+    def unsupported(self, case: Case) -> str | None:
+        """Never."""
+        return None
+
+    def build(self, case: Case) -> Route:
+        """The programs for what is asked, and the samples laid out."""
+        path, bodies = case.sweep.path, tuple(body.name for body in case.mechanism.moving) if self.bodies else ()
+        request = Request(tuple(path.motions), case.points, bodies, self.order, compiled=self.compiled)
+        return Route(compile_model(case.mechanism, request), path)
+
+    def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
+        """The whole call, Python included."""
+        return follow(model, tol)
+
+
+LEVELS: Mapping[str, Level] = {
+    EVERYTHING: Level(),
+    "every body and point: position, velocity": Level(order=1),
+    "every body and point: position": Level(order=0),
+    "compared points: position, velocity, acceleration": Level(bodies=False),
+    "compared points: position": Level(order=0, bodies=False),
+    NUMPY: Level(compiled=False),
+    "every body and point: position; numpy executor": Level(order=0, compiled=False),
+}
+"""What is timed as a whole call, by what is asked."""
+
+
+def loops_alone(case: Case, tol: float) -> Callable[[], None]:
+    """The executor's loops over all samples, everything asked for: no Python but two calls, no result made of the numbers.
+
+    It is to the native engine what a floor is to a simulator, tests and copying included.
+
+    Raises:
+        SolveError: a step has to be divided, which needs Python.
+    """
+    route = Level().build(case)
+    model, n = route.model, len(route.path.times)
+    executor = model.executor(route.lanes)
+    anchor = route.departure.copy()
+    for name, value in (("tolerance", tol), ("consistent", max(CONSISTENT, tol))):
+        anchor[model.slots[name]] = value
+    out = np.empty((model.kept, n + 2 * executor.margin))
+
+    def work() -> None:
+        for side in route.sides:
+            first = side.first + executor.margin
+            went = executor.follow(anchor.copy(), side.samples, out, first, side.step)
+            if went < len(side.times):
+                raise SolveError(f"case {case.name!r}: the loops alone end after {went} of {len(side.times)} samples on one side")
+
+    return work
+
+
+def flops_of(model: Model, iterations: float, test: str = "joined") -> float:
+    """Floating-point operations of a sample: predictor, Newton's iterations, rates, outputs and the test of a solution.
+
+    Those of lanes that were computed and not accepted, or iterated on because a neighbour did, do not count.
+    """
+    sizes = {name: each["flops"] for name, each in model.sizes.items()}
+    return sizes["predict"] + iterations * sizes["newton"] + sizes["motion"] + sizes["outputs"] + sizes[test]

@@ -1,0 +1,74 @@
+"""Times that can be compared: contestants take turns in one process, so that what else the machine does meets all of them."""
+
+from __future__ import annotations
+
+import gc
+import math
+from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter
+from typing import TypeVar
+
+import msgspec
+import numpy as np
+
+# A turn is long against the clock's resolution and short against what interrupts a process: quick work is done several times.
+TURN = 2e-3
+
+Key = TypeVar("Key")
+Work = Callable[[], object]
+
+
+class Spread(msgspec.Struct, frozen=True, kw_only=True):
+    """A time over several rounds: median, quartiles and the least, all in the unit of its place."""
+
+    least: float
+    median: float
+    lower: float
+    upper: float
+    rounds: int
+
+    def times(self, factor: float) -> Spread:
+        """In another unit, or of another amount."""
+        least, median, lower, upper = (factor * each for each in (self.least, self.median, self.lower, self.upper))
+        return Spread(least=least, median=median, lower=lower, upper=upper, rounds=self.rounds)
+
+
+def spread(values: Sequence[float]) -> Spread:
+    """Of values, one a round."""
+    least, lower, median, upper = np.percentile(values, (0.0, 25.0, 50.0, 75.0)).tolist()
+    return Spread(least=least, median=median, lower=lower, upper=upper, rounds=len(values))
+
+
+def take_turns(contestants: Mapping[Key, Work], rounds: int) -> dict[Key, Spread]:
+    """Seconds of one call of each contestant, over rounds in which every one has its turn.
+
+    Each is called once before all rounds. Quick work is called once more before each of its turns, untimed: what the contestant
+    before it drove out of the caches is back then, for all alike. Python's garbage is collected between rounds only.
+    """
+    calls: dict[Key, int] = {}
+    for key, work in contestants.items():
+        work()
+        begin = perf_counter()
+        work()
+        calls[key] = max(1, math.ceil(TURN / (perf_counter() - begin)))
+    times: dict[Key, list[float]] = {key: [] for key in contestants}
+    enabled = gc.isenabled()
+    try:
+        for _ in range(rounds):
+            gc.collect()
+            gc.disable()
+            for key, work in contestants.items():
+                times[key].append(_turn(work, calls[key]))
+            gc.enable()
+    finally:
+        (gc.enable if enabled else gc.disable)()
+    return {key: spread(each) for key, each in times.items()}
+
+
+def _turn(work: Work, calls: int) -> float:
+    if calls > 1:
+        work()
+    begin = perf_counter()
+    for _ in range(calls):
+        work()
+    return (perf_counter() - begin) / calls

@@ -1,0 +1,177 @@
+"""Cost against the size of a mechanism: a chain of four-bar loops, solved by every engine in projection mode.
+
+The loops are those of IFToMM's benchmark A02, unit cranks and couplers, with a ball and a cross at each coupler in place of
+revolutes, so that no row is redundant. Every crank turns as the first one does: the truth is a closed form.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from ...analysis.cascade import Cascade
+from ...analysis.cascade_sweep import CascadeSweep
+from ...analysis.programs import Request
+from ...drivers import JointAngle
+from ...joints import Revolute, Spherical, Universal
+from ...mechanism import Body, Mechanism, Point
+from ...program.compiled import available
+from ...trajectory import Trajectory
+from ..case import Case, Output, Series, Sweep, Truth
+from ..engine import Engine
+from ..record import Outcome
+from ..run import NATIVE
+from .precision import Contestant, contestants
+from .rounds import Spread, take_turns
+
+LOOPS = (1, 2, 4, 8, 16)
+MANY = (16, 100, 1000, 5000)
+"""For what solves a chain loop by loop."""
+# Of the cranks at design [rad]; a quarter turn from upright the links are in line and the motion branches.
+LEAN, TURN = 0.3, 0.8
+SAMPLES = 64
+# An engine that has taken longer than this for all samples of one size is not tried with the next [s]: it would fill the rounds.
+LONGEST = 0.1
+CHAIN = "chain of four-bar loops"
+
+
+class Size(msgspec.Struct, frozen=True, kw_only=True):
+    """A mechanism of so many loops, solved by an engine.
+
+    Attributes:
+        outcome: null where it was not tried, and the message says why.
+        error: largest position error of the last crank's end [m]; residual: the engine's own; null where it was not solved.
+        us_per_sample: null where not all samples were reached.
+    """
+
+    mechanism: str
+    loops: int
+    bodies: int
+    engine: str
+    mode: str
+    loop: str
+    message: str
+    outcome: Outcome | None = None
+    error: float | None = None
+    residual: float | None = None
+    us_per_sample: Spread | None = None
+
+
+def chain(loops: int) -> Case:
+    """Cranks at (k, 0) that lean alike, tied by couplers; the first one turns to both sides."""
+    s, c, n, z = math.sin(LEAN), math.cos(LEAN), range(loops), (0.0, 0.0, 1.0)
+    cranks = [Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), z) for k in range(loops + 1)]
+    balls = [Spherical(f"ball{k}", f"crank{k}", f"coupler{k}", (k + s, c, 0.0)) for k in n]
+    crosses = [Universal(f"cross{k}", f"crank{k + 1}", f"coupler{k}", (k + 1 + s, c, 0.0), (z, (0.0, 1.0, 0.0))) for k in n]
+    mechanism = Mechanism(
+        f"chain of {loops} loops",
+        [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)],
+        [*cranks, *balls, *crosses],
+        [Point("end", f"crank{loops}", (loops + s, c, 0.0))],
+        [JointAngle("turn", "pivot0")],
+    )
+    turn = np.linspace(-TURN, TURN, SAMPLES)
+    x, y = np.sin(LEAN - turn), np.cos(LEAN - turn)
+    why = "a thousand round-offs of a loop, by the number of loops they add up over"
+    outputs = tuple(
+        Output(name, "end", direction, False, 1e-12 * loops, 0.0, why)
+        for name, direction in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)))
+    )
+    reference = {"x": Series(loops + x, -y, -x), "y": Series(y, x, -y)}
+    source = "IFToMM benchmark A02, N-four-bar mechanism"
+    return Case(mechanism.name, source, Truth.CLOSED_FORM, mechanism, Sweep("turn", turn), outputs, reference)
+
+
+@dataclass(frozen=True)
+class ByComponents:
+    """The native engine, a component of the mechanism after the other, those that are alike by the same code; see `Engine`."""
+
+    name = "native, by components"
+    mode = "projection"
+
+    @property
+    def loop(self) -> str:
+        """Where the loop over components and iterations runs."""
+        return "compiled" if available() else "python"
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """None."""
+        return {}
+
+    def version(self) -> str | None:
+        """Version of kincheck."""
+        return importlib.metadata.version("kincheck")
+
+    def unsupported(self, case: Case) -> str | None:
+        """Never: for chains only."""
+        return None
+
+    def build(self, case: Case) -> CascadeSweep:
+        """The components' programs."""
+        path = case.sweep.path
+        return CascadeSweep(Cascade(case.mechanism, Request(tuple(path.motions), case.points)), path)
+
+    def solve(self, model: CascadeSweep, case: Case, tol: float) -> Trajectory:
+        """All samples."""
+        return model.solve(tol)
+
+
+def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Size]:
+    """Solve chains of all lengths with all engines, in turns; where the native one is among them, long ones by components."""
+    ladders: list[tuple[Engine, Sequence[int]]] = [(engine, LOOPS) for engine in engines]
+    if any(engine.name == NATIVE for engine in engines):
+        ladders.insert(1, (ByComponents(), MANY))
+    found = [each for engine, ladder in ladders for each in _solved(engine, ladder, tol)]
+    work = {k: each.work for k, (_, each) in enumerate(found) if each is not None and each.work is not None}
+    seconds = take_turns(work, rounds)
+    times = {k: seconds[k].times(1e6 / SAMPLES) for k in work}
+    return [msgspec.structs.replace(size, us_per_sample=times.get(k)) for k, (size, _) in enumerate(found)]
+
+
+def _solved(engine: Engine, ladder: Sequence[int], tol: float) -> Iterator[tuple[Size, Contestant | None]]:
+    """An engine's chains, the shortest first, solved and not yet timed."""
+    slow = ""
+    for loops in ladder:
+        case = chain(loops)
+        size = Size(
+            mechanism=CHAIN,
+            loops=loops,
+            bodies=len(case.mechanism.moving),
+            engine=engine.name,
+            mode=engine.mode,
+            loop=str(engine.loop),
+            message=slow,
+        )
+        if slow:
+            yield size, None
+            continue
+        (each,) = contestants(case, {"": engine}, tol)
+        entry = each.entry
+        facts: dict[str, Any] = {"outcome": entry.outcome, "message": entry.message, "residual": entry.residual}
+        yield msgspec.structs.replace(size, **facts, error=entry.errors.position), each
+        if each.work is not None:
+            begin = perf_counter()
+            each.work()
+            seconds = perf_counter() - begin
+            slow = f"not tried: {loops} loops took {seconds:.2g} s for {SAMPLES} samples" if seconds > LONGEST else ""
+
+
+def growth(sizes: Sequence[Size]) -> tuple[int, int, float] | None:
+    """Two numbers of loops and the exponent of an engine's cost between them; None where it was not timed twice.
+
+    The larger is its largest, the smaller its first of a hundred or more, or else the next.
+    """
+    timed = [(each.loops, each.us_per_sample.median) for each in sizes if each.us_per_sample is not None]
+    if len(timed) < 2:
+        return None
+    m, u = timed[-1]
+    n, t = next((each for each in timed[:-1] if each[0] >= 100), timed[-2])
+    return n, m, math.log(u / t) / math.log(m / n)

@@ -1,0 +1,136 @@
+"""kincheck history: the runs that were kept, and what they say of a case and an engine."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...errors import KincheckError
+from .house import House, Status, unknown
+from .run import HISTORY
+
+if TYPE_CHECKING:
+    from ..history.series import History
+    from ..history.store import RunRow, Store
+
+LAST = 20  # runs: what a terminal shows at once
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    history: argparse.ArgumentParser
+    history = commands.add_parser("history", help="list the runs kept, their trends and steps", description=_history.__doc__)
+    history.set_defaults(do=_history)
+    add_history(history, "the history")
+    history.add_argument("--case", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these cases only")
+    history.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these engines only")
+    history.add_argument("--last", type=_count, default=LAST, metavar="N", help="the latest N runs; default %(default)s; 0: all")
+    history.add_argument("--plot", type=Path, metavar="FILE.html", help="draw errors and times over the runs, as a page")
+    history.add_argument("--export", type=Path, metavar="FILE", help="write all runs as one table: FILE.parquet or FILE.csv")
+
+
+def add_history(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the option that says where the history is."""
+    parser.add_argument(
+        "--history",
+        type=Path,
+        metavar="FILE",
+        default=os.environ.get(HISTORY) or None,
+        help=f"{what}, which kincheck run --history wrote; default: the environment variable {HISTORY}",
+    )
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of runs; give 0, 1, 2, ...")
+    return int(text)
+
+
+def _history(options: argparse.Namespace, house: House) -> int:
+    """List the runs, the latest first; for a case or an engine, its errors and times in them and the steps in these."""
+    from ..history.series import read
+    from ..history.store import Store
+
+    if options.history is None:
+        raise KincheckError(f"history: which file? give --history FILE, or set {HISTORY}")
+    with Store(Path(options.history), writable=False) as store:
+        chosen: dict[str, Any] = {"cases": options.case, "engines": options.engine}
+        _check_names(store, **chosen)
+        history = read(store, last=options.last or None, **chosen)
+        if options.case or options.engine:
+            _print_trends(history)
+        else:
+            _print_runs(store, store.runs()[: options.last or None])
+        if options.plot is not None:
+            from ..history.plot import write_plot
+
+            write_plot(history, options.plot, title=f"{Path(options.history).name}: errors and times over the runs")
+            print(f"{options.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)} runs")
+        if options.export is not None:
+            from ..history.export import export
+
+            count = export(store, options.export, **chosen)
+            print(f"{options.export}: {count} rows")
+    return Status.WITHIN
+
+
+def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> None:
+    for what, column, names in (("case", "case_name", cases), ("engine", "engine", engines)):
+        known = [name for (name,) in store.connection.execute(f"SELECT DISTINCT {column} FROM records ORDER BY {column}")]
+        for name in names:
+            if name not in known:
+                raise KincheckError(f"history {store.path}: {unknown(what, name, known)}")
+
+
+def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
+    from ..printing import columns, page
+    from ..record import Outcome
+
+    table = columns(">run", "started", "status", "outcomes", "engines", "commit", "host", "command")
+    for row in rows:
+        found = store.connection.execute("SELECT outcome, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)).fetchall()
+        counts = Counter(outcome for outcome, _, _ in found)
+        told = ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome])
+        missing = len(row.plan) - len(found)
+        versions = {engine: version for _, engine, version in found if version}
+        git: dict[str, Any] = row.circumstances.get("git") or {}
+        commit = str(git.get("commit") or "–")[:10] + ("+" if git.get("changed") else "")
+        table.add_row(
+            str(row.id),
+            row.started[:16].replace("T", " "),
+            row.status,
+            told + (f", {missing} missing" if missing else ""),
+            ", ".join(f"{engine} {version}" for engine, version in versions.items()),
+            commit,
+            str(row.circumstances.get("host", "–")),
+            row.command,
+        )
+    page(None).print(table)
+    if not rows:
+        print("no runs yet")
+
+
+def _print_trends(history: History) -> None:
+    from ..history.trends import largest_length, run_name
+    from ..printing import columns, page
+    from ..regression.steps import steps
+    from ..regression.wording import product, step_says
+    from ..reporting.wording import number
+
+    console = page(None)
+    for (case, engine, mode), entries in history.pairs.items():
+        table = columns("run", "version", "outcome", ">error m", ">us/step", title=f"{case} · {product(engine, mode)}")
+        for entry in entries:
+            row = history.runs[entry.run]
+            error = largest_length(entry, case, row)
+            table.add_row(run_name(row), entry.version or "–", str(entry.outcome), number(error), number(entry.us_per_step))
+        console.print(table)
+    for step in steps(history):
+        sign = "worse" if step.worse else "better"
+        console.print(f"{sign}: {step.case} · {product(step.engine, step.mode)}: {step_says(step)}", soft_wrap=True)
+    if not history.pairs:
+        print("no runs of these yet")

@@ -1,0 +1,256 @@
+"""kincheck sweep: solve many variants of a case's design and see what they make of its outputs."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from ...errors import KincheckError
+from ..console import complain
+from . import foreign
+from .house import House, Status, unknown
+from .run import TOL, positive
+
+if TYPE_CHECKING:
+    from ..attempt import Solver
+    from ..case import Case
+    from ..engine import Engine
+    from ..study.results import SweepResults
+    from ..study.study import Study
+    from ..study.sweep import Progress
+
+# Seconds between lines of progress where they do not overwrite each other.
+EVERY = 10.0
+
+FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    sweep: argparse.ArgumentParser
+    sweep = commands.add_parser("sweep", help="solve many variants of a design", description=_sweep.__doc__)
+    sweep.set_defaults(do=_sweep)
+    sweep.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    sweep.add_argument("--vary", type=Path, required=True, metavar="FILE", help="what varies, and by how much (kincheck-vary/1)")
+    sweep.add_argument("--samples", type=_whole(1), metavar="N", help="variants that are drawn")
+    sweep.add_argument("--seed", type=_whole(0), default=0, metavar="S", help="of the draws; default %(default)s")
+    sweep.add_argument("--output", nargs="+", action="extend", default=[], metavar="NAME", help="only these outputs; default: all")
+    sweep.add_argument(
+        "--order", type=int, choices=(0, 1, 2), default=0, help="derivatives of the outputs by time too; default %(default)s"
+    )
+    sweep.add_argument("--tol", type=positive, default=TOL, metavar="X", help=f"largest constraint residual; default {TOL:g}")
+    sweep.add_argument("--jobs", type=_whole(1), metavar="N", help="threads; default: half the processors")
+    sweep.add_argument("--scheduler", metavar="ADDRESS", help="solve on the workers of this dask.distributed scheduler instead")
+    sweep.add_argument(
+        "--check",
+        metavar="ENGINE[:SHARE]",
+        help="rebuild a share of the variants as cases of their own, at least one, and solve them with this engine; default 0.01",
+    )
+    sweep.add_argument(
+        "--replay",
+        type=_whole(0),
+        nargs="+",
+        metavar="INDEX",
+        help="solve only these variants of the seed, each as a case of its own, as kincheck run does; with --check its engine too",
+    )
+    sweep.add_argument("--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
+    sweep.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    foreign.add_options(sweep)
+
+
+def _whole(least: int) -> Any:
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = least - 1
+        if number < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of {least} or more; give one")
+        return number
+
+    return read
+
+
+def _sweep(options: argparse.Namespace, house: House) -> int:
+    """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its outputs over them.
+
+    Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the work could not be done.
+    """
+    from ..reporting import deliver as delivery
+    from ..study.study import Study
+    from ..study.sweep import how_many
+    from ..study.vary import read_variation
+
+    problems: list[str] = []
+    names = ("results.json", "report.html") if options.replay else FILES
+    delivery.check_destinations(problems, out=options.out, json=options.json, names=names)
+    if options.store is not None:
+        delivery.check_destinations(problems, out=None, json=None, markdown=options.store)
+    if options.scheduler is not None and options.jobs is not None:
+        problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
+    if options.replay and options.samples is not None:
+        problems.append("--replay: a variant is known by seed and index; leave out --samples")
+    if options.replay and (options.store or options.scheduler):
+        problems.append("--replay solves here, and stores nothing; leave out --store and --scheduler")
+    engine, share = _check(options, house, problems)
+    case = _only(house.find_case(options.case, foreign.supplied(options)), options.output, problems)
+    foreign.tell_left_out([case])
+    if problems:
+        raise KincheckError("\n".join(problems))
+    variation = read_variation(options.vary, case)
+    samples = variation.count or 0 if options.replay else how_many(variation, options.samples)
+    study = Study(case, variation, samples, options.seed, options.order, options.tol)
+    if options.replay:
+        return _replay(options, house, study, engine)
+    results = _solve(options, study, engine, share)
+    _deliver(options, results)
+    return Status.DEVIATES if results.unsolved or results.deviating else Status.WITHIN
+
+
+def _check(options: argparse.Namespace, house: House, problems: list[str]) -> tuple[Engine | None, float]:
+    """The engine to check with, and the share of the variants."""
+    if options.check is None:
+        return None, 0.0
+    name, _, text = options.check.partition(":")
+    try:
+        share = float(text) if text else 0.01
+    except ValueError:
+        share = math.nan
+    if not 0.0 < share <= 1.0:
+        problems.append(f"--check {options.check}: found the share {text!r}, expected a part of one such as 0.01; correct it")
+    engines = house.find_engines([name], problems)
+    return (engines[0] if engines else None), share
+
+
+def _only(case: Case, names: list[str], problems: list[str]) -> Case:
+    """The case with the named outputs only; all of them unless some are named."""
+    there = [output.name for output in case.outputs]
+    problems += [unknown("output", name, there) for name in names if name not in there]
+    return replace(case, outputs=tuple(output for output in case.outputs if output.name in names)) if names else case
+
+
+def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
+    """Where an engine solves checked variants: in processes of its own, unless it is ours."""
+    from ..attempt import here
+    from ..run import NATIVE
+    from ..workers.distributed import on_cluster
+    from ..workers.limits import Limits, default_jobs
+    from ..workers.pool import in_workers
+
+    if options.scheduler is not None:
+        return on_cluster(options.scheduler, Limits())
+    return here if engine.name == NATIVE else in_workers(options.jobs or default_jobs(), Limits())
+
+
+def _solve(options: argparse.Namespace, study: Study, engine: Engine | None, share: float) -> SweepResults:
+    from ..study.running import on_cluster
+    from ..study.sweep import Check, sweep_designs
+    from ..study.tables import ParquetStore
+    from ..workers.limits import default_jobs
+
+    tell = Teller()
+    check = None
+    if engine is not None:
+        check = Check(engine, share, _solver(options, engine), options.tol, tell.checked)
+    with ExitStack() as stack:
+        stack.callback(tell.end)
+        store = None if options.store is None else stack.enter_context(ParquetStore(options.store, study))
+        try:
+            return sweep_designs(
+                study.case,
+                study.variation,
+                samples=options.samples,
+                seed=options.seed,
+                order=options.order,
+                tol=options.tol,
+                jobs=options.jobs or default_jobs(),
+                source=None if options.scheduler is None else on_cluster(options.scheduler),
+                check=check,
+                store=store,
+                progress=tell.solved,
+                command=options.command,
+            )
+        except KeyboardInterrupt:
+            raise KincheckError(f"interrupted after {tell.done} variants; --samples {tell.done} sweeps those alone") from None
+
+
+def _replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
+    """Solve single variants as a run does: its table, its report, its status."""
+    from .. import run as running
+    from ..reporting import deliver as delivery
+
+    for index in options.replay:
+        if study.samples and index >= study.samples:
+            raise KincheckError(f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1}; give one of them")
+    native = house.engine(running.NATIVE)
+    engines = [native] if engine is None or engine.name == running.NATIVE else [native, engine]
+    cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
+    results = running.run(cases, engines, tol=options.tol, command=options.command, solver=_solver(options, engines[-1]))
+    problems: list[str] = []
+    delivery.deliver(results, problems, matrix=False, out=options.out, json=options.json, junit=None, markdown=None)
+    complain(problems)
+    if problems:
+        return Status.FAILED
+    return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
+
+
+def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
+    """Print the table and write what was asked for."""
+    from ..record import to_json
+    from ..study.page import page
+    from ..study.tables import envelope_csv, gradient_csv, print_sweep
+
+    print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
+    encoded = to_json(results)
+    if options.json == "-":
+        sys.stdout.write(encoded.decode())
+    contents = {Path(options.json): encoded} if options.json not in (None, "-") else {}
+    if options.out is not None:
+        texts = (encoded, page(results).encode(), envelope_csv(results).encode(), gradient_csv(results).encode())
+        contents |= {options.out / name: text for name, text in zip(FILES, texts, strict=True)}
+    for path, content in contents.items():
+        try:
+            path.write_bytes(content)
+        except OSError as error:
+            raise KincheckError(f"{path}: cannot be written ({error.strerror}); give a file in a writable folder") from None
+
+
+class Teller:
+    """Tells on standard error how far a sweep is: one line that changes on a terminal, now and then a line elsewhere."""
+
+    def __init__(self) -> None:
+        self.terminal = sys.stderr.isatty()
+        self.told = perf_counter()
+        self.done = 0
+
+    def solved(self, progress: Progress) -> None:
+        """Told after every chunk."""
+        self.done = progress.done
+        rate = progress.done / progress.seconds
+        left = (progress.total - progress.done) / rate
+        part = f"[{progress.done}/{progress.total}] {100 * progress.done / progress.total:.0f} %"
+        line = f"{part}, {rate:.3g} variants/s, {left:.0f} s left"
+        self._tell(line + (f", {progress.unsolved} unsolved" if progress.unsolved else ""))
+
+    def checked(self, done: int, total: int) -> None:
+        """Told after every checked variant."""
+        self._tell(f"[{done}/{total}] checked")
+
+    def _tell(self, line: str) -> None:
+        now = perf_counter()
+        if now - self.told < (0.1 if self.terminal else EVERY):
+            return
+        self.told = now
+        print(f"\r\x1b[2K{line}" if self.terminal else line, end="" if self.terminal else "\n", file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        """Leave the line to what comes."""
+        if self.terminal:
+            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,55 @@
+"""Answers for people, as text and tables, and the same for programs, as JSON: commands print the one and write the other."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+from rich.console import Console
+from rich.table import Table
+
+from ..errors import KincheckError
+from .record import to_json
+
+# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
+LOG_WIDTH = 200
+
+
+def page(json: str | None) -> Console:
+    """Where to print: standard output, unless the JSON has it."""
+    file = sys.stderr if json == "-" else sys.stdout
+    return Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False)
+
+
+def columns(*heads: str, title: str | None = None) -> Table:
+    """A table without lines; columns whose heads begin with ">" stand right."""
+    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left", title_style="bold")
+    for head in heads:
+        right = head.startswith(">")
+        table.add_column(head.removeprefix(">"), justify="right" if right else "left", overflow="fold", no_wrap=right)
+    return table
+
+
+def write_json(found: msgspec.Struct, json: str | None) -> None:
+    """Write the answer as JSON to a file, or for "-" to standard output.
+
+    Raises:
+        KincheckError: the file cannot be written.
+    """
+    if json == "-":
+        sys.stdout.write(to_json(found).decode())
+        sys.stdout.flush()
+    elif json is not None:
+        try:
+            Path(json).write_bytes(to_json(found))
+        except OSError as error:
+            raise KincheckError(
+                f"--json {json}: cannot be written ({error.strerror}); give a file in a folder that exists"
+            ) from None
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names, one after the other."""
+    return ", ".join(names) or "none"

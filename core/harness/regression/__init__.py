@@ -1,0 +1,1 @@
+"""Regression: what changed between two runs, since when, and whether it is worse."""

@@ -1,0 +1,167 @@
+"""Two runs, pair by pair: what failed, what is fixed, what is no longer reached, what drifted, what became slower."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from ..history.series import Entry, History, Pair, calibration, own_seconds
+from ..record import Outcome, Record
+from ..reporting.wording import MOTIONS, motion_unit, number
+from .findings import Change, Finding, Kind
+from .limits import DRIFT, ENOUGH, TIME_FLOOR, drifted
+from .subject import Subject
+
+CIRCUMSTANCES = ("kincheck", "python", "numpy", "tol", "host", "processor", "platform")
+PHASES = ("build", "first", "warm", "compare")
+
+
+def compare(now: Subject, before: Subject, history: History, slowest: float) -> list[Finding]:
+    """What differs, in the order of the records.
+
+    Args:
+        history: runs up to the one compared with, and on the same machine: what times were then.
+        slowest: the ratio of times up to which a pair is not called slower.
+    """
+    earlier = by_pair(before.results.records)
+    findings: list[Finding] = []
+    for pair, record in by_pair(now.results.records).items():
+        old = earlier.pop(pair, None)
+        if old is None:
+            findings.append(_finding(Kind.FAILURE if record.outcome.bad else Kind.ADDED, record, _said(record)))
+            continue
+        findings += _outcomes(record, old)
+        findings += _lost(record, old)
+        findings += _errors(record, old)
+        entries = history.pairs.get(pair, ())
+        findings += _slower(
+            record, _usual(before, old, entries, history, same_machine(now.facts, before.facts)), now.facts, slowest
+        )
+    findings += [_finding(Kind.ABSENT, old, f"{old.outcome} there") for old in earlier.values()]
+    return findings
+
+
+def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:
+    """The records by case, engine and mode."""
+    return {(record.case, record.engine, record.mode): record for record in records}
+
+
+def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
+    """Versions, machine and settings of two runs that differ: engines first, then ours and what it stands on."""
+    old: dict[str, Any] = before.get("engines") or {}
+    new: dict[str, Any] = now.get("engines") or {}
+    # an engine that only one of the runs has was not asked for in the other
+    pairs: list[tuple[str, Any, Any]] = [(name, old[name], new[name]) for name in new if name in old]
+    pairs += [(name, before.get(name), now.get(name)) for name in CIRCUMSTANCES]
+    pairs.append(("commit", _commit(before), _commit(now)))
+    return [Change(what=what, before=a, now=b) for what, a, b in pairs if a != b]
+
+
+def _commit(facts: Mapping[str, Any]) -> str | None:
+    git: Mapping[str, Any] = facts.get("git") or {}
+    return git.get("commit")
+
+
+def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
+    """Whether times can be compared as they are."""
+    return all(now.get(name) == before.get(name) for name in ("host", "processor"))
+
+
+def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
+    if now.outcome.bad and not before.outcome.bad:
+        yield _finding(Kind.FAILURE, now, f"{before.outcome} → {_said(now)}")
+    elif before.outcome.bad and now.outcome is Outcome.PASS:
+        yield _finding(Kind.FIXED, now, f"{before.outcome} → {now.outcome}")
+
+
+def _lost(now: Record, before: Record) -> Iterator[Finding]:
+    """Phases, samples, motions, standards."""
+    phases = [phase for phase in PHASES if _reached(before, phase) and not _reached(now, phase)]
+    if phases:
+        why = f": {_said(now)}" if now.outcome is not Outcome.PASS else ""
+        yield _finding(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
+        return
+    if (now.solved or 0) < (before.solved or 0) and now.samples == before.samples:
+        yield _finding(Kind.LOST, now, f"{now.solved} of {now.samples} samples solved, {before.solved} before")
+    for output, old in before.errors.items():
+        new = now.errors.get(output)
+        gone = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
+        if gone:
+            why = f"the case has no output {output!r} now" if new is None else new.reason or "no reason is given"
+            yield _finding(Kind.LOST, now, f"{output}: {', '.join(gone)} no longer compared: {why}", output=output, motion=gone[0])
+    if before.validated and not now.validated and now.outcome is Outcome.PASS:
+        yield _finding(
+            Kind.LOST,
+            now,
+            f"no longer validated: judged against {now.truth.replace('_', ' ')}, before {before.truth.replace('_', ' ')}",
+        )
+
+
+def _reached(record: Record, phase: str) -> bool:
+    return record.seconds is not None and getattr(record.seconds, phase) is not None
+
+
+def _errors(now: Record, before: Record) -> Iterator[Finding]:
+    for output, old in before.errors.items():
+        for motion in MOTIONS:
+            a, b = getattr(old, motion), getattr(now.errors.get(output), motion, None)
+            if a is None or b is None:
+                continue
+            about: dict[str, Any] = {"output": output, "motion": motion}
+            if a.tolerance != b.tolerance:
+                told = f"{output} {motion}: {number(a.tolerance)} → {number(b.tolerance)}"
+                yield _finding(Kind.TOLERANCE, now, told, before=a.tolerance, now=b.tolerance, **about)
+            # what is out of tolerance is a failure, and named there
+            if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
+                unit = motion_unit(now.outputs[output].unit, motion) if output in now.outputs else ""
+                times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
+                size = f"{number(a.max_abs)} → {number(b.max_abs)} {unit}"
+                told = f"{output} {motion} error {size} ({times}tolerance {number(b.tolerance)})"
+                ratio = b.max_abs / a.max_abs if a.max_abs else None
+                yield _finding(Kind.DRIFTED, now, told, before=a.max_abs, now=b.max_abs, ratio=ratio, limit=DRIFT, **about)
+
+
+def _usual(
+    before: Subject, record: Record, entries: Sequence[Entry], history: History, same: bool
+) -> tuple[float | None, float | None]:
+    """Seconds that a warm solve took, and the same in calibration loops of its run; None where they are not to be compared.
+
+    The median of the latest runs up to the one compared with, and of that one alone where there are few: the noise of one run
+    would be in every comparison with it.
+    """
+    latest = [entry for entry in entries if entry.seconds][-ENOUGH:]
+    if len(latest) < ENOUGH:
+        seconds = own_seconds(record.seconds.warm, record.seconds.waited) if record.seconds else None
+        loop = calibration(before.facts)
+        return seconds if same else None, seconds / loop if seconds is not None and loop else None
+    times = [(entry.seconds or 0.0, calibration(history.runs[entry.run])) for entry in latest]
+    loops = [seconds / loop for seconds, loop in times if loop]
+    return statistics.median(seconds for seconds, _ in times) if same else None, statistics.median(loops) if loops else None
+
+
+def _slower(now: Record, usual: tuple[float | None, float | None], facts: Mapping[str, Any], limit: float) -> Iterator[Finding]:
+    """Slower by the clock and by the calibration loop, where both can be compared: either alone may be the machine's doing."""
+    seconds = own_seconds(now.seconds.warm, now.seconds.waited) if now.seconds else None
+    if seconds is None:
+        return
+    by_clock, by_loop = usual
+    loop = calibration(facts)
+    expected = [by_clock] if by_clock else []
+    expected += [by_loop * loop] if by_loop and loop else []
+    if not expected:
+        return
+    should = max(expected)
+    if seconds > limit * should and seconds - should > TIME_FLOOR:
+        ratio = seconds / should
+        spread = f"×{number(ratio)}; by the spread from run to run, ×{number(limit)} may be chance"
+        told = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
+        yield _finding(Kind.SLOWER, now, told, before=should, now=seconds, ratio=ratio, limit=limit)
+
+
+def _said(record: Record) -> str:
+    return f"{record.outcome}: {record.message}" if record.message else str(record.outcome)
+
+
+def _finding(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
+    return Finding(kind=kind, case=record.case, engine=record.engine, mode=record.mode, message=message, **about)

@@ -1,0 +1,168 @@
+"""What a comparison of two runs finds, as data: the JSON schema kincheck-regression/1."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, Literal
+
+import msgspec
+
+
+class Kind(StrEnum):
+    """What a finding says. The first four are regressions."""
+
+    FAILURE = "new failure"
+    LOST = "lost"
+    DRIFTED = "accuracy drifted"
+    SLOWER = "slower"
+    FIXED = "fixed"
+    TOLERANCE = "tolerance changed"
+    ADDED = "new in this run"
+    ABSENT = "not in this run"
+
+    @property
+    def regression(self) -> bool:
+        """Whether something is worse than it was."""
+        return self in (Kind.FAILURE, Kind.LOST, Kind.DRIFTED, Kind.SLOWER)
+
+
+WHY: Mapping[Kind, str] = {
+    Kind.FAILURE: "these results were right, or at least not wrong, and are not to be relied on now",
+    Kind.LOST: "what is no longer reached or compared is no longer checked: a fault there would go unseen",
+    Kind.DRIFTED: "within tolerance, but a decimal digit worse: something computes differently than it did",
+    Kind.SLOWER: "slower by more than this machine's spread from run to run",
+    Kind.FIXED: "they failed in the run compared with",
+    Kind.TOLERANCE: "what passes now need not have passed before, or the reverse",
+    Kind.ADDED: "nothing to compare with",
+    Kind.ABSENT: "not asked for, or gone from the library: nothing is known of them",
+}
+"""Why a kind matters."""
+
+
+class Finding(msgspec.Struct, frozen=True, kw_only=True):
+    """One difference between the runs.
+
+    Attributes:
+        output, motion: what it is about; null where it is about the pair.
+        before, now: errors [SI], seconds, or tolerances, by the kind; null where there is no number to it.
+        ratio: of now to before, for a time with the pace of the machine taken out; null where there is none.
+        limit: the ratio from which on it is a finding.
+        since: the first run that has it, where the history knows it.
+    """
+
+    kind: Kind
+    case: str
+    engine: str
+    mode: str
+    message: str
+    output: str | None = None
+    motion: str | None = None
+    before: float | None = None
+    now: float | None = None
+    ratio: float | None = None
+    limit: float | None = None
+    since: int | None = None
+
+
+class Change(msgspec.Struct, frozen=True, kw_only=True):
+    """A version, a machine or a setting that is not what it was; null where it was not there."""
+
+    what: str
+    before: Any
+    now: Any
+
+    def __str__(self) -> str:
+        return f"{self.what} {_short(self.before)} → {_short(self.now)}"
+
+
+def _short(value: Any) -> str:
+    """A value as a line of text has it: commits by their first digits."""
+    text = "none" if value is None else str(value)
+    return text[:10] if len(text) == 40 and text.isalnum() else text
+
+
+class Step(msgspec.Struct, frozen=True, kw_only=True):
+    """A level of the history that changed for good, up to the latest run.
+
+    Attributes:
+        quantity: position, velocity or acceleration (errors), time, or outcome.
+        output: of the error with the largest step; null for time and outcome.
+        first: number of the first run of the new level; `started` is when it began.
+        last: number of the last run of the level before.
+        before, now: the levels: errors [SI], seconds; null for an outcome.
+        changes: what else was not the same in these two runs.
+    """
+
+    case: str
+    engine: str
+    mode: str
+    quantity: str
+    output: str | None
+    first: int
+    started: str
+    last: int
+    before: float | None
+    now: float | None
+    worse: bool
+    changes: list[Change]
+
+
+class Loose(msgspec.Struct, frozen=True, kw_only=True):
+    """A tolerance that no engine has needed.
+
+    Attributes:
+        largest: the largest error in tolerances over all engines, motions and runs.
+        factor: by which the tolerance could be smaller.
+        why: the reason that the case gives for its tolerance; it may be the better one.
+    """
+
+    case: str
+    output: str
+    runs: int
+    largest: float
+    factor: float
+    why: str
+
+
+class RunName(msgspec.Struct, frozen=True, kw_only=True):
+    """Which run: its name for people, its number in the history where it is from one, and when it began."""
+
+    name: str
+    number: int | None
+    started: str
+    host: str
+    commit: str | None
+
+
+class Regressions(msgspec.Struct, frozen=True, kw_only=True):
+    """What changed.
+
+    Attributes:
+        against: the run compared with; null, and `reason` says why, where there is none.
+        pairs: how many records the run has.
+        failing: case, engine and mode of all that is not within tolerance or broken, new or not.
+        time_limit: the ratio from which on a time was called slower.
+    """
+
+    schema: Literal["kincheck-regression/1"] = "kincheck-regression/1"
+    run: RunName
+    against: RunName | None
+    reason: str
+    pairs: int
+    failing: list[tuple[str, str, str]]
+    time_limit: float
+    findings: list[Finding]
+    changes: list[Change]
+    steps: list[Step]
+    loose: list[Loose]
+
+    @property
+    def regressions(self) -> list[Finding]:
+        """The findings that are one."""
+        return [finding for finding in self.findings if finding.kind.regression]
+
+    @property
+    def regressed(self) -> bool:
+        """Whether something is worse than it was; without a run to compare with, whether anything is bad."""
+        return bool(self.regressions) if self.against else bool(self.failing)

@@ -1,0 +1,116 @@
+"""What a report says: its headline, its findings in groups, and the versions that changed, the same in every format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from ..reporting.wording import motion_unit, number
+from .findings import Finding, Kind, Loose, Regressions, Step
+
+LONGEST = 12
+"""Rows of a group that are shown; a broken engine has one for every case. The JSON has all."""
+
+NAMED = 4
+"""Cases that are named where a row is of several."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One or several findings of an engine that say the same.
+
+    Attributes:
+        more: how many further findings the pair has of that kind.
+    """
+
+    engine: str
+    cases: Sequence[str]
+    message: str
+    since: int | None
+    more: int = 0
+
+    @property
+    def where(self) -> str:
+        """The cases, the first of many."""
+        named = ", ".join(self.cases[:NAMED])
+        return named + (f" and {len(self.cases) - NAMED} more" if len(self.cases) > NAMED else "")
+
+    @property
+    def what(self) -> str:
+        """The message, and how many more the pair has."""
+        since = f" · since run {self.since}" if self.since is not None else ""
+        return self.message + (f" · and {self.more} more like it" if self.more else "") + since
+
+
+def headline(found: Regressions) -> str:
+    """The report in one sentence."""
+    if found.against is None:
+        failing = f"{len(found.failing)} of {found.pairs} not right" if found.failing else f"all {found.pairs} right"
+        return f"{found.run.name}: {failing}; compared with nothing: {found.reason}"
+    counts = [f"{len(_pairs(found, kind))} {_plural(kind, found)}" for kind in Kind if kind.regression and _pairs(found, kind)]
+    said = ", ".join(counts) or "nothing regressed"
+    fixed = len(_pairs(found, Kind.FIXED))
+    known = len(found.failing) - len(_pairs(found, Kind.FAILURE))
+    rest = [f"{fixed} fixed"] if fixed else []
+    rest += [f"{known} not right before either"] if known > 0 else []
+    rest += [", ".join(map(str, versions(found)))] if versions(found) else []
+    return "; ".join([f"{found.run.name} against {found.against.name}: {said}", *rest])
+
+
+def versions(found: Regressions) -> list[str]:
+    """The versions that changed, those of the machine and the settings aside."""
+    return [str(change) for change in found.changes if change.what not in ("host", "processor", "platform", "commit", "tol")]
+
+
+def _pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
+    return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
+
+
+def _plural(kind: Kind, found: Regressions) -> str:
+    if kind is Kind.FAILURE:
+        return "new failure" + ("s" if len(_pairs(found, kind)) > 1 else "")
+    return "with something lost" if kind is Kind.LOST else "less accurate" if kind is Kind.DRIFTED else str(kind)
+
+
+def rows(findings: Iterable[Finding]) -> list[Row]:
+    """Findings of one kind: a pair once, with the worst of its ratios; pairs that say the same together."""
+    by_pair: dict[tuple[str, str, str], list[Finding]] = {}
+    for finding in findings:
+        by_pair.setdefault((finding.case, finding.engine, finding.mode), []).append(finding)
+    alike: dict[tuple[str, str, int | None, int], list[str]] = {}
+    for (case, engine, mode), each in by_pair.items():
+        first = max(each, key=lambda finding: finding.ratio or 0.0)
+        alike.setdefault((product(engine, mode), first.message, first.since, len(each) - 1), []).append(case)
+    return [Row(engine, cases, message, since, more) for (engine, message, since, more), cases in alike.items()]
+
+
+def product(engine: str, mode: str) -> str:
+    """The engine, with its mode unless it is projection."""
+    return engine if mode == "projection" else f"{engine} · {mode}"
+
+
+def step_says(step: Step) -> str:
+    """A step, its first run and what changed there."""
+    name = f"{step.output} {step.quantity} error" if step.output else step.quantity
+    if step.before is None or step.now is None:
+        what = "bad" if step.worse else "good again"
+    elif step.quantity == "time":
+        what = f"{number(1e3 * step.before)} → {number(1e3 * step.now)} ms a sweep"
+    else:
+        what = f"{number(step.before)} → {number(step.now)} {motion_unit('', step.quantity)}".rstrip()
+    changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
+    return f"{name}: {what} since run {step.first} ({step.started[:16].replace('T', ' ')}); after run {step.last}: {changed}"
+
+
+def loose_says(loose: Sequence[Loose]) -> list[str]:
+    """The tolerances that could be tightened, a line a case: by its output that allows least."""
+    by_case: dict[str, list[Loose]] = {}
+    for each in loose:
+        by_case.setdefault(each.case, []).append(each)
+    lines: list[str] = []
+    for case, each in by_case.items():
+        least = min(each, key=lambda one: one.factor)
+        many = f"{len(each)} outputs" if len(each) > 1 else least.output
+        reason = f"; its reason: {least.why}" if least.why else ""
+        lines.append(f"{case}: {many}, {number(least.factor)} times or more, by {least.runs} runs{reason}")
+    return lines

@@ -1,0 +1,1 @@
+"""Stress: situations that break kinematic solvers, an independent truth for each, and what engines make of them."""

@@ -1,0 +1,108 @@
+"""What a family is: a way to make specimens at random, each a case, its truth, and the refusals that are right."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ....mechanism import Mechanism
+from ....motions import Motion
+from ....trajectory import Array
+from ...case import Case, Output, Sweep, Truth
+from ...reading.casefile import AXES
+from ...reading.tolerance import DEFAULT_ATOL, DEFAULT_WHY
+from ..truth import Truth as Known
+from ..truth import followed
+
+TOL = 1e-12
+"""Largest accepted residual, as of `kincheck run`."""
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """One mechanism and its sweep.
+
+    Attributes:
+        describe: makes the case; may refuse to (KincheckError), which is the outcome for every engine then.
+        truth: of the case; None where no sample makes sense and every answer is wrong.
+        reasons: what a right refusal speaks of (a regular expression), beyond singular poses and the end of the motion.
+        excused: whether it may be refused for these reasons though solutions exist.
+        reported: whether an answer must report what the geometry contradicts itself by (`Known.violated`).
+        facts: what there is to say of it, by name.
+    """
+
+    name: str
+    describe: Callable[[], Case]
+    truth: Callable[[Case], Known] | None = followed
+    tol: float = TOL
+    reasons: str = ""
+    excused: bool = False
+    reported: bool = False
+    facts: tuple[tuple[str, float], ...] = ()
+
+
+class Family(ABC):
+    """Base of the families. Declaring one with a name registers it.
+
+    Attributes:
+        about: what is nasty, and its sizes, in a sentence.
+        samples: the most that one specimen has; a mechanism costs more to prepare than a sample to solve.
+        several: whether samples are shared out among several specimens rather than given to one.
+    """
+
+    name: ClassVar[str]
+    about: ClassVar[str]
+    samples: ClassVar[int] = 201
+    several: ClassVar[bool] = True
+    registry: ClassVar[dict[str, Family]] = {}
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "name" in cls.__dict__:
+            Family.registry[cls.name] = cls()
+
+    @abstractmethod
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """A random specimen of so many samples."""
+
+
+def as_case(
+    mechanism: Mechanism,
+    driver: str,
+    values: Array,
+    *,
+    rate: float = 1.0,
+    motions: dict[str, Motion] | None = None,
+    source: str = "kincheck stress",
+) -> Case:
+    """The case of a mechanism, all coordinates of all its points as outputs."""
+    outputs = tuple(
+        Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
+        for point in mechanism.points
+        for axis, along in AXES.items()
+    )
+    sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
+    return Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
+
+
+def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:
+    """Three numbers as the descriptions have them."""
+    a, b, c = (float(each) for each in x)
+    return a, b, c
+
+
+def direction(rng: Rng) -> Array:
+    """A random unit vector."""
+    found = rng.normal(size=3)
+    return found / np.linalg.norm(found)
+
+
+def power(rng: Rng, low: float, high: float) -> float:
+    """A number between 10^low and 10^high, all sizes alike."""
+    return float(10.0 ** rng.uniform(low, high))

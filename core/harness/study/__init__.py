@@ -1,0 +1,1 @@
+"""Studies of a design: its hardpoints varied, its outputs reduced over all variants."""

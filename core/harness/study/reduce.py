@@ -1,0 +1,139 @@
+"""Many variants to a few numbers: extremes, mean and spread as they come, in any number of steps; quantiles of those that are kept.
+
+Summaries are merged in the order of the chunks, whoever has computed them, so that a sum is rounded the same way every time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...trajectory import Array
+
+QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """Values of quantities over variants. Shape (quantities, n): one number for each quantity and sample.
+
+    Attributes:
+        count: variants that have a value.
+        least, most, mean: NaN without any.
+        squares: sum of the squared distances from the mean.
+        extremes: of each quantity, the variants with the least and the most of all samples, shape (quantities, 2); -1 without any.
+    """
+
+    count: NDArray[np.int64]
+    least: Array
+    most: Array
+    mean: Array
+    squares: Array
+    extremes: NDArray[np.int64]
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation of what the variants are a sample of: over count - 1; NaN of fewer than two."""
+        with np.errstate(all="ignore"):
+            return np.where(self.count > 1, np.sqrt(self.squares / (self.count - 1)), np.nan)
+
+
+def nothing(quantities: int, n: int) -> Summary:
+    """The summary of no variants."""
+    none, unknown = np.zeros((quantities, n)), np.full((quantities, n), np.nan)
+    return Summary(
+        none.astype(np.int64), unknown, unknown, unknown, none, np.full((quantities, 2), -1, dtype=np.int64)
+    )  # fmt: skip
+
+
+def summary(values: Array, first: int) -> Summary:
+    """Summarise variants.
+
+    Args:
+        values: NaN where there is none, shape (quantities, n, V).
+        first: index of the first variant.
+    """
+    quantities, n, variants = values.shape
+    if np.isnan(values.sum()):  # some are missing
+        there = ~np.isnan(values)
+        count = there.sum(axis=2)
+        with np.errstate(all="ignore"):
+            least, most = np.fmin.reduce(values, axis=2), np.fmax.reduce(values, axis=2)
+            mean = np.where(count, np.where(there, values, 0.0).sum(axis=2) / count, np.nan)
+        centered = np.where(there, values - mean[:, :, None], 0.0)
+    else:
+        count = np.full((quantities, n), variants)
+        least, most, mean = values.min(axis=2), values.max(axis=2), values.mean(axis=2)
+        centered = values - mean[:, :, None]
+    extremes = np.full((quantities, 2), -1, dtype=np.int64)
+    for q in range(quantities):
+        for side, ends in enumerate((least[q], -most[q])):
+            if not np.isnan(ends).all():
+                sample = values[q, int(np.nanargmin(ends))]
+                extremes[q, side] = first + int(np.nanargmin(sample) if side == 0 else np.nanargmax(sample))
+    return Summary(count, least, most, mean, np.einsum("qnv,qnv->qn", centered, centered), extremes)
+
+
+def merged(a: Summary, b: Summary) -> Summary:
+    """The summary of the variants of both; b's come after a's.
+
+    Mean and squares by Chan, Golub and LeVeque: Updating formulae and a pairwise algorithm for computing sample variances (1979),
+    which lose no digits where the mean is large against the spread.
+    """
+    count = a.count + b.count
+    with np.errstate(all="ignore"):
+        share = b.count / count
+        step = b.mean - a.mean
+        mean = np.where(a.count == 0, b.mean, np.where(b.count == 0, a.mean, a.mean + step * share))
+        both = np.where((a.count == 0) | (b.count == 0), 0.0, step * step * a.count * share)
+        least, most = np.fmin(a.least, b.least), np.fmax(a.most, b.most)
+        # b's only where it is further out: the first of equals stays
+        below = np.fmin.reduce(b.least, axis=1) < np.nan_to_num(np.fmin.reduce(a.least, axis=1), nan=np.inf)
+        above = np.fmax.reduce(b.most, axis=1) > np.nan_to_num(np.fmax.reduce(a.most, axis=1), nan=-np.inf)
+    extremes = np.where(np.stack([below, above], axis=1), b.extremes, a.extremes)
+    return Summary(count, least, most, mean, a.squares + b.squares + both, extremes)
+
+
+@dataclass(frozen=True, eq=False)
+class Quantiles:
+    """Quantiles of one quantity over variants.
+
+    Attributes:
+        values: by linear interpolation between neighbours in order, shape (len(QUANTILES), n).
+        errors: standard errors: half the distance between the quantiles at p - s and p + s, s = sqrt(p (1 - p) / m), which is the
+            standard error of the share of m variants below a value; shape as of the values, None where these are exact.
+        kept: how many variants they are of.
+    """
+
+    values: Array
+    errors: Array | None
+    kept: int
+
+
+def quantiles(kept: Sequence[Array], *, exact: bool) -> Quantiles:
+    """Quantiles of variants, NaN where there is no value.
+
+    Args:
+        kept: values, shape (n, V) each.
+        exact: whether these are all variants that there are, rather than a sample of them.
+    """
+    values = np.concatenate(kept, axis=1)
+    count = values.shape[1]
+    p = np.array(QUANTILES)
+    s = np.sqrt(p * (1.0 - p) / max(count, 1))
+    wanted = p if exact else np.concatenate([p, np.clip(p - s, 0.0, 1.0), np.clip(p + s, 0.0, 1.0)])
+    if count == 0:
+        found = np.full((len(wanted), len(values)), np.nan)
+    elif np.isnan(values.sum()):
+        found = np.full((len(wanted), len(values)), np.nan)
+        some = ~np.isnan(values).all(axis=1)
+        found[:, some] = np.nanquantile(values[some], wanted, axis=1)
+    else:
+        found = np.quantile(values, wanted, axis=1)
+    if exact:
+        return Quantiles(found, None, count)
+    here, below, above = found.reshape(3, len(p), -1)
+    return Quantiles(here, 0.5 * (above - below), count)

@@ -1,0 +1,18 @@
+"""Text that came from files or simulators, on its way to people: control characters are shown, and do nothing."""
+
+from __future__ import annotations
+
+
+def visible(text: str, also: str = "") -> str:
+    r"""The text with all that does not print as an escape: \x1b, \u202e, \udcff; spaces and all letters stay as they are.
+
+    A terminal obeys escape sequences, direction marks turn the order of what is read, and lone surrogates cannot be written.
+
+    Args:
+        also: characters that may stay though they do not print.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        letter if letter.isprintable() or letter in also else letter.encode("unicode_escape").decode("ascii") for letter in text
+    )

@@ -1,0 +1,48 @@
+"""Case files, TOML and JSON: read, and driven as `kincheck run` asks."""
+
+import kincheck.cases
+from kincheck.core.analysis.freedom import require_driven
+from kincheck.core.errors import KincheckError
+from kincheck.core.harness.reading.casefile import load_case
+from kincheck.core.harness.reading.document import fault
+from kincheck.core.harness.reading.driving import DRIVERS
+from kincheck.core.harness.suspension import SuspensionOutput
+from kincheck.core.joints import Coupler, Joint
+from kincheck.core.motions import Motion
+
+from .fuzzing import changing, read_or_refused, written
+from .trees import changed_json, changed_toml
+
+LONGEST = 6000
+# The rank is found by a dense factorisation; of small mechanisms it takes milliseconds.
+MOST_BODIES = 12
+KEYS = """schema name source truth units length angle bodies origin euler_parameters fixed joints type point axis points axes radius
+ratio lead body position drivers direction relative joint motion rate amplitude frequency phase times values sweep driver start stop
+steps outputs component atol rtol why suspension convention side forward up wheel_center center_plane kingpin wheel_radius axle
+wheelbase cg_height brakes drive per_travel reference file columns rows ground time closed_form x y z mm deg left iso8855 sae_j670
+front outboard inboard"""
+TYPES = [*Joint.registry, *Coupler.registry, *DRIVERS, *Motion.registry, *SuspensionOutput.registry]
+WORDS = (*KEYS.split(), *TYPES)
+
+
+def one(data: bytes) -> None:
+    """Read one input; raises what a user would see as a traceback."""
+    file = written("case.json" if data.lstrip().startswith(b"{") else "case.toml", data)
+
+    def read() -> None:
+        case = load_case(file)
+        if len(case.mechanism.bodies) <= MOST_BODIES:
+            try:
+                require_driven(case.mechanism)
+            except KincheckError as error:  # as the command line has it
+                raise fault(file, "", f"{error}") from error
+
+    read_or_refused(read)
+
+
+def seeds() -> list[bytes]:
+    """The built-in cases without the files beside them."""
+    return [file.read_bytes() for file in sorted(kincheck.cases.FOLDER.glob("*.toml"))]
+
+
+mutate = changing(changed_json, changed_toml, words=WORDS)

@@ -1,0 +1,50 @@
+"""MJCF models; what the command line says of them, --drive and --hold, stands in a comment of the input."""
+
+import re
+from pathlib import Path
+
+from kincheck.core.harness.reading.files import load
+from kincheck.core.harness.reading.mjcf.attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
+from kincheck.core.harness.reading.supplied import Supplied
+
+from .fuzzing import changing, read_or_refused, written
+from .trees import changed_xml
+
+LONGEST = 4200
+SAID = re.compile(rb'drive ([^ "]{1,40}) hold ([^>"]{0,200})')
+WORDS = (*ROOT, *IN_BODY, *MAKE_BODIES, *DYNAMIC, *(name for each in KNOWN.values() for name in each), *"""angle eulerseq degree radian
+local hinge slide ball free default childclass mocap fixed spatial joint coef flag equality disable autolimits compiler drive hold
+model world main active false x y z XYZ 0:0.5:5 weld connect tendon""".split())
+
+FOUR_BAR = b"""<mujoco model="drive crank:0:0.5:5 hold "><worldbody><body name="a"><joint name="crank" axis="0 1 0"/>
+<body name="b" pos="0 0 2"><joint name="B" axis="0 1 0"/><site name="C" pos="4 0 0"/></body></body>
+<body name="c" pos="4 0 0"><joint name="D" axis="0 1 0"/><site name="c" pos="0 0 2"/></body></worldbody>
+<equality><connect site1="C" site2="c"/></equality></mujoco>"""
+SLIDERS = b"""<mujoco model="drive s:0:0.1:3 hold b free "><compiler angle="radian" eulerseq="zyx"/>
+<default><joint axis="1 0 0"/><default class="q"><joint type="slide"/></default></default><worldbody>
+<frame pos="0 0 1" euler="0 0.1 0"><body name="a" childclass="q" quat="1 0 0 0.5"><joint name="s"/><joint name="t" type="hinge" ref="0.2"/>
+</body></frame><body name="c"><joint name="u" class="q"/></body><body name="d"><joint name="b" type="ball"/><geom size="1"/></body>
+<body name="free" pos="1 1 1"><freejoint/></body></worldbody>
+<tendon><fixed name="f"><joint joint="s" coef="2"/><joint joint="u" coef="-1"/></fixed></tendon>
+<equality><joint joint1="t" joint2="s" polycoef="0 3"/><tendon tendon1="f"/></equality></mujoco>"""
+ROD = b"""<mujoco model="drive in:0:0.5:5 hold "><worldbody><body name="a"><joint name="in" axis="0 0 1"/></body><body name="b" pos="2 1 3">
+<joint name="out" axis="1 0 0"/><body name="rod" pos="0 3.9 -0.8"><joint name="r" type="ball"/></body></body></worldbody>
+<equality><connect body1="rod" body2="a" anchor="-3 -4.9 -2.2"/><weld body1="a" body2="world" active="false"/></equality></mujoco>"""
+
+
+def one(data: bytes) -> None:
+    """Read one input with what it says itself."""
+    drive, hold = found.groups() if (found := SAID.search(data)) else (b"", b"")
+    names = tuple(name.decode("latin-1") for name in hold.split())
+    said = Supplied(drive=(drive.decode("latin-1"),) if drive else (), hold=names)
+    read_or_refused(lambda: load(written("model.xml", data), said))
+
+
+def seeds() -> list[bytes]:
+    """A gripper, a linkage, sliders and a rod."""
+    gripper = (Path(__file__).parent.parent / "data" / "mjcf" / "robotiq_2f85.xml").read_bytes()
+    springs = b"right_driver_joint:0:0.8:17 hold right_spring_link_joint left_spring_link_joint "
+    return [FOUR_BAR, SLIDERS, ROD, re.sub(rb'model="[^"]*"', b'model="drive ' + springs + b'"', gripper, count=1)]
+
+
+mutate = changing(changed_xml, words=WORDS)

@@ -1,0 +1,59 @@
+"""Results in JSON: read, and made into every kind of report."""
+
+import io
+from pathlib import Path
+from unittest import mock
+from xml.etree import ElementTree
+
+import kincheck.cases
+import msgspec
+from kincheck.core.harness.reading.results import read_results
+from kincheck.core.harness.record import to_json
+from kincheck.core.harness.reporting.junit import to_junit
+from kincheck.core.harness.reporting.matrix import print_matrix, to_markdown
+from kincheck.core.harness.reporting.report import render
+from kincheck.core.harness.reporting.table import print_table
+from kincheck.core.harness.reporting.views import Material
+from kincheck.core.harness.scene import scene
+
+from ..made_up import results
+from .fuzzing import changing, read_or_refused, written
+from .trees import changed_json
+
+LONGEST = 16000
+SAID = ["closed_form", "consensus_only", "native", "one", "pass", "fail", "error", "timeout", "crashed", "ground", "half_track_change"]
+WORDS = (*SAID, "time", "wheel", "point_coordinate", "joint_angle", "rad", "m", "1", "rad/m", "dof_account", "program", "signs")
+
+
+def one(data: bytes) -> None:
+    """Read one input and report it; what is a script or a style of ours, and the same in all reports, is left out."""
+    file = written("results.json", data)
+
+    def read() -> None:
+        found = read_results(file)
+        to_json(found)
+        ElementTree.fromstring(to_junit(found))
+        to_markdown(found).encode()
+        for show in (print_table, print_matrix):
+            show(found, text := io.StringIO())
+            assert "\x1b" not in text.getvalue()
+        with mock.patch("plotly.offline.get_plotlyjs", lambda: ""), mock.patch.object(Path, "read_text", lambda *_: ""):
+            render(Material(found, {}, {})).encode()
+
+    read_or_refused(read)
+
+
+def seeds() -> list[bytes]:
+    """Results of two engines, of few samples, with a scene."""
+    made = [results(), results("consensus_only", "crank"), results("closed_form", driver={"name": "stroke", "type": "time"})]
+    drawn = scene(kincheck.cases.load("planar_slider_crank"))
+    drawn = msgspec.structs.replace(
+        drawn,
+        bodies=[msgspec.structs.replace(body, r=body.r[:2], p=body.p[:2]) for body in drawn.bodies],
+        frames=drawn.frames[:2],
+    )
+    made.append(msgspec.structs.replace(results(), scenes={"strut": drawn}))
+    return [msgspec.json.encode(each) for each in made]
+
+
+mutate = changing(changed_json, words=WORDS)

@@ -1,0 +1,193 @@
+"""Large mechanisms as one sparse system: the motions that one program gives, rings of any size, and refusals with names."""
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import (
+    Body,
+    Distance,
+    Gear,
+    JointAngle,
+    Mechanism,
+    Point,
+    RackPinion,
+    Revolute,
+    Screw,
+    SolveError,
+    Spherical,
+    Translational,
+)
+from kincheck.core.analysis.components import components
+from kincheck.core.analysis.equations import frames
+from kincheck.core.analysis.march import Route
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.programs import Request
+from kincheck.core.analysis.solve import follow
+from kincheck.core.analysis.sparse import SparseModel
+from kincheck.core.analysis.sparse_sweep import solve_sparse
+from kincheck.core.harness.bench import scaling
+from kincheck.core.harness.bench.ring import LEAN, pivot, ring
+from kincheck.core.motions import Path, Ramp
+
+from .mechanisms import four_bar, mcpherson, slider_crank
+from .test_cascade import assert_alike
+from .test_chain import chain
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def turning(*values, rate=1.0):
+    return Path({"turn": Ramp(rate)}, np.array(values))
+
+
+def both(mechanism, path, points, *, compiled=False):
+    bodies = tuple(body.name for body in mechanism.moving)
+    expected = follow(Route(compile_model(mechanism, Request(tuple(path.motions), points, bodies)), path), 1e-12)
+    return solve_sparse(SparseModel(mechanism, compiled=compiled), path, points, bodies), expected
+
+
+# several drivers, redundant rows, all kinds of joints, a sweep that does not start at the design
+@pytest.mark.parametrize(
+    "name", ["mcpherson_strut", "mcpherson_steered", "four_bar", "andrews_squeezer", "delta_robot", "bricard", "double_cardan"]
+)
+def test_it_gives_what_one_program_gives(name):
+    case = cases.load(name)
+    assert_alike(*both(case.mechanism, case.sweep.path, case.points))
+
+
+def test_couplers_and_their_coordinates():
+    mechanism = Mechanism(
+        "gears",
+        [Body("wheel"), Body("pinion", (1.0, 0.0, 0.0)), Body("rack"), Body("nut", (1.0, 0.0, 0.5))],
+        [
+            Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), Z),
+            Revolute("second", "pinion", "ground", (1.0, 0.0, 0.0), Z),
+            Translational("guide", "ground", "rack", (1.0, 0.3, 0.0), X),
+            Screw("thread", "pinion", "nut", (1.0, 0.0, 0.5), Z, 0.02),
+            Translational("held", "ground", "nut", (1.0, 0.1, 0.5), Z),
+        ],
+        [Point("tooth", "rack", (1.0, 0.3, 0.0)), Point("top", "nut", (1.0, 0.1, 0.5))],
+        [JointAngle("turn", "first")],
+        [Gear("mesh", ("first", "second"), -2.0), RackPinion("rolls", ("second", "guide"), 0.3)],
+    )
+    found, expected = both(mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"))
+    assert_alike(found, expected)
+    assert np.ptp(found.points["top"].position[:, 2]) > 0.01
+
+
+@pytest.mark.parametrize(
+    "times", [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 30)[::-1], np.zeros(1), np.array([0.5, 0.5, -0.5])]
+)
+def test_any_samples(times):
+    for mechanism in (slider_crank(1.01), four_bar()):
+        assert_alike(*both(mechanism, turning(*times, rate=2.0), tuple(point.name for point in mechanism.points)))
+
+
+def test_every_crank_of_a_ring_turns_as_the_first():
+    cranks, turn = 120, np.linspace(-0.8, 0.8, 17)
+    found = solve_sparse(ring(cranks), turning(*turn), [f"tip{k}" for k in range(cranks)])
+    assert found.solved.all(), found.message
+    assert found.residual <= 1e-15
+    s, c, o = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
+    for k in range(cranks):
+        motion = found.points[f"tip{k}"]
+        # an angle is known to the sum of the round-offs on the way to it; each derivative multiplies it again
+        assert np.abs(motion.position - np.column_stack([pivot(k, cranks) + s, c, o])).max() <= 1e-15 * cranks
+        assert np.abs(motion.velocity - np.column_stack([-c, s, o])).max() <= 1e-14 * cranks
+        assert np.abs(motion.acceleration - np.column_stack([-s, -c, o])).max() <= 1e-13 * cranks
+
+
+def test_a_ring_cannot_be_taken_apart_and_its_factors_grow_with_it():
+    sizes = [len(part.bodies) for part in components(ring(20), frames(ring(20)))]
+    assert sorted(sizes) == [1, 38]  # the driven crank, and all others
+    small, large = (SparseModel(ring(n), compiled=False).factors.entries for n in (40, 160))
+    assert large < 4.4 * small
+
+
+def test_numpy_and_machine_code_agree():
+    path = turning(*np.linspace(-0.5, 0.5, 5))
+    assert_alike(*(solve_sparse(SparseModel(ring(12), compiled=each), path, ["tip6"], ["plate5"]) for each in (True, False)))
+
+
+def test_redundant_rows_of_many_loops_are_found_where_they_are():
+    loops = 60
+    n, s, c = range(loops), np.sin(0.3), np.cos(0.3)
+    pivots = [Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), Z) for k in range(loops + 1)]
+    pins = [Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), Z) for k in n for at in (0, 1)]
+    bodies = [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)]
+    planar = Mechanism("planar", bodies, [*pivots, *pins], [Point("end", f"crank{loops}", (loops + s, c, 0.0))])
+    driven = Mechanism("planar", bodies, planar.joints, planar.points, [JointAngle("turn", "pivot0")])
+    found = solve_sparse(driven, turning(-0.5, 0.5), ["end"])
+    assert found.solved.all(), found.message
+    assert len(found.details["redundant_rows"]) == 3 * loops
+    assert found.details["redundant_residual"] <= 1e-15
+    expected = [[loops + np.sin(0.3 - turn), np.cos(0.3 - turn), 0.0] for turn in (-0.5, 0.5)]
+    assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
+
+
+def test_redundant_rows_that_contradict_are_told():
+    mechanism = four_bar()
+    joints = [joint.changed(axis=(0.0, 1.0, 1e-3)) if joint.name == "D" else joint for joint in mechanism.joints]
+    found = solve_sparse(Mechanism("askew", mechanism.bodies, joints, mechanism.points, mechanism.drivers), turning(0.5))
+    assert not found.solved.any()
+    assert "the redundant rows (" in found.message
+    assert "contradict" in found.message
+
+
+def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
+    values = np.linspace(-0.05, 0.4, 46)
+    model = SparseModel(mcpherson())
+    found = solve_sparse(model, Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1)
+    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
+    assert np.isnan(found.points["wheel"].position[~found.solved]).all()
+    assert "cannot be followed beyond stroke = 0.293" in found.message
+    assert "last reachable sample at stroke = 0.29;" in found.message
+    assert 0.0 < found.details["smallest_pivot"] < 1e-2
+    assert found.points["wheel"].acceleration is None
+    assert found.bodies["knuckle"].a is None
+    far = solve_sparse(model, Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
+    assert far.message.startswith("cannot be followed") is True
+    assert not far.solved.any()
+
+
+def without_driver(mechanism):
+    return Mechanism(mechanism.name, mechanism.bodies, mechanism.joints, mechanism.points)
+
+
+def test_what_cannot_be_solved_is_refused_by_name():
+    whole = chain(40)
+    with pytest.raises(SolveError, match="1 or more degrees of freedom without a driver; .*'coupler"):
+        SparseModel(without_driver(whole), compiled=False)
+    with pytest.raises(SolveError, match="driver 'second' prescribes what"):
+        second = JointAngle("second", "pivot20")
+        SparseModel(Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]), compiled=False)
+    with pytest.raises(SolveError, match=r"dead centre.* most of all '(crank|slider)"):
+        stuck = slider_crank()
+        slide = [type(stuck.drivers[0])("turn", "pivot")]
+        end = Mechanism("stuck", stuck.bodies, stuck.joints, stuck.points, slide)
+        from kincheck.core import PointCoordinate
+
+        SparseModel(Mechanism("stuck", end.bodies, end.joints, end.points, [PointCoordinate("push", "end", X)]), compiled=False)
+    with pytest.raises(SolveError, match="does not close at the design position: residual"):
+        SparseModel(slider_crank(0.2), compiled=False)
+    with pytest.raises(SolveError, match="no body can move"):
+        SparseModel(Mechanism("still", [Body("wall", fixed=True)], []), compiled=False)
+
+
+def test_a_rod_that_spins_freely_is_named():
+    mechanism = mcpherson()
+    rod = [
+        Spherical("inner", "chassis", "rod", (1.14, 0.355, 0.1455)),
+        Spherical("outer", "knuckle", "rod", (1.115, 0.665, 0.118)),
+    ]
+    joints = [*(joint for joint in mechanism.joints if not isinstance(joint, Distance)), *rod]
+    with pytest.raises(SolveError, match="without a driver; what can still move is most of all 'rod'; .*use distance"):
+        SparseModel(Mechanism("spinning", [*mechanism.bodies, Body("rod")], joints, mechanism.points, mechanism.drivers))
+
+
+def test_costs_are_measured_with_residuals_and_errors():
+    rows = scaling.measure([3], [5], rounds=1)
+    assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [("chain", 3, 7, 42), ("ring", 5, 9, 54)]
+    assert all(row.residual <= 1e-15 for row in rows)
+    assert all(row.error <= 1e-14 for row in rows)
+    assert all(row.us_per_value.median > 0.0 for row in rows)

@@ -1,0 +1,96 @@
+"""Steps in a history: the first bad run, and what else changed there; not what is noise, and not a single slow night."""
+
+import math
+import random
+
+import msgspec
+import numpy as np
+import pytest
+from kincheck.core.harness.history.series import read
+from kincheck.core.harness.history.store import Store
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.regression.steps import change_points, steps
+
+from .nights import changed, keep, nights, records, times, worse
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def found(path, **options):
+    with Store(path) as store:
+        return steps(read(store), **options)
+
+
+def noisy(levels, spread=0.05, seed=3):
+    noise = random.Random(seed)
+    return np.array([level + noise.gauss(0.0, spread) for level in levels])
+
+
+@pytest.mark.parametrize(
+    ("levels", "expected"),
+    [
+        ([0.0] * 20, []),
+        ([0.0] * 12 + [0.7] * 8, [12]),
+        ([0.0] * 12 + [0.7] * 8 + [-0.8] * 9, [12, 20]),
+        ([0.0] * 17 + [0.7] * 3, [17]),
+        ([0.0] * 18 + [0.7] * 2, []),
+        ([0.0] * 10 + [3.0] + [0.0] * 10, []),
+        ([0.0] * 12 + [0.3] * 8, []),
+    ],
+    ids=["quiet", "step", "two", "at the end", "too short", "outlier", "too small"],
+)
+def test_levels_are_found_where_they_change(levels, expected):
+    for seed in range(5):
+        assert change_points(noisy(levels, seed=seed), least=math.log(1.5), lasting=3) == expected
+
+
+def test_noise_has_no_steps():
+    """Nights of which one in ten is slow by up to a factor of three."""
+    noise = random.Random(7)
+    for _ in range(200):
+        values = np.array([noise.gauss(0.0, 0.1) + (noise.random() < 0.1) * noise.uniform(0.0, 1.1) for _ in range(40)])
+        assert change_points(values, least=math.log(1.5), lasting=3) == []
+
+
+def test_a_step_of_time_names_its_first_run_and_the_versions_that_changed(path):
+    noise = random.Random(5)
+    for _ in range(8):
+        keep(path, records(noise=noise))
+    for _ in range(4):
+        keep(path, changed(records(noise=noise), **times(2.0)), python="3.13.0")
+    (step,) = found(path)
+    assert (step.case, step.engine, step.quantity, step.first, step.last) == ("first", "mujoco", "time", 9, 8)
+    assert step.started == "2026-11-09T03:00:00+00:00"
+    assert step.worse
+    assert step.now / step.before == pytest.approx(2.0, rel=0.1)
+    assert [str(each) for each in step.changes] == ["python 3.12.3 → 3.13.0", "commit 0808080808 → 0909090909"]
+
+
+def test_a_step_of_error_needs_one_run_and_names_the_output_that_moved_most(path):
+    nights(path, 3)
+    both = changed(changed(records(), **worse(20.0, "x")), **worse(200.0, "y"))
+    keep(path, [msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in both])
+    (step,) = found(path)
+    assert (step.quantity, step.output, step.first) == ("position", "y", 4)
+    assert step.now / step.before == pytest.approx(200.0, rel=1e-3)
+    assert str(step.changes[0]) == "mujoco 4.0.0 → 4.1.0"
+
+
+def test_an_outcome_has_a_first_bad_run_and_what_is_over_does_not_stand(path):
+    nights(path, 2)
+    for _ in range(2):
+        keep(path, changed(records(), outcome=Outcome.CRASHED, message="signal 11"))
+    assert [(each.quantity, each.first, each.worse) for each in found(path, standing=True)] == [("outcome", 3, True)]
+    nights(path, 1)
+    assert found(path, standing=True) == []
+    assert [(each.first, each.worse) for each in found(path)] == [(5, False), (3, True)]
+
+
+def test_a_slow_night_is_no_step_of_time(path):
+    noise = random.Random(5)
+    for night in range(12):
+        keep(path, changed(records(noise=noise), **times(3.0 if night in (5, 10) else 1.0)))
+    assert found(path) == []
