@@ -10,7 +10,7 @@ from typing import Any
 
 from ..core.analysis.march import Route
 from ..core.analysis.model import compile_model
-from ..core.analysis.programs import LAST_ITERATION, Request
+from ..core.analysis.request import LAST_ITERATION, Request
 from ..core.analysis.solve import follow
 from ..core.harness.case import Case
 from ..core.program.compiled import available

@@ -8,7 +8,7 @@ from kincheck.core.analysis.cascade import Cascade
 from kincheck.core.analysis.cascade_sweep import CascadeSweep
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.programs import Request
+from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.solve import follow
 from kincheck.core.motions import Path, Ramp
 

@@ -23,8 +23,8 @@ from kincheck.core import (
 from kincheck.core.analysis.geometry import places
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.programs import Request
 from kincheck.core.analysis.rank import Ranks
+from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
 from kincheck.core.harness.cli import main

@@ -21,7 +21,7 @@ from kincheck.core.analysis.components import components
 from kincheck.core.analysis.equations import frames
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.programs import Request
+from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.solve import follow
 from kincheck.core.analysis.sparse import SparseModel
 from kincheck.core.analysis.sparse_sweep import solve_sparse

@@ -24,7 +24,8 @@ from ..trajectory import Array, BodyMotion
 from .equations import Style
 from .march import CONSISTENT
 from .poses import displaced, state_of
-from .programs import Request, Tracer
+from .programs import Tracer
+from .request import Request
 
 # Longer steps than this [rad] leave the range in which rows computed at one pose say anything of another.
 LONGEST_TURN = 0.3

@@ -16,7 +16,7 @@ from ..motions import Path
 from ..trajectory import Array
 from .march import Route, arrived, march
 from .model import TESTS, Model
-from .programs import FROM, RATE, TIME
+from .request import FROM, RATE, TIME
 from .singularity import EPSILON
 
 # Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9

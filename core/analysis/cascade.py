@@ -21,7 +21,7 @@ from .components import Component, Section, components, section
 from .equations import frames
 from .geometry import places
 from .model import CLOSED, Model, compile_model
-from .programs import RATE, RATE_T, Request
+from .request import RATE, RATE_T, Request
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,8 +115,8 @@ class CascadeSweep:
         bodies = ", ".join(self.cascade.parts[order[worst]].bodies)
         return (
             f"cannot be followed beyond {path.where(here)} (wanted {path.where(wanted)}): the component of {bodies} is left with "
-            f"residual {closure[worst]:.3g} of its size, smallest pivot {np.nanmin(np.abs(pivot)):.3g} (zero at a lock-up or dead centre); "
-            "shorten the sweep or drive another coordinate"
+            f"residual {closure[worst]:.3g} of its size, smallest pivot {np.nanmin(np.abs(pivot)):.3g} (zero at a lock-up or dead "
+            "centre); shorten the sweep or drive another coordinate"
         )
 
     def _trajectory(self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]) -> Trajectory:

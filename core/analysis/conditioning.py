@@ -27,7 +27,7 @@ from .formulation import Configuration
 from .geometry import placed, places
 from .model import compile_model
 from .poses import displaced, jacobian, state_of
-from .programs import Request
+from .request import Request
 from .screws import Screw, screws
 from .slope import Slope, derivatives
 from .solve import sweep

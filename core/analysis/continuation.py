@@ -15,7 +15,7 @@ from ..trajectory import Array
 from .equations import Style
 from .freedom import require_driven
 from .model import compile_model
-from .programs import Request
+from .request import Request
 from .singularity import Singularity, examine
 from .system import System
 from .walk import NODE, Beside, Spot, Walk

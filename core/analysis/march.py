@@ -17,7 +17,7 @@ from ..motions import Path
 from ..program import MARGIN
 from ..trajectory import Array
 from .model import Model
-from .programs import FROM, TIME
+from .request import FROM, TIME
 from .system import System
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.

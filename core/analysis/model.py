@@ -15,7 +15,8 @@ from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, Nump
 from ..program.compiled import available
 from ..trajectory import Array
 from .components import Section
-from .programs import EARLIER, FROM, RATE, RATE_T, TIME, Request, Tracer
+from .programs import Tracer
+from .request import EARLIER, FROM, RATE, RATE_T, TIME, Request
 
 MAX_ITERATIONS = 12
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.

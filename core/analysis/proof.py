@@ -21,7 +21,7 @@ from .enclosure import Enclosure, UnprovedError, enclose
 from .equations import Constraint, Frames, constraints, frames
 from .exact import Reading, equations, exact_mechanism
 from .model import compile_model
-from .programs import Request
+from .request import Request
 from .solve import sweep
 
 Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]

@@ -19,7 +19,7 @@ from ..trajectory import Array
 from .bridge import AMPLIFIED, PIVOT, bridge, onward
 from .continuation import limit_ahead
 from .march import End, March, Route, march
-from .programs import FROM, TIME
+from .request import FROM, TIME
 from .singularity import EPSILON, Singularity, examine, listed, solve_closely
 
 # Of one march: a crossing takes a few milliseconds to be located, and a thousand turns may cross a thousand times.

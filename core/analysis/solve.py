@@ -15,7 +15,7 @@ from .equations import Style
 from .freedom import require_driven
 from .march import March, Route, march
 from .model import Model, compile_model
-from .programs import Request
+from .request import Request
 from .scrutiny import doubtful, scrutinise
 
 

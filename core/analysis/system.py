@@ -16,7 +16,8 @@ from ..primitives.base import Motion
 from ..program import NumpyExecutor, Plan, program
 from ..trajectory import Array
 from .model import Model
-from .programs import FROM, RATE, RATE_T, TIME, Tracer
+from .programs import Tracer
+from .request import FROM, RATE, RATE_T, TIME
 
 EULER = 4
 """Numbers of a vector of a state that is Euler parameters."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..analysis.model import Model, compile_model
-from ..analysis.programs import Request
+from ..analysis.request import Request
 from .case import Case
 
 ORDERS = ("positions only", "and velocities", "and accelerations")

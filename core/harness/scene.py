@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from ..analysis.model import compile_model
-from ..analysis.programs import Request
+from ..analysis.request import Request
 from ..analysis.solve import sweep
 from ..errors import KincheckError
 from ..joints import Joint, Kind

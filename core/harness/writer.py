@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ..analysis.model import compile_model
-from ..analysis.programs import Request
+from ..analysis.request import Request
 from ..analysis.solve import sweep
 from ..errors import SolveError
 from ..mechanism import Mechanism

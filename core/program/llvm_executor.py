@@ -14,7 +14,6 @@ from ..trajectory import Array
 from . import compiled, llvm_code, llvm_loops
 from .executor import Plan
 
-
 LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], str]] = {
     "follow": (llvm_loops.follow, "pppiipiii"),
     "fan": (llvm_loops.fan, "pipiipiiii"),

@@ -11,7 +11,7 @@ import numpy as np
 from ...analysis.geometry import places
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
-from ...analysis.programs import Request
+from ...analysis.request import Request
 from ...analysis.variants import Variants, solve_variants
 from ...program.compiled import available
 from ...trajectory import Array, PointMotion, Trajectory

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...analysis.march import CONSISTENT, Route
 from ...analysis.model import Model, compile_model
-from ...analysis.programs import Request
+from ...analysis.request import Request
 from ...analysis.solve import follow
 from ...errors import SolveError
 from ...program.compiled import available

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...analysis.cascade import Cascade
 from ...analysis.cascade_sweep import CascadeSweep
-from ...analysis.programs import Request
+from ...analysis.request import Request
 from ...drivers import JointAngle
 from ...joints import Revolute, Spherical, Universal
 from ...mechanism import Body, Mechanism, Point

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...analysis.march import Route
 from ...analysis.model import compile_model
-from ...analysis.programs import Request
+from ...analysis.request import Request
 from ...analysis.solve import follow
 from ...errors import KincheckError
 from ...trajectory import Trajectory

@@ -13,7 +13,7 @@ from ...algebra import Vec3
 from ...analysis.geometry import placed
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
-from ...analysis.programs import Request
+from ...analysis.request import Request
 from ...analysis.variants import solve_variants
 from ...jet import Jet
 from ...motions import Path

@@ -1,0 +1,61 @@
+"""What a sweep is asked for, and how the slots of its lanes are named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .equations import Style
+
+# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
+LAST_ITERATION = 1e-9
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a sweep is to give.
+
+    Attributes:
+        drivers: names of the drivers that move; the others hold their design value, and cost nothing.
+        points, bodies: names whose motion is wanted.
+        order: 0 positions, 1 and velocities, 2 and accelerations.
+        style: how the rows are written.
+        compiled: run by machine code where llvmlite is installed, else by numpy; the same results to round-off.
+        state: keep the whole state of every sample, and its rates.
+        varied: places of the geometry (see `places`) that are inputs of the programs; all others are constants in them.
+        last_iteration: of a sample, the one that starts from a residual below this [units of the mechanism's size].
+    """
+
+    drivers: tuple[str, ...]
+    points: tuple[str, ...]
+    bodies: tuple[str, ...] = ()
+    order: int = 2
+    style: Style = Style.NATIVE
+    compiled: bool = True
+    state: bool = False
+    varied: tuple[str, ...] = ()
+    last_iteration: float = LAST_ITERATION
+
+
+RATE, RATE_T = "rate", "rate_t"
+"""The vectors that hold the rates and accelerations of the unknowns."""
+TIME = "time"
+GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
+"""The vectors that tell how a given body moves, and how many numbers each has [units and seconds]."""
+FROM, EARLIER = "from ", "earlier "
+"""Before the names of what a lane is predicted from, and of what that was predicted from."""
+
+
+class Layout:
+    """Where everything stands in a lane: slots are numbered as they are first asked for."""
+
+    def __init__(self) -> None:
+        self.slots: dict[str, int] = {}
+        self.vectors: dict[str, list[int]] = {}
+
+    def scalar(self, name: str) -> int:
+        """The slot of a scalar."""
+        return self.slots.setdefault(name, len(self.slots))
+
+    def vector(self, name: str, count: int = 3) -> list[int]:
+        """The slots of a vector's components."""
+        return self.vectors.setdefault(name, [self.scalar(f"{name}.{k}") for k in range(count)])
