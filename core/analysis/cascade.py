@@ -51,15 +51,16 @@ class Cascade:
 
     Args:
         request: as for `compile_model`; accelerations are computed whatever its order, to predict from.
+        parts: its components, where they are known already.
 
     Raises:
         SolveError: the mechanism has couplers, is not driven enough, or does not close at the design position.
     """
 
-    def __init__(self, mechanism: Mechanism, request: Request) -> None:
+    def __init__(self, mechanism: Mechanism, request: Request, parts: Sequence[Component] | None = None) -> None:
         self.mechanism, self.request = mechanism, request
         frame = frames(mechanism)
-        self.parts = components(mechanism, frame)
+        self.parts = components(mechanism, frame) if parts is None else parts
         self.unit = max(part.extent for part in self.parts) or frame.unit
         x: Vector
         origins = {name: x for name, origin in frame.origins.items() if (x := _triple(frame.unit * origin))}
