@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .analysis.assemble import assemble
     from .analysis.assemblies import find_assemblies
+    from .analysis.continuation import trace
     from .analysis.designs import solve_designs
     from .analysis.solve import solve
     from .drivers import JointAngle, JointDisplacement, PointCoordinate
@@ -72,11 +73,12 @@ __all__ = [
     "find_assemblies",
     "solve",
     "solve_designs",
+    "trace",
 ]
 
 _ROOMS = (
     *(".errors", ".mechanism", ".drivers", ".motions", ".joints"),
-    *(f".analysis.{name}" for name in ("solve", "assemble", "assemblies", "designs")),
+    *(f".analysis.{name}" for name in ("solve", "assemble", "assemblies", "designs", "continuation")),
 )
 
 

@@ -14,16 +14,11 @@ import numpy as np
 
 from ..motions import Path
 from ..trajectory import Array
+from .continuity import AMPLIFIED, EPSILON, PIVOT
 from .march import Route, arrived, march
 from .model import TESTS, Model
 from .request import FROM, RATE, TIME
-from .singularity import EPSILON
 
-# Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9
-# m that outputs are held to.
-AMPLIFIED = 1e3
-# Partial pivoting leaves a smallest pivot of no less than sigma; over the case library it is 1.5 to 14 times as much.
-PIVOT = 30.0
 # The motion from each of the eight to the next [units of the mechanism's size, rad]. Long ways cost accuracy by the motion's
 # curvature, short ones by the poses' own nearness to the singular one; the first that is accurate enough is taken.
 NODES = (0.02, 0.01, 0.005, 0.002)

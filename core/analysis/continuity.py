@@ -1,4 +1,4 @@
-"""Did two neighbouring poses come from the same motion, or did the solver jump to another assembly?"""
+"""May a pose be believed: does it come from the same motion as its neighbour, and are its residuals all there is to know?"""
 
 from __future__ import annotations
 
@@ -15,6 +15,20 @@ NEGLIGIBLE = 1e-6
 # A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or
 # parts of the mechanism's size, says nothing of what is between: a whole turn ends where it began, on whatever assembly.
 LONGEST_STEP = 0.5
+# Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9
+# m that outputs are held to.
+AMPLIFIED = 1e3
+# Partial pivoting leaves a smallest pivot of no less than sigma; over the case library it is 1.5 to 14 times as much.
+PIVOT = 30.0
+EPSILON = float(np.finfo(np.float64).eps)
+
+
+def doubtful(pivot: float, closure: float, tol: float) -> bool:
+    """Whether a sample needs scrutiny: its pivot, negative beyond a singular pose, and its residual allow errors too large.
+
+    The error of rates is that of the pose over sigma once more.
+    """
+    return PIVOT * max(closure, EPSILON) > AMPLIFIED * tol * pivot * abs(pivot)
 
 
 def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float | Array, size: float) -> NDArray[np.bool_]:

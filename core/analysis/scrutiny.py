@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 
 from ..motions import Path
 from ..trajectory import Array
-from .bridge import AMPLIFIED, PIVOT, bridge, onward
+from .bridge import bridge, onward
 from .continuation import limit_ahead
+from .continuity import AMPLIFIED, EPSILON, PIVOT
 from .march import End, March, Route, march
 from .request import FROM, TIME
-from .singularity import EPSILON, Singularity, examine, listed, solve_closely
+from .singularity import Singularity, examine, listed, solve_closely
 
 # Of one march: a crossing takes a few milliseconds to be located, and a thousand turns may cross a thousand times.
 LOCATED = 8
-PARTS, ROUNDS = 16, 3
+PARTS, ROUNDS = 17, 3  # a prime number of parts: few of them end where it is singular
 # Unknowns up to which a dense decomposition is worth its time, a second.
 LARGEST = 1000
 CONTINUED = "the branch followed is the continuation of the motion"
@@ -57,14 +58,6 @@ class Findings:
         if self.poses:
             found["singular_poses"] = self.poses
         return found | ({"notes": self.notes} if self.notes else {})
-
-
-def doubtful(pivot: float, closure: float, tol: float) -> bool:
-    """Whether a sample needs scrutiny: its pivot, negative beyond a singular pose, and its residual allow errors too large.
-
-    The error of rates is that of the pose over sigma once more.
-    """
-    return PIVOT * max(closure, EPSILON) > AMPLIFIED * tol * pivot * abs(pivot)
 
 
 def scrutinise(route: Route, found: March, tol: float) -> Findings:
@@ -225,11 +218,13 @@ class _Scrutiny:
         for _ in range(ROUNDS):
             times = a + (b - a) * np.arange(1, PARTS + 1) / PARTS
             found = march(onward(self.route, lane, times), self.tol, visit=range(PARTS))
-            first = int((np.sign(found.kept[self.model.rows["pivot"].start]) != sign).argmax())
-            if not found.solved[: first + 1].all():
+            good = found.solved & (np.sign(found.kept[self.model.rows["pivot"].start]) == sign)
+            first = PARTS - 1 if good.all() else int((~good).argmax())
+            if first:
+                lane, a = found.visited[first - 1], float(times[first - 1])
+            if not found.solved[first]:
                 break
-            lane = found.visited[first - 1] if first else lane
-            a, b = float(times[first - 1]) if first else a, float(times[first])
+            b = float(times[first])
         singularity = examine(self.system, self.system.state(lane[:, None]), self.route.sampled(np.array([a])))
         self._say("crossed", 0.5 * (a + b), singularity)
         self.findings.notes.append(

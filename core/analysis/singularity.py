@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
+from .continuity import EPSILON
 from .system import System
 
 # Of what is largest, in a combination of rows or a motion: smaller shares are not named.
@@ -125,7 +126,6 @@ class Solved:
 
 
 # Steps of size EPSILON ** (1/3) lose as much to rounding as to curvature in a central difference.
-EPSILON = float(np.finfo(np.float64).eps)
 DIFFERENCE = EPSILON ** (1.0 / 3.0)
 # Each of Newton's steps at least halves the distance to a solution, whatever its multiplicity; five halvings more than from a
 # sample's residual tolerance (1e-6 of an angle at a dead centre) to where rounding ends it are enough.

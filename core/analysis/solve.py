@@ -11,12 +11,12 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
+from .continuity import doubtful
 from .equations import Style
 from .freedom import require_driven
 from .march import March, Route, march
 from .model import Model, compile_model
 from .request import Request
-from .scrutiny import doubtful, scrutinise
 
 
 def solve(
@@ -108,7 +108,11 @@ def follow(route: Route, tol: float) -> Trajectory:
     model, found = route.model, march(route, tol)
     closure, leftover, pivot = _tests(route, found, whole=not found.ends)
     details, message = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)}, ""
-    if found.ends or (math.isfinite(tol) and doubtful(pivot, closure, tol)):
+    if not math.isfinite(tol):  # nothing is asked of the samples
+        message = "; ".join(found.messages)
+    elif found.ends or doubtful(pivot, closure, tol):
+        from .scrutiny import scrutinise  # rarely needed
+
         findings = scrutinise(route, found, tol)
         closure, leftover, pivot = _tests(route, found, whole=False)
         details |= {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)} | findings.details

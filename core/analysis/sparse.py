@@ -33,10 +33,9 @@ from .sparse_rows import Jacobian
 
 # An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.
 CONTRACTS = 1e-2
-# A residual that is expected below this is as small as it gets.
-ROUND_OFF = 1e-17
-# Residuals below this are round-off, in rows of size one over lengths of size one: nothing is left to iterate.
-SETTLED = 1e-15
+# Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an iteration that gains less than
+# a digit though its factors are new shows that they are.
+SETTLED, STALLS = 1e-15, 0.1
 MOVES = 1e-6
 """A body that moves at least this much, in a motion whose largest component is one, is free."""
 FEW = 5
@@ -249,18 +248,15 @@ class SparseModel:
             while not done and iterations < MAX_ITERATIONS:
                 if not math.isfinite(residual):
                     raise FailedError("Newton diverges to numbers that are not finite")
-                last = residual
-                if rate <= CONTRACTS:
-                    done = residual * rate <= ROUND_OFF
-                else:
+                renewed = not rate <= CONTRACTS
+                if renewed:
                     self._factor()
                 state = self.moved(state, -self.factors.solve(self.elements.phi[self.kept]))
-                residual = self._evaluate(state, drives)
+                last, residual = residual, self._evaluate(state, drives)
                 rate, iterations = residual / last, iterations + 1
-                done = done or residual <= SETTLED
+                done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
             closure, leftover, branch = self._tested(residual, tol, done=done)
-            deviation, moved = state - taylor - (here.state - here.predicted), state - here.state
-            gap, reach = (float((self._scale * np.abs(x)).max()) for x in (deviation, moved))
+            gap, reach = (float((self._scale * np.abs(state - other)).max()) for other in (taylor, here.state))
             if not gap <= LARGEST_DEVIATION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
                 raise FailedError("Newton jumps to another assembly")
             rates, accelerations = self._motion()

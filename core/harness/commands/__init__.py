@@ -17,5 +17,6 @@ COMMANDS = (
     "doctor",
     "history",
     "report",
+    "stress",
 )
 """Modules of this room, in the order of the help."""

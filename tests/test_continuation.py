@@ -1,0 +1,151 @@
+"""Tracing a motion by its own length: limit points and branch points against closed forms, and what lies beyond them."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import SolveError
+from kincheck.core.analysis.continuation import trace
+from kincheck.core.harness.cli import main
+
+from .mechanisms import A0, B0, C0, CRANK, D0, four_bar, mcpherson, slider_crank
+from .test_chain import LEAN, chain
+
+# The strut's limits of travel [m] to 18 digits, by other means than the package's: the six numbers of the knuckle's pose in 40
+# digits close two rods, the arm's axis and the strut's line (as in strut_oracle.py), and a secant rule makes the stroke stationary.
+LIMITS = {1: 0.293337313746648221, -1: -0.316737084187394147}
+
+
+def distance(a, b):
+    return np.linalg.norm(np.subtract(a, b))
+
+
+# Limit points
+
+
+@pytest.mark.parametrize("style", ["native", "relative"])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_limits_of_the_strut(direction, style):
+    """To 1e-9 m and much better; the dip of the condition at +0.26 m on the way is no branch point."""
+    length = 5.0 if direction == 1 else 3.0
+    curve = trace(mcpherson(), "stroke", direction=direction, length=length, style=style)
+    (event,) = curve.events
+    assert event.kind == "limit point"
+    assert event.value == pytest.approx(LIMITS[direction], abs=1e-14)
+    assert event.singularity.sigma < 1e-10
+    assert "stroke" in event.singularity.owners
+    assert {"lca", "knuckle"} <= set(event.singularity.moves)
+    assert event.points["wheel"][2] == pytest.approx(0.101 + LIMITS[direction], abs=1e-12)
+
+
+def test_the_limit_does_not_depend_on_the_steps():
+    values = [trace(mcpherson(), "stroke", direction=-1, length=2.5, longest=longest).events[0].value for longest in (0.02, 0.1)]
+    assert values[0] == pytest.approx(values[1], abs=1e-14)
+
+
+def test_the_strut_goes_on_beyond():
+    curve = trace(mcpherson(), "stroke", direction=-1, length=3.0)
+    beyond = np.abs(curve.arc) > abs(curve.events[0].arc)
+    assert (np.diff(curve.values[~beyond]) < 0.0).all()
+    assert (np.diff(curve.values[beyond]) > 0.0).all()
+    assert curve.values == pytest.approx(curve.points["wheel"][:, 2] - 0.101, abs=1e-14)
+    assert curve.message == ""
+    # the rods keep their lengths, there as before
+    lengths = np.linalg.norm(curve.points["rod_end"] - np.array([1.14, 0.355, 0.1455]), axis=1)
+    assert lengths == pytest.approx(lengths[0], abs=1e-14)
+
+
+def test_a_rod_that_is_shorter_than_its_crank():
+    """Limits where the rod stands upright; between them the slider takes both places that the crank leaves it."""
+    rod = 0.1
+    curve = trace(slider_crank(rod), "turn", length=4.0)
+    limit = np.arcsin(rod / CRANK)
+    assert [event.value for event in curve.events] == pytest.approx([limit, -limit], abs=1e-12)
+    assert curve.closed
+    offset = curve.points["end"][:, 0] - CRANK * np.cos(curve.values)
+    assert np.abs(offset) == pytest.approx(np.sqrt(rod**2 - (CRANK * np.sin(curve.values)) ** 2), abs=1e-9)  # 1e-16 under the root
+    first, second = (event.arc for event in curve.events)
+    assert ((offset < 0.0) == ((curve.arc > first) & (curve.arc < second))).all()
+
+
+def test_a_rocker_that_drives_its_crank():
+    """Limits where crank and coupler are in line; the crank goes round, and the curve is closed."""
+    rocked = replace(four_bar(), drivers=[replace(four_bar().drivers[0], name="rock", joint="D")])
+    curve = trace(rocked, "rock", length=12.0)
+    crank, coupler, rocker, base = distance(A0, B0), distance(B0, C0), distance(C0, D0), distance(A0, D0)
+
+    def angle(reach):
+        return np.arccos((base**2 + rocker**2 - reach**2) / (2.0 * base * rocker))
+
+    design = angle(distance(A0, C0))
+    assert [event.value for event in curve.events] == pytest.approx(
+        [angle(reach) - design for reach in (coupler + crank, coupler - crank)]
+    )
+    assert curve.closed
+    assert curve.values[-1] == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_limit_at_which_the_curve_branches_too():
+    """Bricard's hinge turns back at 30 degrees, folded flat: corrections do not converge there, and the limit is interpolated."""
+    mechanism = cases.load("bricard").mechanism
+    curve = trace(mechanism, mechanism.drivers[0].name, length=4.5)
+    assert [event.value for event in curve.events] == pytest.approx([np.pi / 6.0], abs=1e-11)
+
+
+# Branch points
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("loops", [1, 2])
+def test_change_points(loops, direction):
+    """All links in line: the determinant changes its sign with an odd number of loops, and not with an even one."""
+    curve = trace(chain(loops), "turn", length=4.5, direction=direction)
+    (event,) = curve.events
+    assert event.kind == "branch point"
+    assert event.value == pytest.approx(LEAN + direction * np.pi / 2.0, abs=1e-11)
+    assert "turn" not in event.singularity.owners
+    # straight on: the cranks stay parallel
+    expected = np.column_stack([loops + np.sin(LEAN - curve.values), np.cos(LEAN - curve.values)])
+    assert curve.points["end"][:, :2] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_motion_without_singular_poses():
+    """A whole turn of a crank, and back at the design."""
+    curve = trace(four_bar(), "turn", length=12.0)
+    assert curve.closed
+    assert curve.events == ()
+    assert curve.values[-1] == pytest.approx(2.0 * np.pi, abs=0.1)
+    assert curve.sigma.min() > 0.01
+
+
+# Arguments and the command line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"driver": "steer"}, "no driver 'steer'; known: stroke"),
+        ({"direction": 2}, "direction is 2, expected 1"),
+        ({"length": -1.0}, "length is -1.0, expected a positive number"),
+        ({"longest": np.nan}, "longest is nan"),
+        ({"points": ["hub"]}, "no point 'hub'; known: wheel, rod_end"),
+    ],
+)
+def test_what_makes_no_sense(arguments, message):
+    with pytest.raises(SolveError, match=message):
+        trace(mcpherson(), **({"driver": "stroke"} | arguments))
+
+
+def test_the_command_line(tmp_path, capsys):
+    file = tmp_path / "curve.json"
+    assert main(["trace", "mcpherson_strut", "--length", "3", "--json", str(file)]) == 0
+    assert "limit point at stroke = -0.316737084 m" in capsys.readouterr().out
+    found = json.loads(file.read_text())
+    assert found["schema"] == "kincheck-trace/1"
+    (event,) = found["curves"][1]["events"]
+    assert event["value"] == pytest.approx(LIMITS[-1], abs=1e-14)
+    assert event["nearest_pose"]["kind"] == "lock-up"
+    assert main(["trace", "mcpherson_strut", "--driver", "strok"]) == 2
+    assert "did you mean 'stroke'" in capsys.readouterr().err

@@ -1,0 +1,174 @@
+"""Samples at, near and beyond singular poses: right and said to be, or refused with the number; never taken in silence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.adapters.native import Native
+from kincheck.core import Distance, JointDisplacement, Point, Translational
+from kincheck.core.analysis.solve import solve
+from kincheck.core.harness.run import run
+from kincheck.core.program import Elimination, Tape, program
+from mpmath import mp, mpf
+
+from .mechanisms import CRANK, mcpherson, slider_crank, slider_crank_motion
+from .running import run_on
+from .test_chain import LEAN, chain
+from .test_continuation import LIMITS
+
+BRANCH = LEAN + np.pi / 2.0
+"""Where all links of the chain are in line."""
+
+
+def chain_end(loops, turn):
+    """Closed form of the last crank's pin, its velocity and acceleration at rate one."""
+    s, c, zero = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
+    return [np.column_stack(each) for each in ([loops + s, c, zero], [-c, s, zero], [-s, -c, zero])]
+
+
+# Bifurcations
+
+
+@pytest.mark.parametrize("loops", [1, 2])
+@pytest.mark.parametrize("near", [0.0, 1e-13, -1e-9])
+def test_a_sample_where_the_motion_branches(loops, near):
+    """Its equations say nothing of it; it is interpolated, said to be, and the samples beyond are reached."""
+    turn = np.array([0.0, 0.7, 1.4, BRANCH + near, 2.3, 3.0])
+    found = solve(chain(loops), "turn", turn)
+    assert found.solved.all(), found.message
+    end = found.points["end"]
+    for values, expected, error in zip(
+        (end.position, end.velocity, end.acceleration), chain_end(loops, turn), (1e-12, 1e-11, 1e-9), strict=True
+    ):
+        assert np.abs(values - expected).max() <= error
+    (note,) = found.details["notes"]
+    assert note.startswith(f"passes a singular pose at turn = {BRANCH:.9g}")
+    assert "the branch followed is the continuation of the motion" in note
+    (pose,) = found.details["singular_poses"]
+    assert pose["outcome"] == "passed"
+    assert pose["kind"] == "bifurcation"
+    assert pose["sample"] == 3
+    assert pose["driver"] == {"turn": pytest.approx(BRANCH)}
+    assert pose["smallest_singular_value"] < 1e-6
+    assert any(name.startswith("coupler") for name in pose["direction"])
+    assert "turn" not in pose["rows_of"]
+
+
+def test_many_samples_around_it():
+    """Fine steps up to it: some are interpolated, none is wrong."""
+    turn = BRANCH + np.linspace(-1e-3, 1e-3, 21)
+    found = solve(chain(1), "turn", turn)
+    assert found.solved.all(), found.message
+    assert np.abs(found.points["end"].position - chain_end(1, turn)[0]).max() <= 1e-9
+    assert found.details["retried_samples"] >= 1
+
+
+def test_a_singular_pose_between_samples():
+    turn = np.linspace(0.0, 2.4, 7)
+    found = solve(chain(1), "turn", turn)
+    assert found.solved.all()
+    (pose,) = found.details["singular_poses"]
+    assert pose["outcome"] == "crossed"
+    assert pose["driver"]["turn"] == pytest.approx(BRANCH, abs=0.4 / 17)
+    assert "crosses a singular pose between turn = 1.6 and turn = 2" in found.details["notes"][0]
+
+
+def test_both_ways_and_twice():
+    found = solve(chain(1), "turn", np.linspace(-3.0, 6.0, 40))
+    assert found.solved.all()
+    places = sorted(pose["driver"]["turn"] for pose in found.details["singular_poses"])
+    assert places == pytest.approx([BRANCH - np.pi, BRANCH, BRANCH + np.pi], abs=0.02)
+
+
+def test_a_run_says_what_a_passing_record_passed():
+    case = cases.load("iftomm_n_four_bar")
+    sweep = replace(case.sweep, values=np.deg2rad(np.array([0.0, 60.0, 90.0, 110.0])))
+    (record,) = run([replace(case, sweep=sweep, reference={})], [Native()], tol=1e-12).records
+    assert record.outcome == "pass"
+    assert record.solved == 4
+    assert "passes a singular pose at crank = 1.57079633" in record.message
+
+
+def test_ordinary_sweeps_say_nothing():
+    for mechanism, driver in ((mcpherson(), "stroke"), (chain(1), "turn")):
+        details = solve(mechanism, driver, np.linspace(-0.08, 0.08, 9)).details
+        assert not {"notes", "singular_poses", "retried_samples"} & set(details)
+
+
+# Lock-up
+
+
+def pushed():
+    """A slider that drives its crank, from an open angle; its dead centre is at the second value."""
+    design = float(slider_crank_motion([1.0]).x[0])
+    pin = (CRANK * np.cos(1.0), 0.0, -CRANK * np.sin(1.0))
+    m = slider_crank()
+    rod = Distance("rod", "crank", "slider", (pin, (design, 0.0, 0.0)))
+    guide = Translational("guide", "ground", "slider", (design, 0.0, 0.0), (1.0, 0.0, 0.0))
+    driven = replace(m, joints=[m.joint("pivot"), rod, guide], points=[Point("pin", "crank", pin)])
+    return replace(driven, drivers=[JointDisplacement("push", "guide")]), design, pin
+
+
+def pin_height(design, pin, push):
+    """Of the pin below the guide [m], in 40 digits from the doubles that the mechanism has."""
+    with mp.workdps(40):
+        x, crank, rod = mpf(design) + mpf(push), mp.norm([mpf(v) for v in pin]), mp.norm([mpf(design) - mpf(pin[0]), mpf(pin[2])])
+        along = (x * x + crank * crank - rod * rod) / (2 * x)
+        return -mp.sqrt(crank * crank - along * along)
+
+
+GAPS = np.array([1e-3, 1e-6, 1e-9, 1e-12])
+
+
+def test_near_a_dead_centre_positions_are_right():
+    """1e-12 m before it a residual of 1e-12 would be 1e-6 m of the pin; samples are solved again until rounding ends it."""
+    mechanism, design, pin = pushed()
+    values = CRANK + 1.0 - design - GAPS
+    found = solve(mechanism, "push", values, order=0)
+    assert found.solved.all(), found.message
+    for position, value in zip(found.points["pin"].position, values.tolist(), strict=True):
+        assert abs(mpf(float(position[2])) - pin_height(design, pin, value)) <= 1e-9
+    assert found.details["retried_samples"] >= 2
+
+
+def test_near_a_dead_centre_uncertain_rates_are_refused():
+    mechanism, design, _ = pushed()
+    found = solve(mechanism, "push", CRANK + 1.0 - design - GAPS)
+    assert found.solved.tolist() == [True, True, False, False]
+    assert np.isnan(found.points["pin"].position[2:]).all()
+    assert "refused at push = " in found.message
+    assert "rates by" in found.message
+    assert "a driver's row depends on the joints' (lock-up), of p" in found.message
+    assert [pose["outcome"] for pose in found.details["singular_poses"]] == ["refused", "refused"]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
+    found = solve(mcpherson(), "stroke", direction * np.linspace(0.0, 0.4, 21))
+    assert f"the limit of travel is stroke = {LIMITS[direction]:.9g}" in found.message
+    assert "kincheck trace" in found.message
+    (pose,) = found.details["singular_poses"]
+    assert pose["outcome"] == "limit"
+    assert pose["driver"]["stroke"] == pytest.approx(LIMITS[direction], abs=1e-14)
+    assert pose["kind"] == "lock-up"
+    assert "stroke" in pose["rows_of"]
+    assert {"lca", "knuckle"} <= set(pose["direction"])
+
+
+# The sign of the determinant
+
+
+@pytest.mark.parametrize("n", [2, 5, 11])
+def test_signed_pivot(n):
+    """The smallest pivot in size, with the determinant's sign in all lanes, or in all the opposite."""
+    matrices = np.random.default_rng(n).normal(size=(64, n, n))
+    tape = Tape()
+    slots = np.arange(n * n).reshape(n, n)
+    elimination = Elimination([{j: tape.input(int(slots[i, j])) for j in range(n)} for i in range(n)])
+    block = np.vstack([matrices.reshape(64, -1).T, np.zeros((n + 1, 64))])
+    run_on([program("p", tape, dict(enumerate([elimination.signed_pivot, *elimination.pivots], n * n)))], block)
+    found, pivots = block[n * n], block[n * n + 1 :]
+    signs = np.sign(found) * np.linalg.slogdet(matrices)[0]
+    assert (signs == signs[0]).all()
+    assert (np.abs(found) == np.minimum(np.abs(pivots).min(axis=0), 1.0)).all()
