@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..core.analysis.march import Route
-from ..core.analysis.model import compile_model
+from ..core.analysis.prepare import Solver, prepare
 from ..core.analysis.request import LAST_ITERATION, Request
-from ..core.analysis.solve import follow
 from ..core.harness.case import Case
 from ..core.program.compiled import available
 from ..core.trajectory import Trajectory
@@ -61,15 +59,14 @@ class Native:
         """Never: a joint is supported by being composed of primitives."""
         return None
 
-    def build(self, case: Case) -> Route:
+    def build(self, case: Case) -> Solver:
         """Select the rows, trace the programs for the points that the outputs read, and lay out the samples."""
         path = case.sweep.path
-        request = Request(tuple(path.motions), case.points, last_iteration=self.last_iteration)
-        return Route(compile_model(case.mechanism, request), path)
+        return prepare(case.mechanism, Request(tuple(path.motions), case.points, last_iteration=self.last_iteration), path)
 
-    def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
+    def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""
-        return follow(model, tol if self.last_iteration <= LAST_ITERATION else math.inf)
+        return model(tol if self.last_iteration <= LAST_ITERATION else math.inf)
 
     def efforts(self) -> Mapping[str, Native]:
         """By how near to the solution Newton's last step starts; the predictor is the same."""

@@ -9,7 +9,7 @@ from kincheck.core.analysis.cascade_sweep import CascadeSweep
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.analysis.solve import follow
+from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp
 
 from .mechanisms import four_bar, mcpherson, slider_crank

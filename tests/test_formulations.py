@@ -12,7 +12,7 @@ from kincheck.core.algebra import ZERO, Quat, Vec3, X, turned_by
 from kincheck.core.analysis.equations import Style, constraints, frames
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.analysis.solve import sweep
+from kincheck.core.analysis.sweep import sweep
 from kincheck.core.harness.probe import probes
 from kincheck.core.primitives import conventional, paper
 from kincheck.core.primitives.base import Pose

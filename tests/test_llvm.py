@@ -10,7 +10,7 @@ from kincheck.core import solve
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.analysis.solve import sweep
+from kincheck.core.analysis.sweep import sweep
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import NumpyExecutor, Plan, Tape, absolute, cos, maximum, minimum, program, sin, sqrt, where_larger
 from kincheck.core.program import compiled as code

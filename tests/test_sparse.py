@@ -22,9 +22,9 @@ from kincheck.core.analysis.equations import frames
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.analysis.solve import follow
 from kincheck.core.analysis.sparse import SparseModel
 from kincheck.core.analysis.sparse_sweep import solve_sparse
+from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.bench import scaling
 from kincheck.core.harness.bench.ring import LEAN, pivot, ring
 from kincheck.core.motions import Path, Ramp

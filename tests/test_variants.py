@@ -11,7 +11,7 @@ from kincheck.core.analysis.geometry import placed, places
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.analysis.solve import follow
+from kincheck.core.analysis.sweep import follow
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path
 

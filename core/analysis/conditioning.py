@@ -30,7 +30,7 @@ from .poses import displaced, jacobian, state_of
 from .request import Request
 from .screws import Screw, screws
 from .slope import Slope, derivatives
-from .solve import sweep
+from .sweep import sweep
 
 
 @dataclass(frozen=True, eq=False)

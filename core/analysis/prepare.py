@@ -1,10 +1,9 @@
 """How a mechanism is solved is chosen by its size: as one program, component by component, or as one sparse system.
 
-The answers are the same to round-off. One program costs least for each sample, and much to make: its text grows with the square of
-what it ties together. Components share programs, so that a chain of thousands is made ready in seconds; a mechanism that no
-component can be taken from, and that is too large for one program, is a sparse system. Measured on a chain of four-bars, one program
-against components: 3 bodies 0.7 and 8 us a sample, made ready in 0.2 and 0.3 s; 17 bodies 2.7 and 25 us, 2.2 and 0.3 s; 33 bodies
-2.5 and 14 us, 5.9 and 0.3 s.
+The answers are the same to round-off. One program costs least for each sample, and much to make: its text grows faster than what it
+ties together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large
+for one program is a sparse system. Measured on chains of four-bars, one program against components: 3 bodies 0.7 and 8 us a sample,
+made ready in 0.2 and 0.3 s; 17 bodies 2.7 and 25 us, 2.2 and 0.3 s; 33 bodies 2.5 and 14 us, 5.9 and 0.3 s.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from .equations import Style, frames
 from .march import Route
 from .model import compile_model
 from .request import Request
-from .solve import follow
 from .sparse import SparseModel
 from .sparse_sweep import solve_sparse
+from .sweep import follow
 
 # Up to as many bodies one program is made in about a second.
 ONE_PROGRAM = 13

@@ -22,7 +22,7 @@ from .equations import Constraint, Frames, constraints, frames
 from .exact import Reading, equations, exact_mechanism
 from .model import compile_model
 from .request import Request
-from .solve import sweep
+from .sweep import sweep
 
 Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]
 """Value from the design, velocity and acceleration [SI] of each moving driver at every sample."""

@@ -10,12 +10,10 @@ import numpy as np
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp
-from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
-from .continuity import doubtful
+from ..trajectory import Array, Trajectory
 from .equations import Style
 from .freedom import require_driven
-from .march import March, Route, march
-from .model import Model, compile_model
+from .prepare import prepare
 from .request import Request
 
 
@@ -56,7 +54,7 @@ def solve(
             argument makes no sense.
     """
     path, request = asked(mechanism, driver, values, rate, points, bodies, order, style, motions)
-    return sweep(compile_model(mechanism, request), path, tol)
+    return prepare(mechanism, request, path)(tol)
 
 
 def asked(
@@ -96,61 +94,3 @@ def asked(
 def _require(holds: bool, otherwise: str) -> None:
     if not holds:
         raise SolveError(f"solve: {otherwise}")
-
-
-def sweep(model: Model, path: Path, tol: float) -> Trajectory:
-    """Run a compiled model over the samples of a path; see `solve`."""
-    return follow(Route(model, path), tol)
-
-
-def follow(route: Route, tol: float) -> Trajectory:
-    """Run a compiled model along a route; see `solve`."""
-    model, found = route.model, march(route, tol)
-    closure, leftover, pivot = _tests(route, found, whole=not found.ends)
-    details, message = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)}, ""
-    if not math.isfinite(tol):  # nothing is asked of the samples
-        message = "; ".join(found.messages)
-    elif found.ends or doubtful(pivot, closure, tol):
-        from .scrutiny import scrutinise  # rarely needed
-
-        findings = scrutinise(route, found, tol)
-        closure, leftover, pivot = _tests(route, found, whole=False)
-        details |= {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)} | findings.details
-        message = "; ".join(findings.messages)
-    iterations = found.kept[model.rows["iterations"].start]
-    return Trajectory(
-        points={name: _point(model, found, name) for name in model.request.points},
-        solved=found.solved,
-        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
-        residual=closure * model.frame.unit,
-        message=message,
-        details=details,
-        bodies={name: _body(model, found, name) for name in model.request.bodies},
-    )
-
-
-def _tests(route: Route, found: March, *, whole: bool) -> tuple[float, float, float]:
-    """Of all solved samples: the largest residuals of kept and redundant rows, and the smallest pivot, negative where any is.
-
-    A pivot is negative beyond a singular pose, where the determinant's sign is not that of the start.
-    """
-    rows = route.model.rows
-    tests = found.kept[rows["closure"].start : rows["pivot"].stop]
-    solved = tests if whole else tests[:, found.solved]
-    closure, leftover = solved[:2].max(axis=1, initial=0.0).tolist()
-    pivots = solved[3]
-    return closure, leftover, float(pivots.min(initial=1.0) if route.ahead else -pivots.max(initial=-1.0))
-
-
-def _point(model: Model, found: March, name: str) -> PointMotion:
-    motions = [found.kept[model.rows[f"{label} {name}"]].T for label in ("position", "velocity", "acceleration")[: model.orders]]
-    return PointMotion(*motions, *[None] * (3 - len(motions)))
-
-
-def _body(model: Model, found: March, name: str) -> BodyMotion:
-    """Rates of place and of rotation stand side by side, so that both are one view."""
-    rows = model.rows
-    motions = [found.kept[rows[f"{label} {name}"]].T for label in ("r", "p")]
-    for first, last in (("rdot", "omega"), ("rddot", "omega_t"))[: model.orders - 1]:
-        motions.append(found.kept[rows[f"{first} {name}"].start : rows[f"{last} {name}"].stop].T)
-    return BodyMotion(*motions, *[None] * (4 - len(motions)))

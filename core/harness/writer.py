@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.model import compile_model
 from ..analysis.request import Request
-from ..analysis.solve import sweep
+from ..analysis.sweep import sweep
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..trajectory import Array, BodyMotion

@@ -12,7 +12,7 @@ import numpy as np
 from ...analysis.march import CONSISTENT, Route
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
-from ...analysis.solve import follow
+from ...analysis.sweep import follow
 from ...errors import SolveError
 from ...program.compiled import available
 from ...trajectory import Trajectory

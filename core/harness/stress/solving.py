@@ -8,7 +8,7 @@ from typing import Any
 from ...analysis.march import Route
 from ...analysis.model import compile_model
 from ...analysis.request import Request
-from ...analysis.solve import follow
+from ...analysis.sweep import follow
 from ...errors import KincheckError
 from ...trajectory import Trajectory
 from ..attempt import Answer, Failure, Pair, bounded, check, said
