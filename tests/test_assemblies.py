@@ -1,6 +1,7 @@
 """All assemblies of a mechanism: as many as geometry says, each closed by the paper's own equations, ranked, and exported."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -77,6 +78,15 @@ def test_the_same_seed_finds_the_same():
     assert [each.starts for each in one.found] != [each.starts for each in other.found]
 
 
+def test_the_delta_robot_has_sixteen():
+    """Three knees that bend in or out, and for each of the eight ways the platform above or below."""
+    mechanism = cases.load("delta_robot").mechanism
+    found = find_assemblies(mechanism, at_design(mechanism), samples=150, spread=None)
+    assert len(found.found) == 16
+    assert all(closes(mechanism, each) for each in found.found)
+    assert len({(each.orientation, tuple(each.signs.values())) for each in found.found}) > 4
+
+
 def test_a_gough_platform_has_several():
     mechanism = cases.load("gough_platform").mechanism
     found = find_assemblies(mechanism, at_design(mechanism), samples=24, spread=None)
@@ -126,6 +136,8 @@ def test_a_simulator_starts_in_the_assembly_that_was_chosen(to, tmp_path, monkey
     main_ending = {"mjcf": ".xml", "exudyn": ".py", "urdf": ".urdf"}[to]
     texts = {file.name.removeprefix("model") or main_ending: file.read_text() for file in tmp_path.glob("model*")}
     found = read(to, texts, mechanism, tmp_path)
+    if to == "mjcf":  # hinges have turned the short way
+        assert all(abs(float(each)) <= np.pi for each in re.search('qpos="([^"]*)"', texts[".xml"])[1].split())
     assert np.abs(found.residuals).max() <= 1e-12
     chosen = json.loads((tmp_path / "found.json").read_text())["assemblies"][1]
     for name, pose in chosen["bodies"].items():

@@ -76,18 +76,20 @@ def test_batches(monkeypatch):
 def test_chains_are_solved_until_they_take_too_long(monkeypatch):
     monkeypatch.setattr(size, "LOOPS", (1, 2))
     monkeypatch.setattr(size, "MANY", (3, 4))
+    monkeypatch.setattr(size, "CRANKS", (4,))
     found = size.measure_sizes([adapters.engine("native")], TOL, 1)
     assert [(each.engine, each.loops, each.bodies) for each in found] == [
         ("native", 1, 3),
         ("native", 2, 5),
         ("native, by components", 3, 7),
         ("native, by components", 4, 9),
+        ("native", 4, 7),
     ]
     assert all(each.outcome is Outcome.PASS and each.error < 1e-13 for each in found)
     monkeypatch.setattr(size, "LONGEST", 0.0)
     _, second, *_ = size.measure_sizes([adapters.engine("native")], TOL, 1)
     assert (second.outcome, second.us_per_sample) == (None, None)
-    assert second.message.startswith("not tried: 1 loops took")
+    assert second.message.startswith("not tried: 1 took")
 
 
 def test_growth_is_that_of_the_largest():

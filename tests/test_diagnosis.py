@@ -25,6 +25,7 @@ from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.rank import Ranks
 from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.screws import free_motions
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
 from kincheck.core.harness.cli import main
@@ -104,6 +105,25 @@ def test_what_is_left_free_is_described_body_by_body():
     assert spin.through[0] == pytest.approx(1.0)
     (finding,) = diagnose(case(rod, [0.0]), samples=1, tol=1e-12).findings
     assert finding.startswith("1 motion is left free with the drivers held: 'rod' turns about (0, 1, 0) through (1, ")
+
+
+def test_motions_that_have_nothing_to_do_with_each_other_are_not_mixed():
+    """Three motions of two columns each, in a null space whose orthonormal basis mixes them."""
+    rng = np.random.default_rng(7)
+    apart = np.kron(np.eye(3), [[1.0, -1.0]])  # each row ties two columns together
+    found = free_motions(rng.normal(size=(3, 3)) @ apart)
+    assert found.shape == (3, 6)
+    assert np.abs(apart @ found.T).max() <= 1e-14
+    assert ((np.abs(found) > 1e-12).sum(axis=1) == 2).all()
+
+
+def test_a_link_turns_about_its_instantaneous_centre():
+    """Where crank and rocker, drawn longer, meet: (0.3, 0.4) s = (1.4, 0) + (0.2, 1.2) t at s = 6."""
+    (motion,) = Ranks(replace(four_bar(), drivers=[])).free
+    (coupler,) = (screw for screw in motion if screw.body == "coupler")
+    assert coupler.through[0] == pytest.approx(1.8)
+    assert coupler.through[2] == pytest.approx(2.4)
+    assert np.abs(coupler.axis) == pytest.approx(Y)
 
 
 def test_a_nut_that_nothing_holds_screws_by_its_lead():

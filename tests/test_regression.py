@@ -93,6 +93,16 @@ def test_round_off_that_grows_is_no_drift(path):
     assert kinds(reported(path)) == []
 
 
+def test_on_another_processor_only_the_calibration_loop_is_compared_with(path):
+    nights(path, 6)
+    keep(path, changed(records(), **times(3.0)), processor="another", calibration_seconds=0.06)
+    slower = [each.engine + each.case for each in reported(path).findings]
+    assert slower == []
+    quick = [changed([each], case=each.case, engine=each.engine, **times(0.25))[0] for each in records()]
+    keep(path, changed(quick, **times(4.0)), processor="another", calibration_seconds=0.005)
+    assert kinds(reported(path, against="6")) == [(Kind.SLOWER, *FIRST)]  # 10 ms, as before
+
+
 # Planted
 
 
@@ -195,17 +205,17 @@ def test_tolerances_that_nothing_needed_are_named_after_ten_runs(path):
 def test_rules_find_the_run_to_compare_with(path):
     keep(path, records())
     keep(path, records(), git={"commit": "b" * 40, "branch": "topic", "changed": False})
-    keep(path, records(), git={"commit": "c" * 40, "branch": "main", "changed": True})
     keep(path, records(), status="interrupted")
     keep(path, changed(records(), outcome=Outcome.FAIL))
+    keep(path, records(), git={"commit": "c" * 40, "branch": "main", "changed": True})
     keep(path, [msgspec.structs.replace(each, case="other") for each in records()])
     keep(path, records())
-    assert reported(path).against.name == "run 3 (last green)"
+    assert reported(path).against.name == "run 5 (last green)"
     assert reported(path, against="topic-baseline").against.name == "run 2 (topic baseline)"
-    assert reported(path, against="main-baseline").against.name == "run 5 (main baseline)"
-    assert reported(path, against="4").against.name == "run 4, interrupted"
+    assert reported(path, against="main-baseline").against.name == "run 4 (main baseline)"
+    assert reported(path, against="3").against.name == "run 3, interrupted"
     assert reported(path, run="2").against.number == 1
-    nothing = reported(path, run="5", against="none-baseline")
+    nothing = reported(path, run="4", against="none-baseline")
     assert nothing.against is None
     assert nothing.regressed  # it has a failure, and nothing to excuse it
     with pytest.raises(KincheckError, match="run 7 cannot be compared with itself"):
@@ -261,7 +271,7 @@ def test_junit_names_what_is_about_a_pair_and_keeps_skips(path):
     made = changed(
         changed(records(), **times(2.0)), case="second", outcome=Outcome.UNAVAILABLE, message="not installed", seconds=None
     )
-    keep(path, made)
+    keep(path, changed(made, case="first", engine="native", outcome=Outcome.CRASHED, message="signal 11"))
     found = reported(path)
     with Store(path) as store:
         root = ET.fromstring(to_regression_junit(store.results(7), found))
@@ -269,6 +279,7 @@ def test_junit_names_what_is_about_a_pair_and_keeps_skips(path):
     assert failed == {"first.mujoco.projection slower", "second.mujoco.projection lost"}
     assert [suite.get("failures") for suite in root] == ["1", "1"]
     assert [suite.get("skipped") for suite in root] == ["0", "2"]
+    assert [(suite.get("tests"), suite.get("errors")) for suite in root] == [("5", "2"), ("5", "0")]
 
 
 def test_markdown_takes_foreign_text_as_text_and_folds_what_is_alike(path):

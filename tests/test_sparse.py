@@ -10,6 +10,7 @@ from kincheck.core import (
     JointAngle,
     Mechanism,
     Point,
+    PointCoordinate,
     RackPinion,
     Revolute,
     Screw,
@@ -72,7 +73,8 @@ def test_couplers_and_their_coordinates():
     )
     found, expected = both(mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"))
     assert_alike(found, expected)
-    assert np.ptp(found.points["top"].position[:, 2]) > 0.01
+    # the pinion makes half the turns, the nut a lead for each
+    assert np.ptp(found.points["top"].position[:, 2]) == pytest.approx(6.0 / 2.0 * 0.02 / (2.0 * np.pi), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +148,7 @@ def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
     assert found.points["wheel"].acceleration is None
     assert found.bodies["knuckle"].a is None
     far = solve_sparse(model, Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
-    assert far.message.startswith("cannot be followed") is True
+    assert "no sample reached on this side" in far.message
     assert not far.solved.any()
 
 
@@ -156,20 +158,21 @@ def without_driver(mechanism):
 
 def test_what_cannot_be_solved_is_refused_by_name():
     whole = chain(40)
-    with pytest.raises(SolveError, match="1 or more degrees of freedom without a driver; .*'coupler"):
+    with pytest.raises(
+        SolveError, match="1 or more degrees of freedom without a driver; what can still move is most of all 'crank0', "
+    ):
         SparseModel(without_driver(whole), compiled=False)
+    second = JointAngle("second", "pivot20")
     with pytest.raises(SolveError, match="driver 'second' prescribes what"):
-        second = JointAngle("second", "pivot20")
         SparseModel(Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]), compiled=False)
-    with pytest.raises(SolveError, match=r"dead centre.* most of all '(crank|slider)"):
-        stuck = slider_crank()
-        slide = [type(stuck.drivers[0])("turn", "pivot")]
-        end = Mechanism("stuck", stuck.bodies, stuck.joints, stuck.points, slide)
-        from kincheck.core import PointCoordinate
-
-        SparseModel(Mechanism("stuck", end.bodies, end.joints, end.points, [PointCoordinate("push", "end", X)]), compiled=False)
+    stretched = slider_crank()
+    push = [PointCoordinate("push", "end", X)]
+    with pytest.raises(SolveError, match=r"dead centre.* most of all 'crank'; "):
+        SparseModel(Mechanism("stuck", stretched.bodies, stretched.joints, stretched.points, push), compiled=False)
+    m = mcpherson()
+    joints = [joint.changed(length=3.0) if isinstance(joint, Distance) else joint for joint in m.joints]
     with pytest.raises(SolveError, match="does not close at the design position: residual"):
-        SparseModel(slider_crank(0.2), compiled=False)
+        SparseModel(Mechanism("apart", m.bodies, joints, m.points, m.drivers), compiled=False)
     with pytest.raises(SolveError, match="no body can move"):
         SparseModel(Mechanism("still", [Body("wall", fixed=True)], []), compiled=False)
 
@@ -181,7 +184,7 @@ def test_a_rod_that_spins_freely_is_named():
         Spherical("outer", "knuckle", "rod", (1.115, 0.665, 0.118)),
     ]
     joints = [*(joint for joint in mechanism.joints if not isinstance(joint, Distance)), *rod]
-    with pytest.raises(SolveError, match="without a driver; what can still move is most of all 'rod'; .*use distance"):
+    with pytest.raises(SolveError, match=r"without a driver; what can still move is most of all 'rod'; .*use distance"):
         SparseModel(Mechanism("spinning", [*mechanism.bodies, Body("rod")], joints, mechanism.points, mechanism.drivers))
 
 

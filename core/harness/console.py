@@ -9,12 +9,13 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 
 from .record import Outcome, Record, Results
+from .visible import visible
 
 
 def complain(lines: Iterable[str]) -> None:
     """Say what is wrong on standard error, a line each, as the tool."""
     for line in lines:
-        print(f"kincheck: {line}", file=sys.stderr)
+        print(f"kincheck: {visible(line)}", file=sys.stderr)
 
 
 def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
@@ -23,7 +24,7 @@ def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
 
     def tell(record: Record, done: int, total: int) -> None:
         records.append(record)
-        line = f"[{done}/{total}] {record.case} {record.engine}: {record.outcome}"
+        line = visible(f"[{done}/{total}] {record.case} {record.engine}: {record.outcome}")
         if terminal:
             line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)

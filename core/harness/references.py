@@ -125,7 +125,8 @@ def series(file: Path, found: Reference, values: Array, outputs: Sequence[Quanti
     proved = {name: each for name, each in found.outputs.items() if each.reason is None}
     for output in outputs:
         if output.name in proved and (proved[output.name].unit, proved[output.name].signs) != (output.unit, output.signs):
-            raise fault(file, f"outputs.{output.name}", "found another unit or convention of signs, expected that of the case; make it anew")
+            problem = "found another unit or convention of signs, expected that of the case; make the reference anew"
+            raise fault(file, f"outputs.{output.name}", problem)
     names = [output.name for output in outputs if output.name in proved]
     if not names:
         raise fault(file, "outputs", f"found {', '.join(proved) or 'none'}, expected outputs of the case; make the reference anew")

@@ -16,3 +16,10 @@ def visible(text: str, also: str = "") -> str:
     return "".join(
         letter if letter.isprintable() or letter in also else letter.encode("unicode_escape").decode("ascii") for letter in text
     )
+
+
+def cell(value: object) -> object:
+    """A value for a cell of a CSV file: a text that a spreadsheet would take for a formula, and compute, gets an apostrophe."""
+    if not isinstance(value, str):
+        return value
+    return f"'{visible(value)}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else visible(value)

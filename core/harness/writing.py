@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from ..errors import CaseError
-from ..joints import Coupler, Joint
-from ..motions import Absolute, Motion
+from ..joints import Coupler
+from ..motions import Absolute
 from .case import MARKER, TIME, Case, Output
 from .reading.casefile import AXES
 from .reading.schema import SCHEMA, own_fields
@@ -75,7 +75,7 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
 
 def _own(item: Any) -> Mapping[str, Any]:
     """The fields that a file gives; what may be left out and is, is not written."""
-    described: type[Joint] | type[Coupler] | type[Motion] = type(item)
+    described: Any = type(item)  # pyright: ignore[reportUnknownVariableType]
     return {f.name: value for f in own_fields(described) if (value := getattr(item, f.name)) is not None}
 
 
@@ -98,6 +98,5 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)  # a JSON string is a basic string of TOML
     if isinstance(value, tuple | list):
-        items: Sequence[Any] = value  # pyright: ignore[reportUnknownVariableType]
-        return f"[{', '.join(map(_value, items))}]"
+        return f"[{', '.join(map(_value, cast('Sequence[Any]', value)))}]"
     return repr(float(value)) if not isinstance(value, int) else repr(value)

@@ -10,6 +10,7 @@ from kincheck.core.harness.suspension import SuspensionOutput
 from kincheck.core.joints import Coupler, Joint
 from kincheck.core.motions import Motion
 
+from ..case_texts import BASE, INLINE
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_json, changed_toml
 
@@ -41,8 +42,9 @@ def one(data: bytes) -> None:
 
 
 def seeds() -> list[bytes]:
-    """The built-in cases without the files beside them."""
-    return [file.read_bytes() for file in sorted(kincheck.cases.FOLDER.glob("*.toml"))]
+    """The built-in cases without the files beside them, and one with a reference inside."""
+    texts = [file.read_text().partition("[reference]")[0] for file in sorted(kincheck.cases.FOLDER.glob("*.toml"))]
+    return [text.encode() for text in (BASE + INLINE, *texts)]
 
 
 mutate = changing(changed_json, changed_toml, words=WORDS)

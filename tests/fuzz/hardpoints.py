@@ -12,8 +12,8 @@ from .trees import changed_json, changed_lines
 LONGEST = 3000
 DATA = Path(__file__).parent.parent / "data" / "hardpoints"
 ROLES = [name for template in TEMPLATES.values() for role in template.roles for name in (role.name, *role.also)]
-KEYS = """name x y z mm cm inch [HARDPOINT] [UNITS] {hardpoint_name symmetry x_value y_value z_value} left/right single right LENGTH =
-Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up"""
+KEYS = """name x y z mm cm inch [HARDPOINT] [UNITS] {hardpoint_name symmetry x_value y_value z_value} left/right single right LENGTH
+= Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up"""
 WORDS = (*KEYS.split(), *ROLES, *TEMPLATES, *(name for each in TEMPLATES.values() for name in each.also))
 
 
@@ -34,7 +34,11 @@ def one(data: bytes) -> None:
 def seeds() -> list[bytes]:
     """The files of the tests, and their points as tables."""
     adams = (DATA / "adams_front_suspension.sub").read_text()
-    rows = [line.replace("'", "").split() for line in adams.split("z_value}")[1].split("[")[0].splitlines() if line.strip().startswith("'")]
+    rows = [
+        line.replace("'", "").split()
+        for line in adams.split("z_value}")[1].split("[")[0].splitlines()
+        if line.strip().startswith("'")
+    ]
     table = "name,x,y,z\n" + "\n".join(",".join([row[0], *row[-3:]]) for row in rows)
     other = "# units: mm\n# axes: rearward,right,up\n" + table.replace(",", "\t")
     return [*(file.read_bytes() for file in sorted(DATA.glob("*.json"))), *(text.encode() for text in (adams, table, other))]

@@ -35,7 +35,23 @@ PROVED = {
     "seconds": 0.1,
 }
 SUSPENSION = "mcpherson_suspension"
-WORDS = (*"push tip_x tip_x.velocity tip_x.acceleration stroke toe camber # signs: iso8855 sae_j670 time".split(), *PROVED)
+WORDS = (
+    *[
+        "push",
+        "tip_x",
+        "tip_x.velocity",
+        "tip_x.acceleration",
+        "stroke",
+        "toe",
+        "camber",
+        "#",
+        "signs:",
+        "iso8855",
+        "sae_j670",
+        "time",
+    ],
+    *PROVED,
+)
 
 
 def one(data: bytes) -> None:

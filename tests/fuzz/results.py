@@ -21,7 +21,19 @@ from .fuzzing import changing, read_or_refused, written
 from .trees import changed_json
 
 LONGEST = 16000
-SAID = ["closed_form", "consensus_only", "native", "one", "pass", "fail", "error", "timeout", "crashed", "ground", "half_track_change"]
+SAID = [
+    "closed_form",
+    "consensus_only",
+    "native",
+    "one",
+    "pass",
+    "fail",
+    "error",
+    "timeout",
+    "crashed",
+    "ground",
+    "half_track_change",
+]
 WORDS = (*SAID, "time", "wheel", "point_coordinate", "joint_angle", "rad", "m", "1", "rad/m", "dof_account", "program", "signs")
 
 
@@ -37,7 +49,7 @@ def one(data: bytes) -> None:
         for show in (print_table, print_matrix):
             show(found, text := io.StringIO())
             assert "\x1b" not in text.getvalue()
-        with mock.patch("plotly.offline.get_plotlyjs", lambda: ""), mock.patch.object(Path, "read_text", lambda *_: ""):
+        with mock.patch("plotly.offline.get_plotlyjs", return_value=""), mock.patch.object(Path, "read_text", return_value=""):
             render(Material(found, {}, {})).encode()
 
     read_or_refused(read)

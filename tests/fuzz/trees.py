@@ -9,9 +9,66 @@ from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
 
-NUMBERS = (0, 1, -1, 2, 3, 0.5, -0.1, 1e-9, 1e-100, 1e-101, 1e100, 1e101, 1e308, 5e-324, 10**18, 2**64, -(10**400), float("inf"), float("nan"))
-OTHERS = (True, None, "", " ", "a", "\x1b[31m", "\u202e", "=1+1", "<b>", "|", "../x.csv", "/dev/zero", "\ud800", "x" * 300, [], {}, [[]])
-TEXTS = ("", "0", "-1", "1e400", "1e-320", "nan", "inf", "1_0", "0x1", "1 2", "1 0 0", "0 0 0", "1 0 0 0", "true", "\u202e", "'", '"', "a" * 250)
+NUMBERS = (
+    0,
+    1,
+    -1,
+    2,
+    3,
+    0.5,
+    -0.1,
+    1e-9,
+    1e-100,
+    1e-101,
+    1e100,
+    1e101,
+    1e308,
+    5e-324,
+    10**18,
+    2**64,
+    -(10**400),
+    float("inf"),
+    float("nan"),
+)
+OTHERS = (
+    True,
+    None,
+    "",
+    " ",
+    "a",
+    "\x1b[31m",
+    "\u202e",
+    "=1+1",
+    "<b>",
+    "|",
+    "../x.csv",
+    "/dev/zero",
+    "\ud800",
+    "x" * 300,
+    [],
+    {},
+    [[]],
+)
+TEXTS = (
+    "",
+    "0",
+    "-1",
+    "1e400",
+    "1e-320",
+    "nan",
+    "inf",
+    "1_0",
+    "0x1",
+    "1 2",
+    "1 0 0",
+    "0 0 0",
+    "1 0 0 0",
+    "true",
+    "\u202e",
+    "'",
+    '"',
+    "a" * 250,
+)
 
 Step = Callable[[bytes, random.Random], bytes]
 

@@ -10,6 +10,7 @@ from ..reporting.measures import precision_figure
 from ..reporting.views import Plot
 from .engines import Bench, effort
 from .precision import Entry
+from .size import Size
 
 
 @dataclass(frozen=True)
@@ -40,12 +41,12 @@ def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:
     return Diagram(plot, precision_figure(drawn, {style.name: style for style in styles}), styles)
 
 
-def size_diagram(found: Bench) -> Diagram:
+def size_diagram(family: str, sizes: Sequence[Size]) -> Diagram:
     """Time against the number of loops."""
-    timed = [(each.engine, each.loops, each.us_per_sample.median) for each in found.sizes if each.us_per_sample is not None]
-    caption = f"{found.sizes[0].mechanism}; time of one driver value, position, velocity and acceleration."
-    plot = Plot("size", "time per sample against the number of loops, both log axes", caption)
-    return _against(plot, "loops", "time per sample [µs]", timed)
+    timed = [(each.engine, each.loops, each.us_per_sample.median) for each in sizes if each.us_per_sample is not None]
+    caption = f"A {family}; time of one driver value, position, velocity and acceleration."
+    plot = Plot(family.replace(" ", "-"), f"{family}: time per sample against their number, both log axes", caption)
+    return _against(plot, family.rpartition(" ")[2], "time per sample [µs]", timed)
 
 
 def batch_diagram(found: Bench) -> Diagram:

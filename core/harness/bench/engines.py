@@ -17,13 +17,14 @@ from ..circumstances import circumstances
 from ..engine import Engine
 from ..reporting.measures import Effort
 from ..run import NATIVE
-from . import levels
+from . import levels, scaling
 from .batch import Batch, measure_batches
 from .formulation import Formulation
 from .peak import Peak, prepare
 from .precision import Contestant, Entry, FloorOf, Needed, contestants, efforts_of, floors, needed, with_truth
 from .processes import Process, measure_processes
 from .rounds import Spread, Work, take_turns
+from .scaling import Scaling
 from .size import Size, measure_sizes
 
 NAME = "bench"
@@ -31,6 +32,9 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment variables by which linear algebra learns how many threads it may use, once numpy is loaded."""
 PARTS = ("work", "batch", "size", "processes")
 """What may be measured: work against precision, cost against batch size and mechanism size, first use and memory."""
+
+# Sizes of chain and ring as one sparse system. A round of them takes seconds, which few interruptions are long against.
+LARGE, LARGE_ROUNDS = (100, 1000), 3
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True):
@@ -70,6 +74,7 @@ class Bench(msgspec.Struct, frozen=True, kw_only=True):
     rates: list[Rate] = []
     batches: list[Batch] = []
     sizes: list[Size] = []
+    scalings: list[Scaling] = []
     processes: list[Process] = []
     formulation: Formulation | None = None
 
@@ -112,8 +117,11 @@ def measure(
         tell(f"{first.name}: batches of variants")
         add("batches", measure_batches(first, tol, rounds, peak))
     if "size" in parts:
-        tell("chains of loops")
+        tell("chains and rings of loops")
         add("sizes", measure_sizes(projections, tol, rounds))
+        if any(engine.name == NATIVE for engine in engines):
+            tell("large mechanisms")
+            add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
     if "processes" in parts:
         tell(f"{first.name}: processes of their own")
         names = {engine.name for engine in projections}  # variants of a simulator take the memory that it takes

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 
 from ..reporting.wording import number
 from ..run import NATIVE
+from . import cost_report as cost
 from . import levels
-from .diagrams import batch_diagram, entries_of, precision_diagram, size_diagram, stage_diagram
+from .cost_report import TIMED, cells
+from .diagrams import entries_of, precision_diagram
 from .engines import NAME, Bench
 from .formulation import report as formulation_report
-from .fresh import STAGES
 from .pages import Report, Section
 from .precision import REQUIRED, Entry, Needed
-from .rounds import Spread
-from .size import growth
 
 LOOPS_RUN = {
     "python": "in Python, around calls into the simulator",
@@ -22,10 +21,6 @@ LOOPS_RUN = {
     "compiled": "in machine code",
 }
 """Where the loop over samples and iterations runs, in words."""
-TIMED = (
-    "Median and quartiles over the rounds, in µs a sample: warm, contestants taking turns in one process. Errors are the largest "
-    "over samples and outputs. An outcome is by the tolerances of the case, which a coarse effort is expected to miss."
-)
 
 
 def report(found: Bench) -> Report:
@@ -46,15 +41,12 @@ def report(found: Bench) -> Report:
     for case in dict.fromkeys(entry.case for entry in found.levels):
         sections.append(_levels(found, case))
     sections += [_rates(found)] if found.rates else []
-    sections += [_batches(found)] if found.batches else []
-    sections += [_sizes(found)] if found.sizes else []
-    sections += [_processes(found)] if found.processes else []
+    sections += [cost.batches(found)] if found.batches else []
+    sections += [cost.sizes(found, family) for family in dict.fromkeys(each.mechanism for each in found.sizes)]
+    sections += [cost.scalings(found)] if found.scalings else []
+    sections += [cost.processes(found)] if found.processes else []
     sections += formulation_report(found.formulation).sections if found.formulation else []
     return Report(NAME, "Run time against error, measured", facts, sections)
-
-
-def _spread(us: Spread | None) -> tuple[str, str]:
-    return ("–", "–") if us is None else (number(us.median), f"{number(us.lower)} … {number(us.upper)}")
 
 
 def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> Section:
@@ -66,7 +58,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
             str(entry.outcome),
             *(number(getattr(entry.errors, name)) for name in ("position", "velocity", "acceleration")),
             number(entry.iterations),
-            *_spread(entry.us_per_sample),
+            *cells(entry.us_per_sample),
         )
         for entry in entries
     ]
@@ -156,7 +148,7 @@ def _levels(found: Bench, case: str) -> Section:
         us = entry.us_per_sample
         part = None if us is None or whole is None else us.median / whole
         errors = (number(getattr(entry.errors, name)) for name in ("position", "velocity", "acceleration"))
-        rows.append((entry.setting, entry.loop, str(entry.outcome), *errors, *_spread(us), number(part)))
+        rows.append((entry.setting, entry.loop, str(entry.outcome), *errors, *cells(us), number(part)))
     headings = (
         "asked for",
         "loop",
@@ -194,80 +186,3 @@ def _rates(found: Bench) -> Section:
         "and addition are two. The peak is measured in the same rounds.",
     )
     return Section("Arithmetic", [], notes, ("case", "", "µs a sample", "flops a sample", "Gflop/s", "of peak"), 2, rows)
-
-
-def _batches(found: Bench) -> Section:
-    rows = [
-        (
-            str(each.variants),
-            *_spread(each.us_per_sample),
-            number(each.gflops),
-            "–" if each.of_peak is None else f"{100 * each.of_peak:.1f} %",
-            f"{100 * each.solved:.4g} %",
-            str(each.retried),
-            number(each.error),
-        )
-        for each in found.batches
-    ]
-    notes = (
-        "All hardpoints vary by a thousandth of the mechanism's size; one core; time by sample and variant. Error: position of the "
-        "first variant, which is the case itself. Retried: variants solved again alone.",
-    )
-    headings = ("variants", "µs", "quartiles", "Gflop/s", "of peak", "solved", "retried", "error [m]")
-    return Section(f"{found.batches[0].case}: cost against batch size", [], notes, headings, 1, rows, [batch_diagram(found)])
-
-
-def _sizes(found: Bench) -> Section:
-    rows = [
-        (
-            e.engine,
-            e.loop,
-            str(e.loops),
-            str(e.bodies),
-            str(e.outcome or "–"),
-            number(e.error),
-            number(e.residual),
-            *_spread(e.us_per_sample),
-        )
-        for e in found.sizes
-    ]
-    said: list[str] = []
-    for engine in dict.fromkeys(each.engine for each in found.sizes):
-        mine = [each for each in found.sizes if each.engine == engine]
-        if (grown := growth(mine)) is not None:
-            said.append(
-                f"{engine}: from {grown[0]} to {grown[1]} loops the cost grows as their number to the power of {grown[2]:.2f}."
-            )
-        said += [f"{engine}, {each.loops} loops: {each.message}" for each in mine if each.us_per_sample is None]
-    headings = ("engine", "loop", "loops", "bodies", "outcome", "error [m]", "residual", "µs", "quartiles")
-    title = f"Cost against mechanism size: {found.sizes[0].mechanism}"
-    return Section(title, said, (TIMED,), headings, 2, rows, [size_diagram(found)])
-
-
-def _processes(found: Bench) -> Section:
-    rows = [
-        (
-            each.what,
-            *_spread(each.seconds),
-            *(number(each.stages[name].median if each.stages else None) for name in STAGES),
-            number(each.beyond_numpy),
-            str(each.status),
-            number(each.peak_mb),
-        )
-        for each in found.processes
-    ]
-    notes = (
-        "Seconds of fresh processes, files warm; stages are medians, beyond numpy: those after it, to the first solution. Memory: "
-        "the most a process held; runs are of the first case, and in one process with their engine (--jobs 0).",
-    )
-    headings = (
-        "process",
-        "s",
-        "quartiles",
-        *(name.replace(" ", "\n") for name in STAGES),
-        "beyond\nnumpy",
-        "status",
-        "memory\n[MB]",
-    )
-    diagrams = [stage_diagram(found)] if any(each.stages for each in found.processes) else []
-    return Section("First use, whole processes and memory", [], notes, headings, 1, rows, diagrams)

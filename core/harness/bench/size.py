@@ -1,7 +1,8 @@
-"""Cost against the size of a mechanism: a chain of four-bar loops, solved by every engine in projection mode.
+"""Cost against the size of a mechanism: a chain and a ring of loops, solved by every engine in projection mode.
 
-The loops are those of IFToMM's benchmark A02, unit cranks and couplers, with a ball and a cross at each coupler in place of
-revolutes, so that no row is redundant. Every crank turns as the first one does: the truth is a closed form.
+The loops of the chain are those of IFToMM's benchmark A02, unit cranks and couplers, with a ball and a cross at each coupler in
+place of revolutes, so that no row is redundant. In the ring (see `ring`) none can be solved before the others. Every crank turns
+as the first one does: the truth is a closed form.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import importlib.metadata
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import msgspec
@@ -29,9 +30,11 @@ from ..engine import Engine
 from ..record import Outcome
 from ..run import NATIVE
 from .precision import Contestant, contestants
+from .ring import pivot, ring
 from .rounds import Spread, take_turns
 
 LOOPS = (1, 2, 4, 8, 16)
+CRANKS = (4, 8, 16)
 MANY = (16, 100, 1000, 5000)
 """For what solves a chain loop by loop."""
 # Of the cranks at design [rad]; a quarter turn from upright the links are in line and the motion branches.
@@ -39,11 +42,11 @@ LEAN, TURN = 0.3, 0.8
 SAMPLES = 64
 # An engine that has taken longer than this for all samples of one size is not tried with the next [s]: it would fill the rounds.
 LONGEST = 0.1
-CHAIN = "chain of four-bar loops"
+CHAIN, RING = "chain of four-bar loops", "ring of cranks"
 
 
 class Size(msgspec.Struct, frozen=True, kw_only=True):
-    """A mechanism of so many loops, solved by an engine.
+    """A mechanism of so many loops, or cranks, solved by an engine.
 
     Attributes:
         outcome: null where it was not tried, and the message says why.
@@ -77,15 +80,25 @@ def chain(loops: int) -> Case:
         [Point("end", f"crank{loops}", (loops + s, c, 0.0))],
         [JointAngle("turn", "pivot0")],
     )
+    return _turned(mechanism, "end", loops, "IFToMM benchmark A02, N-four-bar mechanism")
+
+
+def circle(cranks: int) -> Case:
+    """The ring; its crank farthest from the driver is looked at."""
+    far = cranks // 2
+    return _turned(ring(cranks), f"tip{far}", pivot(far, cranks), "a ring of parallelograms: all cranks turn alike")
+
+
+def _turned(mechanism: Mechanism, tip: str, at: float, source: str) -> Case:
+    """The driver turns to both sides; the tip is that of a crank at `at` [m]."""
     turn = np.linspace(-TURN, TURN, SAMPLES)
     x, y = np.sin(LEAN - turn), np.cos(LEAN - turn)
     why = "a thousand round-offs of a loop, by the number of loops they add up over"
+    atol = 1e-12 * len(mechanism.moving)
     outputs = tuple(
-        Output(name, "end", direction, False, 1e-12 * loops, 0.0, why)
-        for name, direction in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)))
+        Output(name, tip, direction, False, atol, 0.0, why) for name, direction in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)))
     )
-    reference = {"x": Series(loops + x, -y, -x), "y": Series(y, x, -y)}
-    source = "IFToMM benchmark A02, N-four-bar mechanism"
+    reference = {"x": Series(at + x, -y, -x), "y": Series(y, x, -y)}
     return Case(mechanism.name, source, Truth.CLOSED_FORM, mechanism, Sweep("turn", turn), outputs, reference)
 
 
@@ -125,24 +138,25 @@ class ByComponents:
 
 
 def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Size]:
-    """Solve chains of all lengths with all engines, in turns; where the native one is among them, long ones by components."""
-    ladders: list[tuple[Engine, Sequence[int]]] = [(engine, LOOPS) for engine in engines]
+    """Solve chains and rings of all lengths with all engines, in turns; the native engine long chains, too, by components."""
+    asked: list[tuple[str, Engine, Sequence[int]]] = [(CHAIN, engine, LOOPS) for engine in engines]
     if any(engine.name == NATIVE for engine in engines):
-        ladders.insert(1, (ByComponents(), MANY))
-    found = [each for engine, ladder in ladders for each in _solved(engine, ladder, tol)]
+        asked.insert(1, (CHAIN, ByComponents(), MANY))
+    asked += [(RING, engine, CRANKS) for engine in engines]
+    found = [each for family, engine, ladder in asked for each in _solved(family, engine, ladder, tol)]
     work = {k: each.work for k, (_, each) in enumerate(found) if each is not None and each.work is not None}
     seconds = take_turns(work, rounds)
     times = {k: seconds[k].times(1e6 / SAMPLES) for k in work}
     return [msgspec.structs.replace(size, us_per_sample=times.get(k)) for k, (size, _) in enumerate(found)]
 
 
-def _solved(engine: Engine, ladder: Sequence[int], tol: float) -> Iterator[tuple[Size, Contestant | None]]:
-    """An engine's chains, the shortest first, solved and not yet timed."""
+def _solved(family: str, engine: Engine, ladder: Sequence[int], tol: float) -> Iterator[tuple[Size, Contestant | None]]:
+    """An engine's chains or rings, the shortest first, solved and not yet timed."""
     slow = ""
     for loops in ladder:
-        case = chain(loops)
+        case = chain(loops) if family == CHAIN else circle(loops)
         size = Size(
-            mechanism=CHAIN,
+            mechanism=family,
             loops=loops,
             bodies=len(case.mechanism.moving),
             engine=engine.name,
@@ -158,10 +172,10 @@ def _solved(engine: Engine, ladder: Sequence[int], tol: float) -> Iterator[tuple
         facts: dict[str, Any] = {"outcome": entry.outcome, "message": entry.message, "residual": entry.residual}
         yield msgspec.structs.replace(size, **facts, error=entry.errors.position), each
         if each.work is not None:
-            begin = perf_counter()
+            begin = process_time()  # on a busy machine no other engine drops out than on a quiet one
             each.work()
-            seconds = perf_counter() - begin
-            slow = f"not tried: {loops} loops took {seconds:.2g} s for {SAMPLES} samples" if seconds > LONGEST else ""
+            seconds = process_time() - begin
+            slow = f"not tried: {loops} took {seconds:.2g} s for {SAMPLES} samples" if seconds > LONGEST else ""
 
 
 def growth(sizes: Sequence[Size]) -> tuple[int, int, float] | None:

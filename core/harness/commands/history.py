@@ -92,7 +92,9 @@ def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
 
     table = columns(">run", "started", "status", "outcomes", "engines", "commit", "host", "command")
     for row in rows:
-        found = store.connection.execute("SELECT outcome, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)).fetchall()
+        found = store.connection.execute(
+            "SELECT outcome, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
+        ).fetchall()
         counts = Counter(outcome for outcome, _, _ in found)
         told = ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome])
         missing = len(row.plan) - len(found)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import KincheckError
+from ..visible import cell
 from .store import Store
 
 INTEGERS = ("run", "solved", "samples", "worst_step")
@@ -67,7 +68,7 @@ def _csv(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:
         writer.writerow(columns)
         for rows in chunks:
             for row in rows:
-                values = [*row]
+                values = [cell(each) for each in row]
                 for k in truths:
                     values[k] = None if row[k] is None else ("false", "true")[row[k]]
                 writer.writerow(values)

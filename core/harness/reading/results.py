@@ -11,7 +11,7 @@ import msgspec
 
 from ...mechanism import GROUND
 from ..case import Truth
-from ..record import OutputSeries, Record, Results, Scene, from_json
+from ..record import Outcome, OutputSeries, Record, Results, Scene, from_json
 from .document import fault, join, read_text, shown
 
 LARGEST_FILE = 512_000_000
@@ -91,18 +91,18 @@ def _check_record(file: Path, key: str, record: Record, samples: dict[str, int])
         for name, values in record.driver.items():
             _check_numbers(file, join(f"{key}.driver", name), values, count)
     count = samples.get(record.case, 0)
-    expected = "expected driver values beside outputs"
-    _check(file, f"{key}.driver", bool(record.driver) or not (record.outputs or record.outcome == "fail"), f"found none, {expected}")
+    moved = record.driver or not (record.outputs or record.outcome is Outcome.FAIL)
+    _check(file, f"{key}.driver", bool(moved), "found none, expected values beside outputs")
     for name, series in record.outputs.items():
         _check_series(file, join(f"{key}.outputs", name), series, count)
     for name, deviations in record.errors.items():
-        where = join(f"{key}.errors", name)
         for quantity, found in deviations.items():
+            place = f"{join(f'{key}.errors', name)}.{quantity}"
             given = record.outputs.get(name)
             known = given is not None and getattr(given, quantity) is not None
-            _check(file, f"{where}.{quantity}", known, f"found a deviation of what is not there, expected {quantity} of {shown(name)}")
-            _check(file, f"{where}.{quantity}.worst_step", 0 <= found.worst_step < count, f"found no sample, expected one of {count}")
-            _check_sizes(file, f"{where}.{quantity}", (found.max_abs, found.rms, found.tolerance))
+            _check(file, place, known, f"found a deviation of what is not there, expected {quantity} in outputs")
+            _check(file, f"{place}.worst_step", 0 <= found.worst_step < count, f"found no sample, expected one of {count}")
+            _check_sizes(file, place, (found.max_abs, found.rms, found.tolerance))
     numbers = [record.residual_max, record.us_per_step]
     numbers += [] if record.seconds is None else [*msgspec.structs.astuple(record.seconds)]
     _check_sizes(file, key, numbers)

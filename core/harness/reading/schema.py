@@ -47,6 +47,7 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
                          (brake_share), (drive_share): parts of the vehicle's force at this axle, 0 to 1
                          (per_travel) = true: derivatives by travel, the upward way of the wheel centre
     [reference]          true values: file, the name of a CSV file beside the case file, or rows, with (columns)
+                         beside is in its folder or below, links followed: a case file from elsewhere has nothing else opened
                          first column: what is swept, on its grid; others: OUTPUT, OUTPUT.velocity, OUTPUT.acceleration
                          a CSV file of suspension outputs names their convention in a comment: # signs: iso8855
 """

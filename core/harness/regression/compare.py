@@ -64,8 +64,8 @@ def _commit(facts: Mapping[str, Any]) -> str | None:
 
 
 def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
-    """Whether times can be compared as they are."""
-    return all(now.get(name) == before.get(name) for name in ("host", "processor"))
+    """Whether times can be compared by the clock too: on equal processors. Hosted runners have another name every night."""
+    return now.get("processor") == before.get("processor")
 
 
 def _outcomes(now: Record, before: Record) -> Iterator[Finding]:

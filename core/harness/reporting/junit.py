@@ -24,6 +24,9 @@ def to_junit(results: Results) -> bytes:
         for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
             suite.set(count, str(sum(1 for _ in suite.iter(tag))))
     ElementTree.indent(root)
+    for element in root.iter():
+        for key, text in element.attrib.items():
+            element.set(key, FORBIDDEN.sub("\ufffd", text))
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
 
 
@@ -38,7 +41,7 @@ def _test(suite: ElementTree.Element, record: Record, output: str, deviations: D
     )
     verdict, message = _verdict(record, output, deviations)
     if verdict:
-        ElementTree.SubElement(test, verdict, message=FORBIDDEN.sub("\ufffd", message))
+        ElementTree.SubElement(test, verdict, message=message)
 
 
 def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:

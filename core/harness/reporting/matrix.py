@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable
 from typing import TextIO
 
 from rich.console import Console
@@ -10,20 +11,23 @@ from rich.table import Table
 from rich.text import Text
 
 from ..record import Outcome, Record, Results
+from ..visible import visible
 from .table import COLOURS, LOG_WIDTH, QUANTITIES, messages, print_messages, signs, worst
+
+NOT_ASKED = "–"
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
     """Print a row per case and a column per engine, then every message, then a count of outcomes."""
     console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
-    table = Table(box=None, pad_edge=False, header_style="bold", caption=Text(_reading(results)), caption_justify="left")
+    table = Table(box=None, pad_edge=False, header_style="bold", caption=Text(visible(_reading(results))), caption_justify="left")
     table.add_column("case", overflow="fold")
     engines, rows = _laid_out(results)
     for engine in engines:
-        table.add_column(engine, no_wrap=True)
+        table.add_column(Text(visible(engine)), no_wrap=True)
     for case, records in rows.items():
-        cells = (Text(cell(records[engine]), COLOURS.get(records[engine].outcome, "bold red")) for engine in engines)
-        table.add_row(Text(case), *cells)
+        cells = (_cell(records[engine]) if engine in records else Text(NOT_ASKED) for engine in engines)
+        table.add_row(Text(visible(case)), *cells)
     console.print(table)
     print_messages(results, console)
 
@@ -33,12 +37,14 @@ def to_markdown(results: Results) -> str:
     engines, rows = _laid_out(results)
     versions = {record.engine: record.version for record in results.records if record.version}
     head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
-    lines = [_row(head), _row(["---"] * len(head))]
-    lines += [_row([f"`{case}`", *(cell(records[engine]) for engine in engines)]) for case, records in rows.items()]
-    lines += ["", f"{_reading(results)}."]
-    lines += [f"Signs of {', '.join(cases)}: {words}." for words, cases in signs(results).items()]
+    lines = [_row(map(_escaped, head)), _row(["---"] * len(head))]
+    for case, records in rows.items():
+        cells = (_escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
+        lines.append(_row([_as_code(case), *cells]))
+    lines += ["", f"{_escaped(_reading(results))}."]
+    lines += [_escaped(f"Signs of {', '.join(cases)}: {words}.") for words, cases in signs(results).items()]
     lines += [
-        f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}."
+        _escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()
         if outcome is not Outcome.PASS
     ]
@@ -73,5 +79,23 @@ def _reading(results: Results) -> str:
     return f"Largest errors against {', '.join(standards).replace('_', ' ') or 'nothing'}: {units}"
 
 
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(each.replace('|', '/') for each in cells)} |"
+def _row(cells: Iterable[str]) -> str:
+    """A row of cells, bars in which do not divide them."""
+    whole = " | ".join(each.replace("|", "\\|") for each in cells)
+    return f"| {whole} |"
+
+
+def _cell(record: Record) -> Text:
+    return Text(visible(cell(record)), COLOURS.get(record.outcome, "bold red"))
+
+
+def _escaped(text: str) -> str:
+    """Text that Markdown shows as it is, on one line: no mark-up, no links, no HTML, nobody notified."""
+    text = re.sub(r"([\\`*<>~]|(?<=\])\()", r"\\\1", visible(" ".join(text.split())))
+    return re.sub(r"(?<!\w)@(?=\w)", "@\N{WORD JOINER}", text)
+
+
+def _as_code(name: str) -> str:
+    """A name as code, in which nothing can be escaped."""
+    shown = visible(name).replace("`", "'")
+    return f"`{shown}`"

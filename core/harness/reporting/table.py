@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..record import Deviation, Outcome, Record, Results
+from ..visible import visible
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
@@ -35,7 +36,9 @@ def print_table(results: Results, file: TextIO) -> None:
         errors = [_error(record, quantity) for quantity in QUANTITIES]
         time = "–" if record.us_per_step is None else f"{record.us_per_step:.3g}"
         engine = f"{record.engine} · {record.mode}" if several else record.engine
-        table.add_row(Text(record.case), engine, outcome, *errors, truth(record), time)
+        # texts, not strings: those would be taken for mark-up, in which [red] is a colour
+        case, engine, judge = (Text(visible(each)) for each in (record.case, engine, truth(record)))
+        table.add_row(case, engine, outcome, *errors, judge, time)
     console.print(table)
     print_messages(results, console)
 
@@ -43,9 +46,9 @@ def print_table(results: Results, file: TextIO) -> None:
 def print_messages(results: Results, console: Console) -> None:
     """Print the signs of outputs that have a convention, every message, and a count of outcomes."""
     for words, cases in signs(results).items():
-        console.print(Text(f"signs of {', '.join(cases)}: {words}"), soft_wrap=True)
+        console.print(Text(visible(f"signs of {', '.join(cases)}: {words}")), soft_wrap=True)
     for (engine, outcome, message), cases in messages(results).items():
-        console.print(Text(f"{outcome}: {', '.join(cases)} · {engine}: {message}"), soft_wrap=True)
+        console.print(Text(visible(f"{outcome}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
     console.print(", ".join(f"{count} {outcome}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
 
@@ -60,7 +63,7 @@ def _error(record: Record, quantity: str) -> Text:
     if found is None:
         return Text("–")
     error, unit = found
-    return Text(f"{error.max_abs:.1e} {unit}".rstrip(), style="" if error.within else "bold red")
+    return Text(visible(f"{error.max_abs:.1e} {unit}".rstrip()), style="" if error.within else "bold red")
 
 
 def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:

@@ -146,6 +146,10 @@ class Writer:
         """Zero for whatever does not move."""
         return 0 if self.mechanism.is_fixed(body) else self.names.index(body) + 1
 
+    def ends(self, joint: Joint) -> tuple[int, int]:
+        """The bodies of a joint."""
+        return self.index(joint.i), self.index(joint.j)
+
     def place(self, position: Sequence[float]) -> Real:
         return (extended(position) - self.origin) / extended(self.unit)
 
@@ -178,7 +182,7 @@ class Writer:
 
     def coordinate(self, row: int, joint: Joint, freedom: str, weight: float) -> None:
         """A coordinate of an axial joint: that of its second body relative to its first."""
-        i, j = map(self.index, joint.bodies)
+        i, j = self.ends(joint)
         found: Any = joint
         f, g, h = triad(found.axis)
         if freedom == "rotation":

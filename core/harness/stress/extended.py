@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ...errors import KincheckError
 
-Real: TypeAlias = NDArray[np.longdouble]
-"""64 bits of mantissa on x86: a two-thousandth of the round-off of what is judged by it."""
+Real: TypeAlias = NDArray[Any]
+"""Of longdoubles, which numpy's types lose wherever a plain number is near. On x86 they have 64 bits of mantissa: a two-thousandth
+of the round-off of what is judged by them."""
 
 
 def extended(values: Any) -> Real:
@@ -40,5 +41,6 @@ def unit(a: Real) -> Real:
 def triad(axis: Sequence[float]) -> tuple[Real, Real, Real]:
     """f, g, h: orthonormal and right-handed, h along the axis."""
     h = unit(extended(axis))
-    f = unit(np.cross(h, GROUND_AXES[int(np.abs(h).argmin())]))
+    across: Real = np.cross(h, GROUND_AXES[int(np.abs(h).argmin())])
+    f = unit(across)
     return f, np.cross(h, f), h

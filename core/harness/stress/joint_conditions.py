@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def _meet(w: Writer, joint: Any) -> None:
     """The point of both bodies stays one."""
-    i, j = map(w.index, joint.bodies)
+    i, j = w.ends(joint)
     # a fixed joint may do without one: any serves
     point = joint.point if joint.point is not None else w.origin
     for axis in GROUND_AXES:
@@ -29,37 +29,38 @@ def _parallel(w: Writer, joint: Any) -> None:
     """The axis keeps its direction in both bodies."""
     f, g, h = triad(joint.axis)
     for a in (f, g):
-        w.dot(w.row(joint.name), *map(w.index, joint.bodies), a, h)
+        w.dot(w.row(joint.name), *w.ends(joint), a, h)
 
 
 def _alike(w: Writer, joint: Any) -> None:
     """Both bodies turn alike."""
     f, g, h = triad(getattr(joint, "axis", (0.0, 0.0, 1.0)))
     for a, b in ((g, h), (h, f), (f, g)):
-        w.dot(w.row(joint.name), *map(w.index, joint.bodies), a, b)
+        w.dot(w.row(joint.name), *w.ends(joint), a, b)
 
 
 def _line(w: Writer, joint: Any) -> None:
     """The point of j stays on the line of i."""
     for a in triad(joint.axis)[:2]:
-        w.slide(w.row(joint.name), *map(w.index, joint.bodies), a, joint.point, joint.point)
+        w.slide(w.row(joint.name), *w.ends(joint), a, joint.point, joint.point)
 
 
 def _plane(w: Writer, joint: Any) -> None:
     """The point of j stays in the plane of i, or as far from it as it was."""
-    points = getattr(joint, "points", None) or (joint.point, joint.point)
-    w.slide(w.row(joint.name), *map(w.index, joint.bodies), triad(joint.axis)[2], *points, held=True)
+    first, second = getattr(joint, "points", None) or (joint.point, joint.point)
+    w.slide(w.row(joint.name), *w.ends(joint), triad(joint.axis)[2], first, second, held=True)
 
 
 def _angle(w: Writer, joint: Any) -> None:
     """The axes keep their angle."""
     a, b = (unit(extended(axis)) for axis in joint.axes)
-    w.dot(w.row(joint.name), *map(w.index, joint.bodies), a, b, held=True)
+    w.dot(w.row(joint.name), *w.ends(joint), a, b, held=True)
 
 
 def _length(w: Writer, joint: Any) -> None:
     """The points keep their distance."""
-    w.rod(w.row(joint.name), *map(w.index, joint.bodies), *joint.points, getattr(joint, "length", None))
+    first, second = joint.points
+    w.rod(w.row(joint.name), *w.ends(joint), first, second, getattr(joint, "length", None))
 
 
 def _twistless(w: Writer, joint: Any) -> None:
@@ -72,7 +73,7 @@ def _twistless(w: Writer, joint: Any) -> None:
         return a + np.cross(n, a) + np.cross(n, np.cross(n, a)) / (1.0 + h @ k)
 
     row = w.row(joint.name)
-    i, j = map(w.index, joint.bodies)
+    i, j = w.ends(joint)
     w.dot(row, i, j, f, carried(g))
     w.dot(row, i, j, g, carried(f), -1.0)
 

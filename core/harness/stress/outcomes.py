@@ -100,11 +100,11 @@ def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer |
                 continue
             compared[k] = True
             # what is missing of a solved sample is infinitely wrong
-            error = np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf).max(axis=1).astype(np.float64)
-            bound = np.maximum(truth.bounds[name][k], np.finfo(np.float64).tiny)
-            ratios[k] = np.maximum(ratios[k], np.where(known, error / bound, 0.0))
+            off = np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf)[known].max(axis=1).astype(np.float64)
+            bound = np.maximum(truth.bounds[name][k, known], np.finfo(np.float64).tiny)
+            ratios[k, known] = np.maximum(ratios[k, known], off / bound)
             if k == 0:
-                errors = np.maximum(errors, np.where(known, error, 0.0))
+                errors[known] = np.maximum(errors[known], off)
     wrong = (ratios > 1.0).any(axis=0)
     told = max([result.residual, *(float(result.details.get(name) or 0.0) for name in ("redundant_residual",))])
     if specimen.reported and truth.violated is not None:

@@ -148,6 +148,7 @@ def rounded(case: Case, digits: int) -> Case | None:
         require_driven(found)
     except (KincheckError, ValueError):
         return None
-    sweep = replace(case.sweep, values=np.linspace(*map(short, case.sweep.values[[0, -1]].tolist()), len(case.sweep.values)))
+    first, last = (float(short(case.sweep.values[k])) for k in (0, -1))
+    sweep = replace(case.sweep, values=np.linspace(first, last, len(case.sweep.values)))
     outputs = tuple(each for each in case.outputs if isinstance(each, Output))
     return replace(case, mechanism=found, sweep=sweep, outputs=outputs)

@@ -27,6 +27,7 @@ from .truth import Reach, Truth
 
 # However few samples a family gets, they are of so many specimens, and not fewer than three each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
+COARSEST = 5
 # A proof takes some ms, making its equations a hundred times as long: of small mechanisms, and every other one.
 LARGEST_PROVED = 6
 
@@ -114,17 +115,22 @@ def stress(
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Made]:
-    """As many specimens as make up a share of samples; the first are the same whatever the share, but for their samples."""
-    each = min(family.samples, max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share)
+    """As many specimens as make up a share of samples."""
+    most = max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share
     found: list[Made] = []
     while (done := sum(one.samples for one in found)) < share:
-        found.append(specimen(family, seed, len(found), min(each, max(FEWEST_SAMPLES, share - done))))
+        found.append(specimen(family, seed, len(found), min(most, max(FEWEST_SAMPLES, share - done))))
     return found
 
 
-def specimen(family: Family, seed: int, number: int, samples: int) -> Made:
-    """That specimen of a family."""
-    one = family.specimen(np.random.default_rng([seed, zlib.crc32(family.name.encode()), number]), samples)
+def specimen(family: Family, seed: int, number: int, most: int) -> Made:
+    """That specimen of a family; its mechanism is the same whatever else is run, and so are its samples unless that is too many."""
+    rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
+    # a coarse sweep leaves most to the solver, a fine one has more to judge
+    fineness = float(rng.random()) ** 0.5
+    wanted = int(COARSEST * (family.samples / COARSEST) ** fineness) if family.several else most
+    samples = min(wanted, most)
+    one = family.specimen(rng, samples)
     try:
         case = one.describe()
     except KincheckError as error:

@@ -59,7 +59,7 @@ class Interpreted:
 
 
 def suited(engine: Engine, case: Case, number: int) -> Engine:
-    """The native engine as it is for every other mechanism that is small enough, interpreted for the rest; simulators as they are."""
+    """The native engine compiled for every other mechanism that is small enough, else interpreted; simulators as they are."""
     if engine.name != NATIVE or len(case.sweep.values) >= FEWEST_COMPILED_FOR:
         return engine
     return engine if number % 2 == 0 and len(case.mechanism.moving) <= LARGEST_COMPILED else Interpreted(engine)

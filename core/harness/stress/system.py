@@ -3,9 +3,9 @@
 The way is followed here, by nobody else's predictor. A step dx from one knot to the next is taken where J0^-1 J1 - I is less than a
 half in the norm of row sums: the simplified iteration from the knot then contracts all along the step, so that its solution is the
 one that continues the motion (Newton-Kantorovich). Near a singular pose that asks for steps as small as the smallest singular
-value; there it is enough that (J0^-1 J1 - I) dx is less than a half of dx, seen from both ends, and that det(J0^-1 J1) is positive: on
-the other side of a gap between two solutions it is negative. Samples between two knots are interpolated, polished, and held to the
-same from the nearer knot.
+value; there it is enough that (J0^-1 J1 - I) dx is less than a half of dx, seen from both ends, and that det(J0^-1 J1) is
+positive: on the other side of a gap between two solutions it is negative. Samples between two knots are interpolated, polished,
+and held to the same from the nearer knot.
 """
 
 from __future__ import annotations

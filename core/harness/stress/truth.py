@@ -31,9 +31,11 @@ from .system import LANES, POLISHED, Solved, System
 
 ROUND_OFF = 1e-14
 AT_A_FOLD = ROUND_OFF**0.5
-# Residuals are accepted up to the tolerance of a run, 1e-12; where two solutions are nearer than its root they cannot be told apart
-# by it, so that to stop there is right.
-SINGULAR = 1e6
+# A residual of the tolerance of a run, 1e-12, leaves rates uncertain by the square of the condition times that. From here on it is
+# more than 1e-9 of them, to which outputs are held by default: an engine may give up, if it says why.
+SINGULAR = (1e-9 / 1e-12) ** 0.5
+# Here it is the rounding of the mechanism itself, 1e-16, that leaves digits to the closed form that Newton's iteration has not.
+UNPOLISHED = 1e6
 
 
 class Reach(IntEnum):
@@ -132,7 +134,7 @@ def closed(case: Case, motion: Motion) -> Truth:
         solved = system.solved(poses, system.sampled(chunk), system.path.times[chunk], system.rows.angles(poses))
         moved = np.abs(solved.poses.u - poses.u).max(axis=(0, 1)).astype(np.float64)
         # the closed form is that of the mechanism without its rounding, which is one of 1e-16 of the rows
-        bad = (moved > ROUND_OFF * solved.condition) & (solved.condition < SINGULAR)
+        bad = (moved > ROUND_OFF * solved.condition) & (solved.condition < UNPOLISHED)
         if bad.any():
             k = int(np.flatnonzero(bad)[0])
             raise DefectError(
@@ -142,7 +144,7 @@ def closed(case: Case, motion: Motion) -> Truth:
         found.reach[chunk] = Reach.REACHED
         found.singular[chunk] = solved.condition >= SINGULAR
         # in a singular pose Newton's iteration cannot polish, and need not
-        found.add(chunk, _replaced(solved, poses, solved.condition >= SINGULAR), keep=False)
+        found.add(chunk, _replaced(solved, poses, solved.condition >= UNPOLISHED), keep=False)
     outward = np.argsort(np.abs(system.path.times), kind="stable")
     for side in (outward[system.path.times[outward] >= 0.0], outward[system.path.times[outward] < 0.0]):
         # a formula may have values again behind a gap, but no motion leads there

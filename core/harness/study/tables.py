@@ -19,6 +19,7 @@ from rich.text import Text
 from ...errors import KincheckError
 from ..reporting.table import LOG_WIDTH
 from ..reporting.wording import number
+from ..visible import cell
 from .page import effect, headline
 from .results import SweepResults
 from .study import Chunk, Study
@@ -103,7 +104,7 @@ def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(rows)
+    writer.writerows([cell(each) for each in row] for row in rows)
     return text.getvalue()
 
 

@@ -96,11 +96,11 @@ class Tree:
         name = element.attributes.get("name", f"body{len(self.places)}")
         if name in self.places:
             raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the bodies")
-        if len(self.places) > MOST_BODIES:
-            raise element.fault(f"found more than {MOST_BODIES} bodies, expected fewer; take out what does not move")
         place = around.then(read_place(element, self.compiler))
         childclass = _class(element, childclass)
         elements = list(element.only("joint", "freejoint"))
+        if max(len(self.places), len(self.moving) + len(elements)) > MOST_BODIES:
+            raise element.fault(f"found more than {MOST_BODIES} bodies or joints, expected fewer; take out what does not move")
         if not elements:
             carrier = outer
             if element.attributes.get("mocap") == "true":
@@ -120,8 +120,6 @@ class Tree:
             if name in self.joints or (kind == "free" and name in self.free):
                 raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the joints")
             inner = body if last else f"{body}.{name}"
-            if len(self.moving) > MOST_BODIES:
-                raise element.fault(f"is one of more than {MOST_BODIES} joints, expected fewer; take out what does not move")
             self.moving[inner] = place
             if not last:
                 self.massless.add(inner)

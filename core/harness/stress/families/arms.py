@@ -16,7 +16,7 @@ from ..evaluation import Poses
 from ..extended import PI, Real, extended, unit
 from ..truth import Motion as Closed
 from ..truth import closed
-from .base import Family, Rng, Specimen, as_case, direction, triple
+from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
 
 KINDS: Sequence[type[Joint]] = (Revolute, Revolute, Translational, Cylindrical, Screw, Fixed)
 LARGEST = 30
@@ -31,9 +31,9 @@ class Arms(Family):
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """A tree whose joints are a third of a metre apart, or a chain."""
-        count = int(np.exp(rng.uniform(np.log(3), np.log(LARGEST + 1))))
+        count = bodies(rng, LARGEST)
         chain = rng.random() < 0.3
-        bodies, joints, drivers = list[Body](), list[Joint](), list[Driver]()
+        parts, joints, drivers = list[Body](), list[Joint](), list[Driver]()
         motions = dict[str, Motion]()
         ends: dict[str, Any] = {GROUND: np.zeros(3)}
         for k in range(count):
@@ -41,7 +41,7 @@ class Arms(Family):
             name, place = f"b{k + 1}", ends[parent] + rng.uniform(0.1, 0.3) * direction(rng)
             kind = KINDS[0] if not drivers else KINDS[int(rng.integers(len(KINDS)))]
             joint = _joint(kind, rng, f"j{k + 1}", parent, name, triple(place))
-            bodies.append(Body(name))
+            parts.append(Body(name))
             joints.append(joint)
             ends[name] = place
             for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:  # a thread's turn says its shift
@@ -59,7 +59,7 @@ class Arms(Family):
         ends.pop(GROUND)
         last = list(ends)[-3:]
         points = [Point(f"tip_{name}", name, triple(ends[name] + 0.1 * direction(rng))) for name in last]
-        mechanism = Mechanism("arm", bodies, joints, points, drivers)
+        mechanism = Mechanism("arm", parts, joints, points, drivers)
         return Specimen(
             f"arm of {count} bodies and {len(drivers)} drivers",
             partial(as_case, mechanism, swept, np.linspace(-2.0, 2.0, samples), motions=motions),

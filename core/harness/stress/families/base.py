@@ -52,7 +52,7 @@ class Family(ABC):
 
     Attributes:
         about: what is nasty, and its sizes, in a sentence.
-        samples: the most that one specimen has; a mechanism costs more to prepare than a sample to solve.
+        samples: the most that one specimen has, and so how fine its sweep can be; coarse ones are drawn as often.
         several: whether samples are shared out among several specimens rather than given to one.
     """
 
@@ -106,3 +106,8 @@ def direction(rng: Rng) -> Array:
 def power(rng: Rng, low: float, high: float) -> float:
     """A number between 10^low and 10^high, all sizes alike."""
     return float(10.0 ** rng.uniform(low, high))
+
+
+def bodies(rng: Rng, most: int) -> int:
+    """How many bodies, 3 to the most: the cost grows with the square, so that half of them have five or fewer."""
+    return int(3.0 * ((most + 1) / 3.0) ** (rng.random() ** 2))

@@ -21,7 +21,7 @@ from ....motions import Motion, Sine
 from ....trajectory import Array
 from ..conditions import conditions
 from ..evaluation import Evaluator, Poses
-from .base import Family, Rng, Specimen, as_case, direction, triple
+from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
 
 LARGEST = 30
 # Types that carry a body, and those that close: what leaves five freedoms carries nothing.
@@ -39,12 +39,12 @@ class Loops(Family):
 
     name = "loops"
     about = f"random closed loops of 3 to {LARGEST} bodies, all joint types, gears and racks, 1 or 2 drivers"
-    samples = 101
+    samples = 81
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Far enough that every second one comes to a dead centre."""
         while True:
-            count = int(np.exp(rng.uniform(np.log(3), np.log(LARGEST + 1))))
+            count = bodies(rng, LARGEST)
             found = _Builder(rng, count).built()
             if found is not None:
                 break

@@ -78,14 +78,14 @@ def heading(a: Real) -> Real:
     return np.arctan2(a[1], a[0])
 
 
-def meet(P: Real, p: Real, Q: Real, q: Real, side: float) -> Real:
-    """Where circles of squared radii p about P and q about Q meet, on the side of the line from P to Q; NaN where they do not."""
-    d = Q - P
+def meet(first: Real, p: Real, second: Real, q: Real, side: float) -> Real:
+    """Where circles of squared radii p and q about two points meet, on that side of the line between; NaN where they do not."""
+    d = second - first
     e = (d * d).sum(axis=0)
     along = (p - q + e) / (2.0 * e)
     with np.errstate(invalid="ignore"):
         across = side * np.sqrt(p / e - along * along)
-    return P + along * d + across * np.stack([-d[1], d[0]])
+    return first + along * d + across * np.stack([-d[1], d[0]])
 
 
 JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
@@ -95,99 +95,119 @@ JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
 def coupled(way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan, Plan]) -> tuple[list[Body], list[Joint]]:
     """The coupler, or the rod in its place, between two bodies at their points: bodies and joints of it."""
     first, second, coupler = names
-    P, Q = map(plane.point, at)
+    start, end = map(plane.point, at)
     n = plane.normal
     along = plane.along((at[1][0] - at[0][0], at[1][1] - at[0][1]))
     across = triple(np.cross(n, along))
     if way == "rod":
-        return [], [Distance("rod", first, second, (P, Q))]
+        return [], [Distance("rod", first, second, (start, end))]
     joints: Mapping[str, Sequence[Joint]] = {
-        "revolutes": (Revolute("pin_1", first, coupler, P, n), Revolute("pin_2", coupler, second, Q, n)),
-        "balls": (Universal("pin_1", first, coupler, P, (n, across)), Spherical("pin_2", coupler, second, Q)),
-        "cylinders": (Cylindrical("pin_1", first, coupler, P, n), Spherical("pin_2", coupler, second, Q)),
+        "revolutes": (Revolute("pin_1", first, coupler, start, n), Revolute("pin_2", coupler, second, end, n)),
+        "balls": (Universal("pin_1", first, coupler, start, (n, across)), Spherical("pin_2", coupler, second, end)),
+        "cylinders": (Cylindrical("pin_1", first, coupler, start, n), Spherical("pin_2", coupler, second, end)),
     }
     return [Body(coupler)], list(joints[way])
 
 
-def four_bar(plane: Plane, B: Plan, D: Plan, C: Plan, way: str = "revolutes", turn: str = "turn") -> Mechanism:
+def four_bar(plane: Plane, b: Plan, d: Plan, c: Plan, way: str = "revolutes", turn: str = "turn") -> Mechanism:
     """A crank from the origin of the plane to B, a coupler to C, a rocker to D; the crank is driven."""
-    bodies, joints = coupled(way, plane, ("crank", "rocker", "coupler"), (B, C))
-    A = plane.point((0.0, 0.0))
+    bodies, joints = coupled(way, plane, ("crank", "rocker", "coupler"), (b, c))
     return Mechanism(
         "four_bar",
         [Body("crank"), Body("rocker"), *bodies],
-        [Revolute("pivot", "ground", "crank", A, plane.normal), Revolute("rest", "ground", "rocker", plane.point(D), plane.normal)]
+        [
+            Revolute("pivot", "ground", "crank", plane.point((0.0, 0.0)), plane.normal),
+            Revolute("rest", "ground", "rocker", plane.point(d), plane.normal),
+        ]
         + joints,
-        [Point("B", "crank", plane.point(B)), Point("C", "rocker", plane.point(C))],
+        [Point("B", "crank", plane.point(b)), Point("C", "rocker", plane.point(c))],
         [JointAngle(turn, "pivot")],
     )
 
 
-def four_bar_motion(plane: Plane, B: Plan, D: Plan, C: Plan, parallel: bool = False) -> Motion:
-    """Its closed form, on the side of the design all along; or of the parallelogram, that goes through its change points."""
-    b, c, d = (extended(each)[:, None] for each in (B, C, D))
-    p, q = ((c - b) ** 2).sum(axis=0), ((c - d) ** 2).sum(axis=0)
-    side = float(np.sign((d - b)[0, 0] * (c - b)[1, 0] - (d - b)[1, 0] * (c - b)[0, 0]))
+def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = False) -> Motion:
+    """Its closed form, on the side of the design up to where the crank must turn back; or of the parallelogram, which goes on."""
+    B, C, D = (extended(each)[:, None] for each in (b, c, d))
+    p, q = ((C - B) ** 2).sum(axis=0), ((C - D) ** 2).sum(axis=0)
+    side = float(np.sign((D - B)[0, 0] * (C - B)[1, 0] - (D - B)[1, 0] * (C - B)[0, 0]))
+    first, last = (-np.inf, np.inf) if parallel else turning_range(B, D, p, q)
+    pivot, pin, rest = (extended(plane.point(each)) for each in ((0.0, 0.0), b, d))
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
-        turn = drives[0]
-        now_b = spin(turn, B)
-        now_c = now_b + (c - b) if parallel else meet(now_b, p, d + 0.0 * now_b, q, side)
-        a, at_b, at_d = (extended(plane.point(x)) for x in ((0.0, 0.0), B, D))
-        still = np.repeat(a[:, None], len(turn), axis=1)
-        rest = np.repeat(at_d[:, None], len(turn), axis=1)
-        rocked = heading(now_c - d) - heading(c - d)
-        carried = heading(now_c - now_b) - heading(c - b)
+        turn = np.where((first < drives[0]) & (drives[0] < last), drives[0], np.nan)
+        now_b = spin(turn, b)
+        now_c = now_b + (C - B) if parallel else meet(now_b, p, D + 0.0 * now_b, q, side)
+        still = np.zeros_like(now_b[:1])
         return {
-            "crank": (plane.turned(turn), a, still),
-            "rocker": (plane.turned(rocked), at_d, rest),
-            "coupler": (plane.turned(carried), at_b, plane.place(now_b)),
+            "crank": (plane.turned(turn), pivot, pivot[:, None] + still),
+            "rocker": (plane.turned(heading(now_c - D) - heading(C - D)), rest, rest[:, None] + still),
+            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.place(now_b)),
         }
 
     return motion
 
 
-def slider_crank(plane: Plane, B: Plan, C: Plan, way: str, drive: str, guide: Plan = (1.0, 0.0)) -> Mechanism:
+def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
+    """How far a crank at b may turn either way from there, coupler and rocker having squared lengths p and q; the pivot is at d.
+
+    The coupler and the rocker are stretched out or folded where the law of cosines gives the crank's angle from the ground a cosine
+    within -1 and 1; without such an angle the crank passes there.
+    """
+    r2, g2 = (b * b).sum(axis=0)[0], (d * d).sum(axis=0)[0]
+    folded, stretched = ((np.sqrt(p[0]) + sign * np.sqrt(q[0])) ** 2 for sign in (-1.0, 1.0))
+    nearest, farthest = ((r2 + g2 - e) / (2.0 * np.sqrt(r2 * g2)) for e in (folded, stretched))
+    at = heading(b)[0] - heading(d)[0]
+    at = np.arctan2(np.sin(at), np.cos(at))
+    low, high = (float(np.arccos(x)) if -1.0 < x < 1.0 else None for x in (nearest, farthest))
+    # all angles at which it must stop, on the circle and once around it
+    stops = [k * 2.0 * np.pi + sign * stop for stop in (low, high) if stop is not None for sign in (-1.0, 1.0) for k in (-1, 0, 1)]
+    ahead, behind = [stop - at for stop in stops if stop > at], [stop - at for stop in stops if stop < at]
+    return float(max(behind, default=-np.inf)), float(min(ahead, default=np.inf))
+
+
+def slider_crank(plane: Plane, b: Plan, c: Plan, way: str, drive: str, guide: Plan = (1.0, 0.0)) -> Mechanism:
     """A crank from the origin of the plane to B, a coupler to C on a slider along the guide; "turn" or "slide" is driven."""
-    bodies, joints = coupled(way, plane, ("crank", "slider", "coupler"), (B, C))
+    bodies, joints = coupled(way, plane, ("crank", "slider", "coupler"), (b, c))
     driver = JointAngle("turn", "pivot") if drive == "turn" else JointDisplacement("slide", "guide")
     return Mechanism(
         "slider_crank",
-        [Body("crank"), Body("slider", plane.point(C)), *bodies],
+        [Body("crank"), Body("slider", plane.point(c)), *bodies],
         [
             Revolute("pivot", "ground", "crank", plane.point((0.0, 0.0)), plane.normal),
-            Translational("guide", "ground", "slider", plane.point(C), plane.along(guide)),
+            Translational("guide", "ground", "slider", plane.point(c), plane.along(guide)),
             *joints,
         ],
-        [Point("B", "crank", plane.point(B)), Point("C", "slider", plane.point(C))],
+        [Point("B", "crank", plane.point(b)), Point("C", "slider", plane.point(c))],
         [driver],
     )
 
 
-def slider_crank_motion(plane: Plane, B: Plan, C: Plan, drive: str, guide: Plan = (1.0, 0.0)) -> Motion:
-    """Its closed form, the guide of length one: the crank by the slider's circle and the coupler's, or the slider by a quadratic."""
-    b, c, g = (extended(each)[:, None] for each in (B, C, guide))
-    r2, l2 = (b * b).sum(axis=0), ((c - b) ** 2).sum(axis=0)
-    side = float(np.sign(c[0, 0] * b[1, 0] - c[1, 0] * b[0, 0]))
-    ahead = float(np.sign(((c - b) * g).sum()))
+def slider_crank_motion(plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan = (1.0, 0.0)) -> Motion:
+    """Its closed form, the guide of length one: the slider by a quadratic, or the crank by two circles."""
+    B, C, g = (extended(each)[:, None] for each in (b, c, guide))
+    r2, l2 = (B * B).sum(axis=0), ((C - B) ** 2).sum(axis=0)
+    side = float(np.sign(C[0, 0] * B[1, 0] - C[1, 0] * B[0, 0]))
+    ahead = float(np.sign(((C - B) * g).sum()))
+    pivot, pin, slider = (extended(plane.point(each)) for each in ((0.0, 0.0), b, c))
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
         value = drives[0]
         if drive == "turn":
-            now_b = spin(value, B)
-            back = ((c - now_b) * g).sum(axis=0)  # |c + s g - b|^2 = l^2
+            now_b = spin(value, b)
+            back = ((C - now_b) * g).sum(axis=0)  # |C + s g - B|^2 = l^2
             with np.errstate(invalid="ignore"):
-                s = -back + ahead * np.sqrt(back * back - ((c - now_b) ** 2).sum(axis=0) + l2)
-            turn, now_c = value, c + s * g
+                s = -back + ahead * np.sqrt(back * back - ((C - now_b) ** 2).sum(axis=0) + l2)
+            turn, now_c = value, C + s * g
         else:
-            now_c = c + value * g
+            # behind the pivot it could be assembled again, but not reached
+            value = np.where(((C + value * g) * g).sum(axis=0) * (C * g).sum() > 0.0, value, np.nan)
+            now_c = C + value * g
             now_b = meet(0.0 * now_c, r2 + 0.0 * value, now_c, l2 + 0.0 * value, side)
-            turn = heading(now_b) - heading(b)
-        a, at_b, at_c = (extended(plane.point(x)) for x in ((0.0, 0.0), B, C))
+            turn = heading(now_b) - heading(B)
         return {
-            "crank": (plane.turned(turn), a, np.repeat(a[:, None], len(value), axis=1)),
-            "slider": (plane.turned(0.0 * turn + 0.0 * now_c[0]), at_c, plane.place(now_c)),
-            "coupler": (plane.turned(heading(now_c - now_b) - heading(c - b)), at_b, plane.place(now_b)),
+            "crank": (plane.turned(turn), pivot, pivot[:, None] + np.zeros_like(now_b[:1])),
+            "slider": (plane.turned(0.0 * turn), slider, plane.place(now_c)),
+            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.place(now_b)),
         }
 
     return motion

@@ -19,6 +19,8 @@ class Reach(Family):
         "sliders driven past the stretched rod, rockers past their dead centres, struts and tie rods within 1e-6 of them at design"
     )
 
+    samples = 81
+
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """A driven slider, or a four-bar whose driven bar cannot turn round."""
         plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))

@@ -11,9 +11,10 @@ from ....drivers import JointAngle, JointDisplacement
 from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
 from ....mechanism import GROUND, Body, Mechanism, Point
 from ....trajectory import Array
+from ..extended import extended
 from ..truth import closed, followed
 from .base import Family, Rng, Specimen, as_case, direction, power, triple
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion, meet
 
 TURN = 0.97 * np.pi
 
@@ -23,9 +24,11 @@ class Singular(Family):
 
     name = "singular"
     about = (
-        "parallelograms, kites and other change-point four-bars, exact and off by 1e-12 to 1e-2; Bennett and Bricard loops; platforms "
-        "on six legs off by 1e-8 to 0.1 from the similar hexagons that are singular"
+        "parallelograms (exact, and off by 1e-12 to 1e-2) and kites at their change points; Bennett and Bricard loops; platforms "
+        "on six legs, off by 1e-8 to 0.1 from the similar hexagons that are singular"
     )
+
+    samples = 61
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """One of them."""
@@ -33,12 +36,18 @@ class Singular(Family):
 
 
 def _parallelogram(rng: Rng, samples: int) -> Specimen:
-    """Folds flat twice a turn; exact, it is answered by the parallelogram or refused, never by what crosses it there."""
+    """Folds flat twice a turn. Exact, it is answered by the parallelogram or refused, never by what crosses it there; off one way
+    it turns into the antiparallel linkage within the root of that, off the other way it cannot pass.
+    """
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
-    off = 0.0 if rng.random() < 0.3 else power(rng, -12.0, -2.0)
+    off = 0.0 if rng.random() < 0.25 else power(rng, -12.0, -2.0) * float(rng.choice([-1.0, 1.0]))
     crank, up = float(rng.uniform(0.2, 0.5)), float(rng.uniform(0.8, 2.2))
     b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
-    c: Plan = (b[0] + 1.0 - off, b[1])  # a coupler shorter than the ground: the crank still turns
+    # the crank is the shortest, and by Grashof turns if the rocker is longer, the coupler being as long as the ground
+    c: Plan = (b[0] + 1.0, b[1])
+    if off:
+        met = meet(extended(b)[:, None], extended([1.0]), extended([[1.0], [0.0]]), extended([(crank + off) ** 2]), 1.0)
+        c = (float(met[0, 0]), float(met[1, 0]))
     motion = four_bar_motion(plane, b, (1.0, 0.0), c, parallel=off == 0.0)
     values = np.linspace(-TURN, TURN, samples)
     return Specimen(

@@ -1,0 +1,134 @@
+"""kincheck stress: situations that break kinematic solvers, and whether any answer is wrong without saying so."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...errors import KincheckError
+from .house import House, Status, unknown
+from .run import MODES, TOL, positive
+
+if TYPE_CHECKING:
+    from ..engine import Engine
+
+SAMPLES = 2000
+FILES = ("stress.json", "stress.html", "stress.md")
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    stress: argparse.ArgumentParser
+    stress = commands.add_parser("stress", help="nasty mechanisms: is any answer silently wrong?", description=_stress.__doc__)
+    stress.set_defaults(do=_stress)
+    stress.add_argument("--family", nargs="+", action="extend", default=[], metavar="NAME", help="default: all families")
+    stress.add_argument("--list", action="store_true", help="list the families")
+    stress.add_argument("--samples", type=_count, default=SAMPLES, metavar="N", help="over all families; default %(default)s")
+    stress.add_argument("--seed", type=int, default=0, metavar="S", help="of the random mechanisms; default %(default)s")
+    stress.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native")
+    stress.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
+    stress.add_argument(
+        "--out", type=Path, metavar="DIR", help="write the tables there, and the smallest bad cases, reduced, as case files"
+    )
+    stress.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    stress.add_argument("--no-proofs", action="store_true", help="do not prove a share of the truth, which needs python-flint")
+    stress.add_argument(
+        "--replay", nargs="+", action="extend", default=[], type=Path, metavar="FILE", help="judge case files instead"
+    )
+    stress.add_argument(
+        "--tol", type=positive, default=TOL, metavar="X", help=f"of replayed files: largest constraint residual; default {TOL:g}"
+    )
+
+
+def _count(text: str) -> int:
+    number = int(text) if text.isdecimal() else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of samples; give 1 or more")
+    return number
+
+
+def _stress(options: argparse.Namespace, house: House) -> int:
+    """Drive engines through random mechanisms that break kinematic solvers, and judge every sample.
+
+    Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool could not do its work.
+    """
+    from ..reporting import deliver as delivery
+    from ..stress.families import Family
+
+    if options.list:
+        width = max(map(len, Family.registry))
+        for name, family in Family.registry.items():
+            print(f"{name:{width}}  {family.about}")
+        return Status.WITHIN
+    problems: list[str] = []
+    engines = house.find_engines(options.engine or ["native"], problems, options.mode)
+    if options.replay:
+        if problems:
+            raise KincheckError("\n".join(problems))
+        return _replay(options, house, engines)
+    known = Family.registry
+    problems += [unknown("family", name, [*known]) for name in options.family if name not in known]
+    delivery.check_destinations(problems, out=options.out, json=options.json, names=FILES)
+    if problems:
+        raise KincheckError("\n".join(problems))
+    with delivery.json_only() if options.json == "-" else nullcontext():
+        wrong = _run(options, [known[name] for name in dict.fromkeys(options.family or known)], engines)
+    return Status.DEVIATES if wrong else Status.WITHIN
+
+
+def _run(options: argparse.Namespace, families: list[Any], engines: list[Engine]) -> bool:
+    """Run, reduce what is bad, and write the tables; whether anything is bad."""
+    from msgspec.structs import replace
+
+    from ..bench.pages import deliver
+    from ..stress.outcomes import BAD
+    from ..stress.report import markdown, report
+    from ..stress.run import stress
+    from ..stress.saving import save
+
+    def tell(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    found, examples = stress(
+        families,
+        engines,
+        samples=options.samples,
+        seed=options.seed,
+        command=options.command,
+        prove=not options.no_proofs,
+        tell=tell,
+    )
+    if options.out is not None and examples:
+        found = replace(found, findings=[save(example, options.out) for example in examples])
+    made = report(found)
+    deliver(made, found, out=options.out, json=options.json)
+    if options.out is not None:
+        (options.out / FILES[2]).write_text(markdown(made), encoding="utf-8")
+    return any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
+
+
+def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) -> int:
+    """Judge case files by following their motion from the design."""
+    from ..stress.outcomes import BAD, Verdict
+    from ..stress.saving import judge
+
+    bad = False
+    for file in options.replay:
+        case = house.find_case(str(file))
+        for engine in engines:
+            found = judge(case, engine, options.tol)
+            counts = ", ".join(f"{verdict} {found.counts[verdict]}" for verdict in Verdict if found.counts[verdict])
+            print(f"{file.name}  {engine.name} {engine.mode}: {counts}")
+            for verdict in BAD:
+                sample = found.first(verdict)
+                if sample is not None:
+                    bad = True
+                    worst = found.worst[0]
+                    off = "" if worst is None else f", positions off by {worst:.2g} of what is round-off"
+                    print(f"  {verdict} first at {case.sweep.driver} = {case.sweep.values[sample]:.9g}{off}")
+            if found.message:
+                print(f"  {found.message}")
+    return Status.DEVIATES if bad else Status.WITHIN
