@@ -78,13 +78,14 @@ def test_the_same_seed_finds_the_same():
     assert [each.starts for each in one.found] != [each.starts for each in other.found]
 
 
-def test_the_delta_robot_has_sixteen():
-    """Three knees that bend in or out, and for each of the eight ways the platform above or below."""
+def test_the_delta_robot_has_two_assemblies_with_a_level_platform_and_others():
+    """A level platform is where three spheres meet, above or below; with the rods of a pair crossed it is tilted."""
     mechanism = cases.load("delta_robot").mechanism
-    found = find_assemblies(mechanism, at_design(mechanism), samples=150, spread=None)
-    assert len(found.found) == 16
-    assert all(closes(mechanism, each) for each in found.found)
-    assert len({(each.orientation, tuple(each.signs.values())) for each in found.found}) > 4
+    found = find_assemblies(mechanism, at_design(mechanism), samples=150, spread=None).found
+    assert all(closes(mechanism, each) for each in found)
+    level = np.array(mechanism.body("platform").euler_parameters)
+    assert sum(abs(abs(each.poses["platform"][1] @ level) - 1.0) < 1e-9 for each in found) == 2
+    assert 10 <= len(found) <= 40  # measured 16; a platform on six rods has 40 at most (Dietmaier 1998)
 
 
 def test_a_gough_platform_has_several():

@@ -32,7 +32,7 @@ def test_contestants_take_turns(monkeypatch):
     monkeypatch.setattr(rounds, "TURN", 1e-12)  # one call a turn
     called = []
     found = rounds.take_turns({name: lambda name=name: called.append(name) for name in "ab"}, 3)
-    assert "".join(called) == "aabb" + 3 * "ab"
+    assert "".join(called) == "ab" + 3 * "ab"
     assert [each.rounds for each in found.values()] == [3, 3]
 
 

@@ -1,5 +1,7 @@
 """Large mechanisms as one sparse system: the motions that one program gives, rings of any size, and refusals with names."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kincheck import cases
@@ -23,12 +25,12 @@ from kincheck.core.analysis.equations import frames
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.analysis.sparse import SparseModel
+from kincheck.core.analysis.sparse import FailedError, SparseModel
 from kincheck.core.analysis.sparse_sweep import solve_sparse
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.bench import scaling
 from kincheck.core.harness.bench.ring import LEAN, pivot, ring
-from kincheck.core.motions import Path, Ramp
+from kincheck.core.motions import Path, Ramp, Sine
 
 from .mechanisms import four_bar, mcpherson, slider_crank
 from .test_cascade import assert_alike
@@ -83,6 +85,26 @@ def test_couplers_and_their_coordinates():
 def test_any_samples(times):
     for mechanism in (slider_crank(1.01), four_bar()):
         assert_alike(*both(mechanism, turning(*times, rate=2.0), tuple(point.name for point in mechanism.points)))
+
+
+def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample():
+    for times in (np.linspace(0.0, 3.0, 31), np.linspace(2.0, 1.0, 7)):
+        assert_alike(*both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",)))
+    steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))  # begins beyond the travel
+    assert solve_sparse(mcpherson(), steep).message.startswith("on the way to the first sample: cannot be followed beyond")
+
+
+def test_small_steps_take_one_iteration_each():
+    found = solve_sparse(ring(12), turning(*np.linspace(0.0, 0.8, 33)))
+    assert (found.iterations[4:] == 1).all()  # after the steps from which the predictor learns
+
+
+def test_a_wrong_branch_is_no_solution():
+    crank = Mechanism("crank", [Body("b")], [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)], (), [JointAngle("turn", "axle")])
+    model = SparseModel(crank, compiled=False)
+    over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])  # half a turn about x: the axes are parallel, but opposite
+    with pytest.raises(FailedError, match="wrong branch"):
+        model.reach(replace(model.design, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12)
 
 
 def test_every_crank_of_a_ring_turns_as_the_first():

@@ -159,7 +159,7 @@ def _starts(
     """Poses to start from, scalars of shape (n,); the first is the estimate.
 
     A body without an estimate has any attitude, and is near where the spanning tree's joint with its parent wants it. Moving it as
-    that joint lets it, so that only the loops are open, was tried: it finds 8 of the 16 assemblies of the delta robot, this all.
+    that joint lets it, so that only the loops are open, was tried: 200 such starts find 8 assemblies of the delta robot, these 16.
     """
     first = np.arange(n) == 0
     found: dict[str, Pose] = {}

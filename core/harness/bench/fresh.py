@@ -18,7 +18,7 @@ def first_use(clock: Sequence[float]) -> None:
     """Build and solve the pickled case on standard input; print the seconds of all stages as a line of JSON.
 
     Args:
-        clock: when the process began, had imported numpy and then kincheck.core.
+        clock: when the process began, had imported numpy and then what it takes to solve.
     """
     case, tol = pickle.load(sys.stdin.buffer)
     begin = perf_counter()

@@ -42,15 +42,10 @@ def spread(values: Sequence[float]) -> Spread:
 def take_turns(contestants: Mapping[Key, Work], rounds: int) -> dict[Key, Spread]:
     """Seconds of one call of each contestant, over rounds in which every one has its turn.
 
-    Each is called once before all rounds. Quick work is called once more before each of its turns, untimed: what the contestant
+    Each is called before all rounds. Quick work is called once more before each of its turns, untimed: what the contestant
     before it drove out of the caches is back then, for all alike. Python's garbage is collected between rounds only.
     """
-    calls: dict[Key, int] = {}
-    for key, work in contestants.items():
-        work()
-        begin = perf_counter()
-        work()
-        calls[key] = max(1, math.ceil(TURN / (perf_counter() - begin)))
+    calls = {key: _calls(work) for key, work in contestants.items()}
     times: dict[Key, list[float]] = {key: [] for key in contestants}
     enabled = gc.isenabled()
     try:
@@ -63,6 +58,14 @@ def take_turns(contestants: Mapping[Key, Work], rounds: int) -> dict[Key, Spread
     finally:
         (gc.enable if enabled else gc.disable)()
     return {key: spread(each) for key, each in times.items()}
+
+
+def _calls(work: Work) -> int:
+    """How often to call it in a turn; it has been called at least once then."""
+    seconds = _turn(work, 1)
+    if seconds < 10.0 * TURN:  # it may have been the first, which took longer than others will
+        seconds = _turn(work, 1)
+    return max(1, math.ceil(TURN / seconds))
 
 
 def _turn(work: Work, calls: int) -> float:
