@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
@@ -200,13 +201,14 @@ class Model:
         Returns:
             Shape (slots, variants).
         """
-        count = geometry.shape[1]
-        executor = self.executor(count)
-        every = range(len(self.slots))
-        executor.put(every, np.zeros((len(every), 1)))
-        for name, value in self.state.items():
-            executor.put(self.vectors[name], np.array(value)[:, None])
-        for name, value in self.given.items():
+        executor = self.executor(geometry.shape[1])
+        closes = self.stand(executor, geometry)
+        return np.where(closes, executor.get(range(len(self.slots))), np.nan)
+
+    def stand(self, executor: Executor, geometry: Array) -> NDArray[np.bool_]:
+        """Put the lanes of an executor where `standing` says; which of them close there."""
+        executor.clear()
+        for name, value in (*self.state.items(), *self.given.items()):
             executor.put(self.vectors[name], np.array(value)[:, None])
         executor.put(self.sampled, self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))))
         if len(geometry):
@@ -218,9 +220,8 @@ class Model:
             if not (residual > CLOSED).any():
                 break
         executor.run("outputs")
-        found = executor.get(every)
-        closes = (found[self.slots["closure"]] <= CLOSED) & (found[self.slots["branch"]] > 0.0)
-        return np.where(closes, found, np.nan)
+        closure, branch = executor.get([self.slots["closure"], self.slots["branch"]])
+        return (closure <= CLOSED) & (branch > 0.0)
 
     @property
     def ahead(self) -> list[int]:

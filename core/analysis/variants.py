@@ -50,10 +50,10 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         tol: as for `solve`.
     """
     model, n, count = route.model, len(route.path.times), geometry.shape[1]
-    lanes = model.standing(geometry)
-    lanes[[model.slots[name] for name in ("tolerance", "consistent")]] = np.array([[tol], [max(CONSISTENT, tol)]])
     executor = model.executor(count)
-    executor.put(range(len(lanes)), lanes)
+    closes = model.stand(executor, geometry)
+    tolerances = np.array([[tol], [max(CONSISTENT, tol)]])
+    executor.put([model.slots[name] for name in ("tolerance", "consistent")], tolerances)
     arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
     model.start(executor, route.origin)
     start = executor.get(model.ahead)
@@ -63,15 +63,15 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         samples = np.ascontiguousarray(side.samples[:, : len(side.times)])
         executor.fan(samples, whole, side.first, side.step)
     kept = whole[:, :, :count]
-    kept[:, :, ~arrived] = np.nan
+    kept[:, :, ~(arrived & closes)] = np.nan
     solved = ~np.isnan(kept[model.rows["closure"].start])
     failed = np.flatnonzero(~solved.all(axis=0))
     messages: dict[int, str] = {}
     for k in failed.tolist():
-        if np.isnan(lanes[0, k]):
+        if not closes[k]:
             messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
             continue
-        found = march(replace(route, design=lanes[:, k]), tol)
+        found = march(replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0]), tol)
         kept[:, :, k], solved[:, k] = found.kept[:, route.order], found.solved[route.order]
         if found.messages:
             messages[k] = "; ".join(found.messages)

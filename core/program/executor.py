@@ -63,6 +63,10 @@ class Executor(Protocol):
         """Samples that `follow` may overwrite beyond either end of its output."""
         ...
 
+    def clear(self) -> None:
+        """Set all slots of all lanes to zero."""
+        ...
+
     def put(self, slots: Sequence[int], values: Array) -> None:
         """Set slots of all lanes, shape (slots, lanes) or (slots, 1)."""
         ...

@@ -56,6 +56,10 @@ class LlvmExecutor:
         self._memory = _aligned(self._groups, code.slots, code.width)
         self._address = self._memory.ctypes.data
 
+    def clear(self) -> None:
+        """See `Executor`."""
+        self._memory[:] = 0.0
+
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
         padded = np.empty((len(slots), self._groups * self.margin))

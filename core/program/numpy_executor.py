@@ -65,6 +65,10 @@ class NumpyExecutor:
         self._scratch = np.empty((2, lanes))
         self._calls: dict[str, list[Call]] = {}
 
+    def clear(self) -> None:
+        """See `Executor`."""
+        self._block[:] = 0.0
+
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
         self._block[slots] = values
