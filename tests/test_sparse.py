@@ -99,9 +99,16 @@ def test_small_steps_take_one_iteration_each():
     assert (found.iterations[4:] == 1).all()  # after the steps from which the predictor learns
 
 
+CRANK = Mechanism("crank", [Body("b")], [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)], (), [JointAngle("turn", "axle")])
+
+
+def test_turns_are_counted_however_long_the_step():
+    found = solve_sparse(CRANK, turning(2.0 * np.pi + 0.3), (), ["b"])
+    assert found.bodies["b"].p[0] == pytest.approx([np.cos(np.pi + 0.15), 0.0, 0.0, np.sin(np.pi + 0.15)], abs=1e-14)
+
+
 def test_a_wrong_branch_is_no_solution():
-    crank = Mechanism("crank", [Body("b")], [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)], (), [JointAngle("turn", "axle")])
-    model = SparseModel(crank, compiled=False)
+    model = SparseModel(CRANK, compiled=False)
     over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])  # half a turn about x: the axes are parallel, but opposite
     with pytest.raises(FailedError, match="wrong branch"):
         model.reach(replace(model.design, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12)

@@ -106,7 +106,7 @@ def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer |
             if k == 0:
                 errors[known] = np.maximum(errors[known], off)
     wrong = (ratios > 1.0).any(axis=0)
-    told = max([result.residual, *(float(result.details.get(name) or 0.0) for name in ("redundant_residual",))])
+    told = max(result.residual, float(result.details.get("redundant_residual") or 0.0))
     if specimen.reported and truth.violated is not None:
         wrong |= known & (truth.violated > SPREAD * told)
     verdicts[solved] = Verdict.UNJUDGED
@@ -115,7 +115,9 @@ def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer |
     verdicts[beyond] = Verdict.SILENTLY_WRONG
     far = (errors > ELSEWHERE * truth.system.rows.stated.unit) | beyond
     worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(3))
-    return Judgement(verdicts, worst, int((far & (verdicts == Verdict.SILENTLY_WRONG)).sum()), result.message, told)
+    # what an engine notes beside its samples warns nobody who reads the samples, but tells where to look
+    message = "; ".join([*filter(None, [result.message]), *map(str, result.details.get("notes", []))])
+    return Judgement(verdicts, worst, int((far & (verdicts == Verdict.SILENTLY_WRONG)).sum()), message, told)
 
 
 def _refused(specimen: Specimen, truth: Truth | None, n: int, message: str) -> Judgement:
