@@ -102,8 +102,8 @@ class Tracer:
     def _kept(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.kept]
 
-    def newton(self, longest_turn: float | None = None) -> Program:
-        """One Newton-Raphson iteration; its step is shortened where it turns a body by more than the longest turn [rad]."""
+    def newton(self) -> Program:
+        """One Newton-Raphson iteration."""
         phi = self._kept(self.formulation.phi(self.at))
         factor = Elimination(self._kept(self.formulation.rows(self.at)))
         out: dict[int, Scalar] = {
@@ -111,10 +111,6 @@ class Tracer:
             self.layout.scalar("pivot"): factor.signed_pivot,
         }
         step = factor.solve(phi)
-        if longest_turn is not None:
-            turns = [v for motion in self.formulation.motions(self.at, step).values() for v in motion.w]
-            part = minimum(1.0, longest_turn / _largest(turns))
-            step = [part * x for x in step]
         self._store_state(out, self.formulation.retract(self.at, [-x for x in step]))
         return program("newton", self.tape, out, self.prepared)
 
