@@ -102,9 +102,15 @@ def test_small_steps_take_one_iteration_each():
 CRANK = Mechanism("crank", [Body("b")], [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)], (), [JointAngle("turn", "axle")])
 
 
-def test_turns_are_counted_however_long_the_step():
-    found = solve_sparse(CRANK, turning(2.0 * np.pi + 0.3), (), ["b"])
-    assert found.bodies["b"].p[0] == pytest.approx([np.cos(np.pi + 0.15), 0.0, 0.0, np.sin(np.pi + 0.15)], abs=1e-14)
+def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another():
+    path = turning(6.0 * np.pi + 0.3)
+    found = solve_sparse(CRANK, path, (), ["b"])  # an odd number of turns changes the sign
+    assert found.bodies["b"].p[0] == pytest.approx([-np.cos(0.15), 0.0, 0.0, -np.sin(0.15)], abs=1e-14)
+    model = SparseModel(CRANK, compiled=False)
+    here = model.moving(model.design, 0.0, model.drives(path, np.zeros(1))[:, 0])
+    assert model.reach(here, 0.9, model.drives(path, np.array([0.9]))[:, 0], 1e-12).iterations
+    with pytest.raises(FailedError, match="jumps"):
+        model.reach(here, 1.1, model.drives(path, np.array([1.1]))[:, 0], 1e-12)
 
 
 def test_a_wrong_branch_is_no_solution():

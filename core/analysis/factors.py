@@ -1,9 +1,9 @@
 """A large sparse matrix of fixed pattern, factored by SuperLU in an order that is found once.
 
 The order is COLAMD's, with the rows as the first factorisation pivoted them. Measured on a ring of N spatial loops, where nothing
-can be solved before anything else, and a chain, at a given order (medians, one Zen 4 core, N = 1,000, ring and chain): COLAMD 2.4
-and 1.7 ms, minimum degree of A^T A 3.0 and 1.6, reverse Cuthill-McKee of the bodies 2.8 and 1.6. COLAMD wins where it matters,
-and finding it anew at every factorisation would double the time. Minimum degree of A + A^T is not to be tried on matrices like
+can be solved before anything else, and a chain, in a given order (least of 15, one Zen 4 core, N = 1,000, ring and chain): COLAMD
+2.4 and 1.7 ms, minimum degree of A^T A 3.0 and 1.6, reverse Cuthill-McKee of the bodies 2.9 and 1.5. COLAMD wins where it matters;
+finding it anew at every factorisation costs a quarter more. Minimum degree of A + A^T is not to be tried on matrices like
 these, whose diagonals mean nothing: it took 1.6 s.
 """
 

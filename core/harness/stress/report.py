@@ -104,14 +104,14 @@ def _findings(findings: Sequence[Finding]) -> Section:
             each.verdict,
             f"{each.specimen} (number {each.number})",
             f"{each.value:.9g}",
-            _ratio(each.worst[0]),
+            " ".join(map(_ratio, each.worst)),
             each.message[:300] or "says nothing",
             " ".join(filter(None, (each.file, *each.reduced))),
         ]
         for each in findings
     ]
-    columns = ["family", "engine", "outcome", "specimen", "at", "position error", "message", "case file"]
-    notes = [f"The smallest specimen of each. An error beyond {ELSEWHERE:g} of the size counts as another assembly."]
+    columns = ["family", "engine", "outcome", "specimen", "at", "errors", "message", "case file"]
+    notes = [f"The smallest specimen of each; errors as above. An error beyond {ELSEWHERE:g} of the size counts as another assembly."]
     return Section("Findings", ["Replay a file by: kincheck stress --replay FILE --engine NAME --tol X."], notes, columns, 4, rows)
 
 

@@ -154,7 +154,7 @@ def _solve(family: Family, engine: Engine, made: Sequence[Made], found: _Results
         judgements.append((one, judgement))
         missing = isinstance(answer, Failure) and answer.outcome in (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
         if one.specimen.reported and one.truth is not None and one.truth.violated is not None and not missing:
-            accepted = bool(not isinstance(answer, Failure) and answer.solved)
+            accepted = not isinstance(answer, Failure) and answer.solved == one.samples
             tilt = dict(one.specimen.facts).get("tilt", 0.0)
             unavoidable = float(one.truth.violated.max())
             found.acceptances.append(

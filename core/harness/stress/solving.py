@@ -24,7 +24,7 @@ from ..workers.limits import Limits
 PATIENCE = 60.0
 MEMORY = 4.0
 # Machine code is compiled for these; a larger mechanism that is solved once takes less time without.
-LARGEST_COMPILED = 6
+LARGEST_COMPILED = 4
 FEWEST_COMPILED_FOR = 2000
 """Samples for which it is compiled in any case."""
 

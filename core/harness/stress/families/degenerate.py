@@ -136,7 +136,7 @@ WRONG: tuple[tuple[Callable[[Rng], Mechanism], str], ...] = (
     (_cross_of_parallel_axes, "not perpendicular"),
     (_shafts_that_turn_back, "cosine"),
     (_body_that_spins_freely, "free"),
-    (_rocker_of_length_zero, "freedom|lock-up|dead centre|does not move|beyond|singular"),
+    (_rocker_of_length_zero, "free|lock-up|dead centre|does not move|beyond|singular"),
     (_driver_across_the_motion, "dead centre|lock-up|singular|free|does not move"),
     (_slider_at_its_dead_centre, "dead centre|lock-up|singular|free|does not move|no assembly"),
     (_rod_too_long_to_close, "does not close|no assembly"),
