@@ -155,7 +155,7 @@ def limit_ahead(system: System, path: Path, state: Array, time: float, direction
         spot = walk.begin(state, time, direction)
     except np.linalg.LinAlgError:
         return None
-    for before, after in pairwise(_from(spot, walk.along(spot, NEARBY, LONGEST))):
+    for before, after in pairwise(_from(spot, walk.along(spot, NEARBY, LONGEST, ATTEMPTS))):
         if before.dt * after.dt < 0.0:
             return _event(walk, walk.limit(before, after))
     return None
@@ -164,6 +164,8 @@ def limit_ahead(system: System, path: Path, state: Array, time: float, direction
 # A march that fails is left this near [units of the mechanism's size, rad] to the limit point that stopped it, or it was something
 # else.
 NEARBY = 0.5
+# Ten times the steps that such a way takes; equations whose rows are wrong would have it creep on and on.
+ATTEMPTS = 100
 
 
 def _from(first: Spot, others: Iterator[Spot]) -> Iterator[Spot]:

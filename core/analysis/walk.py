@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
@@ -134,10 +135,12 @@ class Walk:
         closure, leftover, branch = (float(tests[name][0, 0]) for name in ("closure", "leftover", "branch"))
         return closure <= self.tol and leftover <= max(CONSISTENT, self.tol) and branch > 0.0
 
-    def along(self, spot: Spot, length: float, longest: float) -> Iterator[Spot]:
-        """Spots after one, up to a length from where the walk began; ends before it where steps get too short."""
+    def along(self, spot: Spot, length: float, longest: float, attempts: int | None = None) -> Iterator[Spot]:
+        """Spots after one, up to a length from where the walk began; ends before it where steps get too short, or are too many."""
         h = 0.1 * longest
-        while spot.arc < length:
+        for _ in count() if attempts is None else range(attempts):
+            if spot.arc >= length:
+                return
             after = self.advance(spot, min(h, length - spot.arc))
             turn = np.arccos(min(1.0, float(after.dq @ spot.dq))) if after else np.inf
             if after is None or turn > LARGEST_TURN:
