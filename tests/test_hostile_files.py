@@ -16,7 +16,7 @@ import pytest
 from kincheck.core.harness.reading import casefile
 from kincheck.core.harness.reading.document import LONGEST_MESSAGE
 from kincheck.core.harness.reading.hardpoints.read import MOST_POINTS
-from kincheck.core.harness.reading.mjcf.tree import MOST_BODIES
+from kincheck.core.harness.reading.mjcf.tree import MOST_BODIES, MOST_MOVING
 
 from .case_texts import BASE, BY_FILE, CSV, edited
 
@@ -71,8 +71,14 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         json.dumps({"schema": "kincheck-case/1", "points": {f"{k}": {} for k in range(50_000)}}),
         "name: missing",
     ),
-    "bodies of a model": ("a.xml", model(filled("<body><joint/></body>", size=LARGEST // 4)), f"more than {MOST_BODIES} bodies"),
-    "joints of a body": ("a.xml", model(f"<body>{filled('<joint/>')}</body>"), f"more than {MOST_BODIES} bodies or joints"),
+    "bodies of a model": (
+        "a.xml",
+        model(filled("<body><joint/></body>", size=LARGEST // 4)),
+        f"more than the {MOST_MOVING} that are read",
+    ),
+    "fixed bodies of a model": ("a.xml", model(filled("<body/>")), f"more than the {MOST_BODIES} that are read"),
+    "as many joints as are read": ("a.xml", model("<body><joint/></body>" * MOST_MOVING), "degrees of freedom"),
+    "joints of a body": ("a.xml", model(f"<body>{filled('<joint/>')}</body>"), f"more than the {MOST_MOVING} that are read"),
     "equalities": (
         "a.xml",
         model('<body name="a"><joint type="ball"/></body>', filled('<connect body1="a" anchor="0 0 0"/>', size=LARGEST // 10)),
@@ -100,7 +106,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         "expected a body",
     ),
     "a long field": ("a.csv", f"name,x,y,z\n{'a' * 1_000_000},1,2,3\n", "line 2: not valid CSV"),
-    "open comments": ("a.json", filled("/*", size=LARGEST), "not valid JSON"),
+    "open comments": ("a.json", filled("/* ", size=LARGEST), "not valid JSON"),
     "open strings": ("a.json", '"' + filled('\\"')[:-100], "not valid JSON"),
     "open strings in TOML": ("a.toml", filled('"', "a = {}"), "not valid TOML"),
     "blanks": ("a.sub", filled(" ", "[UNITS]\nLENGTH = {}a'b'c"), "no row in a block"),

@@ -47,12 +47,12 @@ def run(name: str) -> Results:
     """Everything that is a name or a message is called so."""
 
     def renamed(record: Record, **changes: object) -> Record:
-        outputs = {name: series for series in record.outputs.values()}
-        outputs = {key: msgspec.structs.replace(series, unit=name, sense=name, reason=name) for key, series in outputs.items()}
-        errors = {name: msgspec.structs.replace(each, reason=name) for each in record.errors.values()}
+        outputs = [msgspec.structs.replace(each, unit=name, sense=name, reason=name) for each in record.outputs.values()]
+        errors = [msgspec.structs.replace(each, reason=name) for each in record.errors.values()]
         texts = {"case": name, "engine": name, "version": name, "message": name, "loop": name, "settings": {name: name}}
         return msgspec.structs.replace(
-            record, **({"outputs": outputs, "errors": errors, "driver": {name: [*range(21)]}} | texts | changes)
+            record,
+            **({"outputs": {name: outputs[0]}, "errors": {name: errors[0]}, "driver": {name: [*range(21)]}} | texts | changes),
         )
 
     made = results()

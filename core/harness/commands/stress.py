@@ -14,6 +14,8 @@ from .run import MODES, TOL, positive
 
 if TYPE_CHECKING:
     from ..engine import Engine
+    from ..stress.families import Family
+    from ..stress.results import Stress
 
 SAMPLES = 2000
 FILES = ("stress.json", "stress.html", "stress.md")
@@ -55,8 +57,11 @@ def _stress(options: argparse.Namespace, house: House) -> int:
 
     Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool could not do its work.
     """
+    from ..bench.pages import deliver
     from ..reporting import deliver as delivery
     from ..stress.families import Family
+    from ..stress.outcomes import BAD
+    from ..stress.report import markdown, report
 
     if options.list:
         width = max(map(len, Family.registry))
@@ -75,17 +80,19 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     if problems:
         raise KincheckError("\n".join(problems))
     with delivery.json_only() if options.json == "-" else nullcontext():
-        wrong = _run(options, [known[name] for name in dict.fromkeys(options.family or known)], engines)
-    return Status.DEVIATES if wrong else Status.WITHIN
+        found = _run(options, [known[name] for name in dict.fromkeys(options.family or known)], engines)
+    made = report(found)
+    deliver(made, found, out=options.out, json=options.json)
+    if options.out is not None:
+        (options.out / FILES[2]).write_text(markdown(made), encoding="utf-8")
+    bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
+    return Status.DEVIATES if bad else Status.WITHIN
 
 
-def _run(options: argparse.Namespace, families: list[Any], engines: list[Engine]) -> bool:
-    """Run, reduce what is bad, and write the tables; whether anything is bad."""
+def _run(options: argparse.Namespace, families: list[Family], engines: list[Engine]) -> Stress:
+    """Run, and reduce and save what is bad."""
     from msgspec.structs import replace
 
-    from ..bench.pages import deliver
-    from ..stress.outcomes import BAD
-    from ..stress.report import markdown, report
     from ..stress.run import stress
     from ..stress.saving import save
 
@@ -103,11 +110,7 @@ def _run(options: argparse.Namespace, families: list[Any], engines: list[Engine]
     )
     if options.out is not None and examples:
         found = replace(found, findings=[save(example, options.out) for example in examples])
-    made = report(found)
-    deliver(made, found, out=options.out, json=options.json)
-    if options.out is not None:
-        (options.out / FILES[2]).write_text(markdown(made), encoding="utf-8")
-    return any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
+    return found
 
 
 def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) -> int:

@@ -111,7 +111,9 @@ def _findings(findings: Sequence[Finding]) -> Section:
         for each in findings
     ]
     columns = ["family", "engine", "outcome", "specimen", "at", "errors", "message", "case file"]
-    notes = [f"The smallest specimen of each; errors as above. An error beyond {ELSEWHERE:g} of the size counts as another assembly."]
+    notes = [
+        f"The smallest specimen of each; errors as above. An error beyond {ELSEWHERE:g} of the size counts as another assembly."
+    ]
     return Section("Findings", ["Replay a file by: kincheck stress --replay FILE --engine NAME --tol X."], notes, columns, 4, rows)
 
 

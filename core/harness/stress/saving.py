@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from ..case import Case
 from ..engine import Engine
 from ..writing import case_text
 from .families import Specimen
+from .families.base import coordinates
 from .outcomes import Judgement, Verdict, judged
 from .reduce import fewer_samples, reduced
 from .results import Finding
@@ -27,8 +29,8 @@ def judge(case: Case, engine: Engine, tol: float, truth: Callable[[Case], Truth]
     Raises:
         KincheckError: the truth cannot be had.
     """
-    specimen = Specimen(case.name, lambda: case, truth, tol)
-    return judge_as(specimen, case, engine)
+    watched = dataclasses.replace(case, outputs=coordinates(case.points))
+    return judge_as(Specimen(case.name, lambda: watched, truth, tol), watched, engine)
 
 
 def judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:

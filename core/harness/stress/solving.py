@@ -1,4 +1,4 @@
-"""Having specimens solved: the native engine here, by machine code or by numpy, simulators in worker processes."""
+"""Having specimens solved: the native engine here, by machine code and by numpy, simulators in worker processes."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from ..workers.limits import Limits
 # A simulator that takes longer for a sweep of this size hangs [s].
 PATIENCE = 60.0
 MEMORY = 4.0
-# Machine code is compiled for these; a larger mechanism that is solved once takes less time without.
-LARGEST_COMPILED = 4
-FEWEST_COMPILED_FOR = 2000
-"""Samples for which it is compiled in any case."""
+# Up to so many bodies numpy costs no more than compiling; the search around singular poses makes larger ones slow.
+LARGEST_INTERPRETED = 4
+MOST_INTERPRETED = 2000
+"""Samples for which it is not compiled."""
 
 
 class Interpreted:
@@ -59,10 +59,9 @@ class Interpreted:
 
 
 def suited(engine: Engine, case: Case, number: int) -> Engine:
-    """The native engine compiled for every other mechanism that is small enough, else interpreted; simulators as they are."""
-    if engine.name != NATIVE or len(case.sweep.values) >= FEWEST_COMPILED_FOR:
-        return engine
-    return engine if number % 2 == 0 and len(case.mechanism.moving) <= LARGEST_COMPILED else Interpreted(engine)
+    """The native engine, interpreted for every other small mechanism, so that both executors are met; simulators as they are."""
+    small = len(case.mechanism.moving) <= LARGEST_INTERPRETED and len(case.sweep.values) <= MOST_INTERPRETED
+    return Interpreted(engine) if engine.name == NATIVE and number % 2 and small else engine
 
 
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:

@@ -74,7 +74,8 @@ class Truth:
 
 Motion = Callable[[Real], Mapping[str, tuple[Real, Real, Real]]]
 """A closed form: from the drivers' values, shape (drivers, n), to each moving body's turn since the design, a unit quaternion of
-shape (4, n), a point of the body at design [m], shape (3,), and where it is [m], shape (3, n). NaN where there is no solution."""
+shape (4, n), a point of the body at design [m], shape (3,), and how far that has come [m], shape (3, n): not where it is, which has
+fewer digits far from the origin. NaN where there is no solution."""
 
 
 class DefectError(KincheckError):
@@ -165,9 +166,8 @@ def closed_poses(system: System, motion: Motion, samples: NDArray[np.intp]) -> P
     n = next(iter(moved.values()))[0].shape[-1]
     found = Poses.design(len(stated.bodies), n)
     for k, name in enumerate(stated.bodies, 1):
-        q, at, now = moved[name]
-        found.q[k] = q
-        found.u[k] = (now - at[:, None]) / extended(stated.unit)
+        found.q[k], _, shift = moved[name]
+        found.u[k] = shift / extended(stated.unit)
     levers = [stated.centres[k] - (moved[name][1] - stated.origin) / stated.unit for k, name in enumerate(stated.bodies)]
     for k, lever in enumerate(levers, 1):
         found.u[k] += np.einsum("abn,b->an", found.turned[k], lever)

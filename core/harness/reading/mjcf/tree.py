@@ -16,8 +16,9 @@ from .elements import Element
 from .frames import HERE, Compiler, Place, joint_axis, read_place
 
 WORLD = "world"
-# Ten times as many as robots and hands have.
-MOST_BODIES = 2_000
+# Scenes have many bodies, robots and hands at most some tens that move, a joint each; the freedom of all is counted at once, in a
+# time that grows with the cube of their number: some seconds for as many as these.
+MOST_BODIES, MOST_MOVING = 2_000, 150
 
 
 @dataclass(frozen=True)
@@ -99,8 +100,12 @@ class Tree:
         place = around.then(read_place(element, self.compiler))
         childclass = _class(element, childclass)
         elements = list(element.only("joint", "freejoint"))
-        if max(len(self.places), len(self.moving) + len(elements)) > MOST_BODIES:
-            raise element.fault(f"found more than {MOST_BODIES} bodies or joints, expected fewer; take out what does not move")
+        for most, count, what in (
+            (MOST_BODIES, len(self.places), "bodies; take out what does not move"),
+            (MOST_MOVING, len(self.moving) + len(elements), "joints; take out those that are not looked at"),
+        ):
+            if count > most:
+                raise element.fault(f"found more than the {most} that are read, expected fewer {what}")
         if not elements:
             carrier = outer
             if element.attributes.get("mocap") == "true":

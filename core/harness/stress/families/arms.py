@@ -86,15 +86,15 @@ def forward(mechanism: Mechanism) -> Closed:
         still = np.stack([zero + 1.0, zero, zero, zero])
         found: dict[str, tuple[Real, Real, Real]] = {GROUND: (still, extended(np.zeros(3)), np.zeros((3, n), dtype=np.longdouble))}
         for joint in mechanism.joints:
-            q, at, now = found[joint.i]
+            q, at, come = found[joint.i]
             given: Any = joint
             place = extended(given.point)
             turn, shift = values.get((joint.name, "rotation"), zero), values.get((joint.name, "translation"), zero)
             if isinstance(joint, Screw):
                 shift = extended(joint.lead) * turn / (2.0 * PI)
             h = unit(extended(given.axis)) if isinstance(joint, AxialJoint) else extended((0.0, 0.0, 1.0))
-            lever = (place - at)[:, None] + h[:, None] * shift
-            carried = now + lever + _swing(q, lever)
+            along = h[:, None] * shift
+            carried = come + along + _swing(q, (place - at)[:, None] + along)
             found[joint.j] = _product(q, np.concatenate([np.cos(turn / 2)[None], h[:, None] * np.sin(turn / 2)])), place, carried
         del found[GROUND]
         return found

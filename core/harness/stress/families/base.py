@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -82,13 +82,19 @@ def as_case(
     source: str = "kincheck stress",
 ) -> Case:
     """The case of a mechanism, all coordinates of all its points as outputs."""
-    outputs = tuple(
-        Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
-        for point in mechanism.points
+    sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
+    return Case(
+        mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, coordinates(point.name for point in mechanism.points)
+    )
+
+
+def coordinates(points: Iterable[str]) -> tuple[Output, ...]:
+    """All coordinates of points, as outputs."""
+    return tuple(
+        Output(f"{name}.{axis}", name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
+        for name in points
         for axis, along in AXES.items()
     )
-    sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
-    return Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
 
 
 def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:

@@ -29,12 +29,12 @@ class Plane:
 
     def point(self, at: Plan) -> tuple[float, float, float]:
         """A point of the plane in space, rounded once."""
-        return triple(np.asarray(self.place(extended(at)[:, None])[:, 0], dtype=np.float64))
+        return triple(np.asarray(extended(self.origin) + self.lift(extended(at)[:, None])[:, 0], dtype=np.float64))
 
-    def place(self, at: Real) -> Real:
-        """Points of the plane in space, shape (3, n)."""
-        e1, e2, o = map(extended, (self.e1, self.e2, self.origin))
-        return o[:, None] + e1[:, None] * at[0] + e2[:, None] * at[1]
+    def lift(self, shift: Real) -> Real:
+        """Shifts in the plane in space, shape (3, n)."""
+        e1, e2 = map(extended, (self.e1, self.e2))
+        return e1[:, None] * shift[0] + e2[:, None] * shift[1]
 
     @property
     def normal(self) -> tuple[float, float, float]:
@@ -137,11 +137,11 @@ def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = Fa
         turn = np.where((first < drives[0]) & (drives[0] < last), drives[0], np.nan)
         now_b = spin(turn, b)
         now_c = now_b + (C - B) if parallel else meet(now_b, p, D + 0.0 * now_b, q, side)
-        still = np.zeros_like(now_b[:1])
+        still = np.zeros((3, len(turn)), dtype=np.longdouble)
         return {
-            "crank": (plane.turned(turn), pivot, pivot[:, None] + still),
-            "rocker": (plane.turned(heading(now_c - D) - heading(C - D)), rest, rest[:, None] + still),
-            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.place(now_b)),
+            "crank": (plane.turned(turn), pivot, still),
+            "rocker": (plane.turned(heading(now_c - D) - heading(C - D)), rest, still),
+            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.lift(now_b - B)),
         }
 
     return motion
@@ -205,9 +205,9 @@ def slider_crank_motion(plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan 
             now_b = meet(0.0 * now_c, r2 + 0.0 * value, now_c, l2 + 0.0 * value, side)
             turn = heading(now_b) - heading(B)
         return {
-            "crank": (plane.turned(turn), pivot, pivot[:, None] + np.zeros_like(now_b[:1])),
-            "slider": (plane.turned(0.0 * turn), slider, plane.place(now_c)),
-            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.place(now_b)),
+            "crank": (plane.turned(turn), pivot, np.zeros((3, len(turn)), dtype=np.longdouble)),
+            "slider": (plane.turned(0.0 * turn), slider, plane.lift(now_c - C)),
+            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.lift(now_b - B)),
         }
 
     return motion

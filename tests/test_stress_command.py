@@ -1,0 +1,165 @@
+"""kincheck stress on the command line, its files, and the writing of case files."""
+
+import json
+from dataclasses import replace
+
+import kincheck.adapters
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.adapters.native import Native
+from kincheck.core import solve
+from kincheck.core.errors import CaseError
+from kincheck.core.harness import cli
+from kincheck.core.harness.probe import probes
+from kincheck.core.harness.reading.casefile import load_case
+from kincheck.core.harness.stress.report import markdown, report
+from kincheck.core.harness.stress.results import Cell, Finding, Stress
+from kincheck.core.harness.writing import case_text
+
+
+class Shifted(Native):
+    """The native engine, off by a micrometre beyond 2 rad."""
+
+    def build(self, case):
+        found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
+        far = (np.abs(case.sweep.change) > 2.0)[:, None]
+        points = {name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()}
+        return replace(found, points=points)
+
+    def solve(self, model, case, tol):
+        return model
+
+
+@pytest.fixture
+def shifted(monkeypatch):
+    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": Shifted())
+    monkeypatch.setattr("kincheck.core.harness.stress.run.suited", lambda engine, case, number: engine)
+
+
+def test_a_run_writes_tables_and_data(tmp_path, capsys):
+    assert (
+        cli.main(["stress", "--family", "units", "degenerate", "--samples", "40", "--out", str(tmp_path / "new"), "--json", "-"])
+        == 0
+    )
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert found["schema"] == "kincheck-stress/1"
+    assert [cell["family"] for cell in found["cells"]] == ["units", "degenerate"]
+    assert sum(found["cells"][0]["samples"].values()) >= 20
+    assert found["findings"] == []
+    assert "None of" in err
+    assert {file.name for file in (tmp_path / "new").iterdir()} == {"stress.json", "stress.html", "stress.md"}
+    assert "| units | native projection |" in (tmp_path / "new" / "stress.md").read_text(encoding="utf-8")
+    assert "silently wrong" in (tmp_path / "new" / "stress.html").read_text(encoding="utf-8")
+
+
+def test_what_is_silently_wrong_is_reduced_saved_and_replayed(tmp_path, capsys, shifted):
+    assert cli.main(["stress", "--family", "units", "--samples", "30", "--out", str(tmp_path), "--no-proofs"]) == 1
+    capsys.readouterr()
+    (file,) = tmp_path.glob("*.toml")
+    (finding,) = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))["findings"]
+    assert (finding["file"], finding["verdict"]) == (file.name, "silently wrong")
+    assert len(load_case(file).sweep.values) == 1
+    assert cli.main(["stress", "--replay", str(file)]) == 1
+    assert "silently wrong first at turn = " in capsys.readouterr().out
+
+
+def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
+    file = tmp_path / "rssr.toml"
+    file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
+    assert cli.main(["stress", "--replay", str(file)]) == 0
+    assert "right 181" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--family", "unit"], "there is no family 'unit'; did you mean 'units'?"),
+        (["--engine", "nativ"], "there is no engine 'nativ'"),
+        (["--samples", "0"], "'0' is not a number of samples"),
+        (["--replay", "nowhere.toml"], "no such file"),
+        (["--tol", "-1"], "is not a positive number"),
+    ],
+)
+def test_what_makes_no_sense_is_said_before_anything_is_run(options, said, capsys):
+    assert cli.main(["stress", *options]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_families_are_listed_with_their_sizes(capsys):
+    assert cli.main(["stress", "--list"]) == 0
+    out = capsys.readouterr().out
+    assert "units" in out
+    assert "1e7 m" in out
+
+
+def test_text_of_files_is_no_markup():
+    """Names and messages come from files and simulators."""
+    evil = "<script>|*x*`"
+    cell = {"engine": evil, "mode": "projection", "version": "1", "settings": {}, "worst": [None] * 3, "seconds": 0.0}
+    counts = dict.fromkeys(
+        ["right", "refused, right reason", "refused, wrong reason", "silently wrong", "not judged", "unsupported"], 1
+    )
+    found = Stress(
+        kincheck="1",
+        command="",
+        seed=0,
+        samples=6,
+        abouts={evil: evil},
+        cells=[Cell(family=evil, specimens=1, samples=counts, elsewhere=0, bad=1, **cell)],
+        findings=[
+            Finding(
+                family=evil, engine=evil, mode="projection", verdict="silently wrong", specimen=evil, number=0, sample=0,
+                value=0.0, message=evil, tol=1e-12, worst=[2.0, None, None],
+            )
+        ],
+        proofs=[],
+        acceptances=[],
+        seconds={},
+    )  # fmt: skip
+    text = markdown(report(found))
+    assert "<script>" not in text
+    assert "\\|" in text
+    assert "1 (20 %)" in text  # of the five that are supported
+
+
+# Case files, written
+
+
+@pytest.mark.parametrize("name", sorted(set(cases.names()) - {"mcpherson_suspension"}))
+def test_built_in_cases_are_read_as_they_were_written(name, tmp_path):
+    same_after_writing(cases.load(name), tmp_path)
+
+
+@pytest.mark.parametrize("case", probes(), ids=lambda case: case.name)
+def test_every_joint_type_is_read_as_it_was_written(case, tmp_path):
+    same_after_writing(case, tmp_path)
+
+
+def same_after_writing(case, folder):
+    file = folder / "case.toml"
+    file.write_text(case_text(case, ["what it is", "and why"]), encoding="utf-8")
+    read = load_case(file)
+    assert (read.name, read.source, read.mechanism, read.outputs) == (case.name, case.source, case.mechanism, case.outputs)
+    assert read.sweep.motions == case.sweep.motions
+    assert (read.sweep.driver, read.sweep.rate, read.sweep.design) == (case.sweep.driver, case.sweep.rate, case.sweep.design)
+    # a grid in degrees is even but for its last places
+    assert np.abs(read.sweep.values - case.sweep.values).max() <= 4 * np.spacing(np.abs(case.sweep.values).max())
+
+
+def test_what_a_case_file_cannot_say_is_named():
+    case = cases.load("rssr")
+    uneven = replace(case, sweep=replace(case.sweep, values=np.array([0.0, 1.0, 1.5])))
+    with pytest.raises(CaseError, match="no even grid"):
+        case_text(uneven)
+    with pytest.raises(CaseError, match="'toe' is not a coordinate"):
+        case_text(cases.load("mcpherson_suspension"))
+
+
+def test_names_that_need_quotes_get_them(tmp_path):
+    case = next(case for case in probes() if case.name == "revolute")
+    odd = 'ti "p"\\1'
+    points = [replace(point, name=odd) if point.name == "tip_1" else point for point in case.mechanism.points]
+    outputs = tuple(replace(each, point=odd) if each.point == "tip_1" else each for each in case.outputs)
+    same_after_writing(replace(case, mechanism=replace(case.mechanism, points=points), outputs=outputs), tmp_path)
