@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test lock clean
+.PHONY: run test lock fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
@@ -32,6 +32,10 @@ endif
 lock: .venv/ready
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade \
 		--extra dev pyproject.toml --output-file requirements.lock
+
+# An hour on each reader.
+fuzz: .venv/ready
+	for reader in casefile hardpoints mjcf reference results; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
 
 clean:
 	rm -rf .venv build report *.egg-info

@@ -1,6 +1,7 @@
 """Stress: outcomes, families, reduction, and a run of two thousand samples of the native engine."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from kincheck.core.harness.stress.families.base import as_case
 from kincheck.core.harness.stress.families.planar import any_plane, crank_rocker, four_bar
 from kincheck.core.harness.stress.outcomes import Verdict, described_wrong, judged
 from kincheck.core.harness.stress.reduce import fewer_samples, reduced, rounded
-from kincheck.core.harness.stress.run import stress
+from kincheck.core.harness.stress.run import specimen, stress
+from kincheck.core.harness.stress.saving import judge as judge_file
 from kincheck.core.harness.stress.solving import Interpreted, once
 from kincheck.core.harness.stress.truth import Reach, followed
 from kincheck.core.harness.writing import case_text
@@ -190,10 +192,29 @@ def test_no_family_is_silently_wrong_in_the_native_engine():
     assert all(each.tilt < 1e-8 for each in accepted)
 
 
+def test_errors_do_not_grow_over_a_thousand_turns():
+    made = specimen(FAMILIES["drift"], 0, 0, 4001)
+    assert made.case is not None
+    assert made.truth is not None
+    answer = once(Pair(made.case, NATIVE, 1e-12))
+    assert isinstance(answer, Answer)
+    error = np.abs(answer.outputs["C.x"].position - made.truth.points["C"][0][:, 0]) / made.truth.bounds["C"][0]
+    first, last = float(error[:400].max()), float(error[-400:].max())  # a hundred turns each
+    assert 0.0 < last < 2.0 * first < 0.1
+
+
 @pytest.mark.xfail(reason="the native solver steps over gaps between two solutions that are narrower than a millionth of a radian")
 def test_nothing_nearly_singular_is_silently_wrong():
     found, _ = stress([FAMILIES["singular"]], [Interpreted(NATIVE)], samples=150, seed=0, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
+
+
+@pytest.mark.xfail(reason="the native solver takes steps from one side of a gap to the other")
+@pytest.mark.parametrize("name", ["four_bar_in_one_step", "kite", "loop_of_eight_bodies"])
+def test_what_was_silently_wrong_is_so_no_longer(name):
+    """The smallest mechanisms found so far, a sample each."""
+    file = Path(__file__).parent / "data" / "stress" / f"{name}.toml"
+    assert judge_file(load_case(file), NATIVE, 1e-12).counts[Verdict.SILENTLY_WRONG] == 0
 
 
 # Reduction

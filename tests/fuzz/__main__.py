@@ -11,7 +11,6 @@ import argparse
 import importlib
 import pkgutil
 import random
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -52,17 +51,41 @@ def main(argv: Sequence[str]) -> int:
     bounds = [f"-timeout={SECONDS}", f"-rss_limit_mb={MEGABYTES}", f"-artifact_prefix={crashes}/"]
     if not options.keep:
         return fuzz(options.reader, [f"-max_total_time={options.seconds}", *bounds, "-print_final_stats=1", str(corpus)])
-    minimal = BUILD / f"{options.reader}.minimal"
-    minimal.mkdir(exist_ok=True)
-    for file in minimal.iterdir():
-        file.unlink()
-    # edges without how often they are passed: enough to reach all code again
-    merge = ["-merge=1", "-use_counters=0", *bounds, str(minimal), str(corpus)]
-    # in a process of its own: libFuzzer ends it when it has merged
-    code = f"from tests.fuzz.__main__ import fuzz; fuzz({options.reader!r}, {merge!r})"
-    subprocess.run([sys.executable, "-c", code], check=True)
-    keep(options.reader, [*(file.read_bytes() for file in minimal.iterdir())])
+    keep(options.reader, minimal(options.reader, corpus))
     return 0
+
+
+def minimal(name: str, corpus: Path) -> list[bytes]:
+    """Inputs that together take every step from line to line that all take, the short ones first. (libFuzzer's own merge starts
+    its program anew, which Python is not.)"""
+    reader, here = importlib.import_module(f"tests.fuzz.{name}"), str(HERE.parent.parent / "core")
+    inputs = [*reader.seeds(), *(file.read_bytes() for file in corpus.iterdir())]
+    steps: set[tuple[Any, int, int]] = set()
+    last: dict[int, int] = {}
+
+    def trace(frame: Any, event: str, _: object) -> Any:
+        if not frame.f_code.co_filename.startswith(here):
+            return None
+        if event == "line":
+            steps.add((frame.f_code, last.get(id(frame), 0), frame.f_lineno))
+        last[id(frame)] = frame.f_lineno if event == "line" else 0
+        return trace
+
+    for each in reader.seeds():  # what is imported, or found once and kept, is no step of an input
+        reader.one(each)
+    found: set[tuple[Any, int, int]] = set()
+    kept_inputs: list[bytes] = []
+    for each in sorted(inputs, key=len):
+        steps.clear()
+        sys.settrace(trace)
+        try:
+            reader.one(each)
+        finally:
+            sys.settrace(None)
+        if not steps <= found:
+            found |= steps
+            kept_inputs.append(each)
+    return kept_inputs
 
 
 def fuzz(name: str, arguments: Sequence[str]) -> int:

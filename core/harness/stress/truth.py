@@ -146,6 +146,7 @@ def closed(case: Case, motion: Motion) -> Truth:
         found.singular[chunk] = solved.condition >= SINGULAR
         # in a singular pose Newton's iteration cannot polish, and need not
         found.add(chunk, _replaced(solved, poses, solved.condition >= UNPOLISHED), keep=False)
+    found.singular |= bool(system.design().condition[0] >= SINGULAR)
     outward = np.argsort(np.abs(system.path.times), kind="stable")
     for side in (outward[system.path.times[outward] >= 0.0], outward[system.path.times[outward] < 0.0]):
         # a formula may have values again behind a gap, but no motion leads there
