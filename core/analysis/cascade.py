@@ -62,8 +62,8 @@ class Cascade:
         frame = frames(mechanism)
         self.parts = components(mechanism, frame) if parts is None else parts
         self.unit = max(part.extent for part in self.parts) or frame.unit
-        x: Vector
-        origins = {name: x for name, origin in frame.origins.items() if (x := _triple(frame.unit * origin))}
+        metres = {name: frame.unit * origin for name, origin in frame.origins.items()}
+        origins: dict[str, Vector] = {name: (origin.x, origin.y, origin.z) for name, origin in metres.items()}
         driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
         self.points: list[list[str]] = [[] for _ in self.parts]
         self.part_of = {name: k for k, part in enumerate(self.parts) for name in part.bodies}
@@ -194,8 +194,3 @@ class Lanes:
             for source, target in plan.carried:
                 slots, values = next(each for each in tables if source in each[0])
                 fixed[:, tables[-1][0].index(target)] = values[:, slots.index(source)]
-
-
-def _triple(v: Sequence[float] | object) -> Vector:
-    x, y, z = v  # pyright: ignore[reportGeneralTypeIssues, reportUnknownVariableType]
-    return float(x), float(y), float(z)  # pyright: ignore[reportUnknownArgumentType]

@@ -143,6 +143,10 @@ class _Scrutiny:
         if not len(indices):
             return
         visited = self._visit(indices.tolist())
+        self._lost([k for k in indices.tolist() if k not in visited])
+        if not visited:
+            return
+        indices = np.array(sorted(visited), np.intp)
         lanes = np.stack([visited[k] for k in indices.tolist()], axis=1)
         state, sample = self.system.state(lanes), self.route.sampled(self.times[indices])
         solved = solve_closely(self.system, state, sample)
@@ -163,6 +167,14 @@ class _Scrutiny:
         refused = [at for at in doubted if at not in passed]
         if refused:
             self._refuse(indices[refused], state[:, refused], sample[:, refused], solved.error[: self.model.orders, refused])
+
+    def _lost(self, samples: list[int]) -> None:
+        """Refuse doubtful samples that are not reached a second time: rounding alone had them accepted."""
+        if samples:
+            self.found.kept[:, samples], self.found.solved[samples] = np.nan, False
+            places = listed([self._where(float(self.times[k])) for k in samples])
+            why = f"reached once and not again, so near are residuals to the tolerance {self.tol:.3g}; allow more"
+            self.findings.messages.append(f"refused at {places}: {why}")
 
     def _passed(self, k: int, state: Array, sample: Array) -> bool:
         """Put what the motion has on both sides of a sample in its place, where it goes on."""
@@ -273,8 +285,8 @@ class _Scrutiny:
             return self.route.departure if self.route.from_design else None
         nearest = int(good[away[good].argmax()])
         if nearest not in self._stood:
-            self._stood[nearest] = self._visit({nearest})[nearest]
-        return self._stood[nearest]
+            self._stood |= self._visit({nearest})
+        return self._stood.get(nearest)
 
     def _where(self, time: float) -> str:
         return self.route.path.where(time)

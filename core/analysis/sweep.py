@@ -36,7 +36,7 @@ def follow(route: Route, tol: float) -> Trajectory:
     return Trajectory(
         points={name: _point(model, found, name) for name in model.request.points},
         solved=found.solved,
-        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
+        iterations=np.where(found.solved, iterations, 0.0).astype(np.int64),
         residual=closure * model.frame.unit,
         message=message,
         details=details,
