@@ -203,13 +203,13 @@ def test_errors_do_not_grow_over_a_thousand_turns():
     assert 0.0 < last < 2.0 * first < 0.1
 
 
-@pytest.mark.xfail(reason="the native solver steps over gaps between two solutions that are narrower than a millionth of a radian")
+
 def test_nothing_nearly_singular_is_silently_wrong():
     found, _ = stress([FAMILIES["singular"]], [Interpreted(NATIVE)], samples=150, seed=0, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
-@pytest.mark.xfail(reason="the native solver takes steps from one side of a gap to the other")
+
 @pytest.mark.parametrize("name", ["four_bar_in_one_step", "kite", "loop_of_eight_bodies"])
 def test_what_was_silently_wrong_is_so_no_longer(name):
     """The smallest mechanisms found so far, a sample each."""

@@ -23,10 +23,9 @@ from ..primitives.base import Pose
 from ..program import NumpyExecutor, Plan, Program, program
 from ..trajectory import Array, BodyMotion
 from .equations import Style
-from .march import CONSISTENT
 from .poses import displaced, state_of
 from .programs import Tracer
-from .request import Request
+from .request import CONSISTENT, Request
 
 MAX_ITERATIONS = 100
 # mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies far, more takes twice the steps.

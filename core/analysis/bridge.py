@@ -1,8 +1,9 @@
 """Over a singular pose: the motion on both sides of it, and by interpolation the pose itself, where the motion goes on.
 
 At the pose its own equations say too little, but the motion is smooth there. Eight poses beside it, followed from before to beyond,
-give it by Lagrange's formula; if they are of two different motions, or the motion turns back, the formula does not hold or there
-are no eight.
+give it by Lagrange's formula. If they are of two different motions, or the motion turns back, the formula does not hold or there
+are no eight. If the motion turns round a corner that is too narrow to be seen from there, or there is a gap as narrow, a pose that
+the motion was followed to right before it is not where the formula has it.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from .continuity import AMPLIFIED, EPSILON, PIVOT
 from .march import Route, arrived, march
 from .model import TESTS, Model
 from .request import FROM, RATE, TIME
+from .singularity import solve_closely
 
 # The motion from each of the eight to the next [units of the mechanism's size, rad]. Long ways cost accuracy by the motion's
 # curvature, short ones by the poses' own nearness to the singular one; the first that is accurate enough is taken.
@@ -35,7 +37,7 @@ class Bridge:
     """A singular pose that a motion passes.
 
     Attributes:
-        kept: the kept rows there (`Model.rows`), shape (kept,); motions only, its tests are NaN.
+        kept: the kept rows there (`Model.rows`), shape (kept,); its tests are those of a pose right before it.
         off: bound of its errors: of the pose by the mechanism's size, of rates by their own.
         beyond: a lane that stands beyond it.
     """
@@ -51,24 +53,53 @@ def onward(route: Route, lane: Array, times: Array) -> Route:
     return Route(route.model, Path(route.path.motions, times, route.path.design), arrived(route.model, lane), since)
 
 
-def bridge(route: Route, lane: Array, time: float, tol: float) -> Bridge | None:
-    """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not known well enough."""
+def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | None = None) -> Bridge | None:
+    """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not known well enough.
+
+    Args:
+        near: a lane that stands there, where the motion was followed to, at or right before the singular pose: it must be on the
+            same curve. Without one, only what is interpolated may be believed, and not that the motion goes on.
+    """
     model = route.model
     speed = float(np.abs(lane[model.vectors[FROM + RATE]]).max())
     side = 1.0 if time >= lane[model.slots[FROM + TIME]] else -1.0
     for node in NODES if speed > 0.0 else ():
-        found = march(onward(route, lane, time + side * node / speed * PLACES), tol, visit={len(PLACES) - 1})
-        if not found.solved.all():
+        found = _eight(route, lane, time + side * node / speed * PLACES, tol)
+        if found is None:
             continue
-        closure, pivot = (found.kept[model.rows[name].start] for name in ("closure", "pivot"))
+        whole, lanes = found
+        closure, pivot = (whole[model.rows[name].start] for name in ("closure", "pivot"))
         own = PIVOT * float((np.maximum(closure, EPSILON) / np.abs(pivot)).max())
-        differences = np.abs(found.kept @ (EIGHT - SIX))
-        off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in _scales(model, found.kept, speed))])
-        if off <= AMPLIFIED * tol:
-            kept = found.kept @ EIGHT
-            kept[model.rows[TESTS[0]].start :] = np.nan
-            return Bridge(kept, off, found.visited[len(PLACES) - 1])
+        differences = np.abs(whole @ (EIGHT - SIX))
+        off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in _scales(model, whole, speed))])
+        if off <= AMPLIFIED * tol and (near is None or _on_curve(route, lanes, near)):
+            kept = whole @ EIGHT
+            tests = slice(model.rows[TESTS[0]].start, None)
+            kept[tests] = whole[tests, 3]
+            return Bridge(kept, off, lanes[:, -1])
     return None
+
+
+def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, Array] | None:
+    """What is kept of poses at eight times, and lanes that stand there; a singular pose lies between the fourth and the fifth."""
+    before = march(onward(route, lane, times[:4]), tol, visit=range(4))
+    if not before.solved.all():
+        return None
+    beyond = march(onward(route, before.visited[3], times[4:]), tol, visit=range(4), crossing=True)
+    signs = np.sign(beyond.kept[route.model.rows["pivot"].start])
+    if not (beyond.solved.all() and (signs == signs[0]).all()):
+        return None
+    lanes = [march.visited[k] for march in (before, beyond) for k in range(4)]
+    return np.hstack([before.kept, beyond.kept]), np.stack(lanes, axis=1)
+
+
+def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
+    """Whether the pose of a lane at the middle time is that of the polynomial through eight others."""
+    time = near[[route.model.slots[FROM + TIME]]]
+    solved = solve_closely(route.system, route.system.state(near[:, None]), route.sampled(time))
+    eight = route.system.state(lanes)
+    off, known = np.abs(eight @ EIGHT - solved.state[:, 0]), COVERED * np.abs(eight @ (EIGHT - SIX))
+    return bool((off <= known + PIVOT * solved.error[0, 0]).all())
 
 
 def _scales(model: Model, kept: Array, speed: float) -> Iterator[tuple[slice, float]]:

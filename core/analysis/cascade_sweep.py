@@ -12,8 +12,9 @@ from ..errors import SolveError
 from ..motions import Path
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .cascade import Cascade, Lanes
-from .march import CONSISTENT, HALVINGS, MAX_ROUNDS
+from .march import HALVINGS, MAX_ROUNDS
 from .model import CLOSED
+from .request import accept_by
 
 # Samples at once: enough to share a call's overhead, few enough for the world of ten thousand bodies to stay below 100 MB.
 LANES = 32
@@ -67,7 +68,7 @@ class CascadeSweep:
                     into[at] = np.abs(each).min(axis=0) if name == "pivot" else each.max(axis=0)
 
             lanes.anchor = departure
-            lanes.accept_by({"tolerance": tol, "consistent": max(CONSISTENT, tol)})
+            lanes.accept_by(accept_by(tol))
             message = self._follow(path.times[order], start, path, keep)
             messages += [message] if message else []
         return self._trajectory(found, tests, messages)
@@ -76,7 +77,7 @@ class CascadeSweep:
     def _departure(self) -> tuple[float, list[Array], str]:
         """Where the sweep starts: the time, what is predicted from, and why it cannot be reached if it cannot."""
         lanes, path, start, message = self._lanes, self.path, 0.0, ""
-        lanes.accept_by({"tolerance": CLOSED, "consistent": CONSISTENT})
+        lanes.accept_by(accept_by(CLOSED))
         if not path.from_design:
             way = path.lead_in()
             start = float(path.times[0])

@@ -10,17 +10,23 @@ from ..trajectory import Array
 # Along one motion the trapezoidal rule predicts the change between neighbours; on a sinusoid sampled every 70 degrees it is
 # off by 13 %. A step that is off by more than a quarter is divided and tried again, so a coarse grid costs steps, not samples.
 LARGEST_DEVIATION = 0.25
-# Changes below this part of the mechanism's size are not another assembly.
-NEGLIGIBLE = 1e-6
+# Changes below this part of the mechanism's size are not another assembly: as well is a pose known where it is followed (FOLLOWED).
+NEGLIGIBLE = 1e-8
 # A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or
 # parts of the mechanism's size, says nothing of what is between: a whole turn ends where it began, on whatever assembly.
 LONGEST_STEP = 0.5
+# Nor does a step over which the smallest pivot changes by more than this factor, or changes its sign: beside a singular pose rates
+# change as fast. Steps towards it get shorter and shorter, and nothing there is stepped over.
+LARGEST_RATIO = 4.0
 # Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9
 # m that outputs are held to.
 AMPLIFIED = 1e3
 # Partial pivoting leaves a smallest pivot of no less than sigma; over the case library it is 1.5 to 14 times as much.
 PIVOT = 30.0
 EPSILON = float(np.finfo(np.float64).eps)
+# A motion is followed as long as rounding leaves its rates uncertain by less than this part: nearer to a singular pose it seems to
+# turn any way, also into another motion that crosses it there. The pivot is then 1e-6 of the largest that it has had.
+FOLLOWED = 1e-2
 
 
 def doubtful(pivot: float, closure: float, tol: float) -> bool:

@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from ..motions import Path
 from ..program import MARGIN
 from ..trajectory import Array
+from .continuity import EPSILON, FOLLOWED, LARGEST_RATIO, PIVOT
 from .model import Model
-from .request import FROM, TIME
+from .request import FROM, LARGEST_PIVOT, TIME, accept_by
 from .system import System
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
-# A failing step is tried at its halves, quarters, ... down to this many halvings, all at once.
-HALVINGS = 16
+# A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
+# passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
+HALVINGS = 40
 # A side that needs more rounds than this without reaching a sample makes no headway.
 MAX_ROUNDS = 200
-# Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.
-CONSISTENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,14 +164,14 @@ class Route:
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
 
 
-def march(route: Route, tol: float, visit: Collection[int] = ()) -> March:
+def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bool = False) -> March:
     """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance.
 
     Args:
-        visit: samples at which the lane that stands there is wanted.
+        visit: samples at which the lane that stands there is wanted, and beyond which nothing is.
+        crossing: accept steps across singular poses, whatever is there.
     """
-    model, path = route.model, route.path
-    tolerances = {"tolerance": tol, "consistent": max(CONSISTENT, tol)}
+    model, path, tolerances = route.model, route.path, accept_by(tol, crossing=crossing)
     if route.from_design:
         return _Marcher(route, route.departure, tolerances, visit).run()
     way = Route(model, path.lead_in(), route.design)
@@ -188,6 +188,8 @@ def arrived(model: Model, lane: Array) -> Array:
     found = lane.copy()
     for name in model.state:
         found[model.vectors[name]] = lane[model.vectors[FROM + name]]
+    for name in ("pivot", LARGEST_PIVOT):
+        found[model.slots[name]] = lane[model.slots[FROM + name]]
     return found
 
 
@@ -222,14 +224,12 @@ class _Marcher:
         """Follow one side to its last sample, the anchor going along; None, or where and why it ends before."""
         n, at, rounds, margin = len(side.times), 0, 0, self.executor.margin
         stops = self._stops(side)
-        while True:
+        while stops:
             first = side.first + side.step * at + margin
             went = self.executor.follow(anchor, side.samples[:, at : stops[0] + margin], self.whole, first, side.step)
             at += went
             if at == stops[0]:
                 self._stand(side, stops.pop(0), anchor)
-                if not stops:
-                    return None
                 continue
             rounds = 0 if went else rounds + 1
             failed = self._divide(anchor, float(side.times[at]))
@@ -238,15 +238,16 @@ class _Marcher:
                 self.kept[:, columns], self.solved[columns] = np.nan, False
                 message = self._end(side, at, anchor, failed or "the parts of the step get smaller and smaller")
                 return End(message, self.route, anchor.copy(), float(side.times[at]))
+        return None
 
     def _stops(self, side: Side) -> list[int]:
-        """How many samples of a side have passed where one to visit has; its end is the last."""
+        """How many samples of a side have passed where one to visit has; without any, at its end."""
         n = len(side.times)
         if not self.visit:
             return [n]
         place = np.argsort(self.route.order)
         passed = {int((place[k] - side.first) * side.step) + 1 for k in self.visit}
-        return sorted({count for count in passed if 1 <= count <= n} | {n})
+        return sorted(count for count in passed if 1 <= count <= n)
 
     def _stand(self, side: Side, passed: int, anchor: Array) -> None:
         if self.visit:
@@ -294,4 +295,8 @@ class _Marcher:
             return f"the redundant rows ({names}) contradict the others by {leftover:.3g}"
         if closure > tol:
             return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
+        pivot, before, largest = (float(lane[self.slots[name]]) for name in ("pivot", FROM + "pivot", LARGEST_PIVOT))
+        uncertain = FOLLOWED * pivot**2 <= PIVOT * largest * max(closure, EPSILON)
+        if uncertain or not 1.0 / LARGEST_RATIO < pivot / before < LARGEST_RATIO:
+            return "there is a singular pose ahead"
         return "Newton jumps to another assembly"

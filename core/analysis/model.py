@@ -17,12 +17,12 @@ from ..program.compiled import available
 from ..trajectory import Array
 from .components import Section
 from .programs import Tracer
-from .request import EARLIER, FROM, RATE, RATE_T, TIME, Request
+from .request import EARLIER, FROM, LARGEST_PIVOT, RATE, RATE_T, TIME, Request
 
 MAX_ITERATIONS = 12
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
-TESTS = ("closure", "leftover", "branch", "pivot", ITERATIONS, MARGIN)
+TESTS = ("closure", "leftover", "branch", "pivot", LARGEST_PIVOT, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
 
 

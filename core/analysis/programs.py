@@ -35,13 +35,13 @@ from ..program import (
 )
 from .cartesian import Cartesian, Given
 from .components import Section, select_section
-from .continuity import LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE
+from .continuity import EPSILON, FOLLOWED, LARGEST_DEVIATION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, PIVOT
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
 from .geometry import placed, places
 from .relative import Relative
-from .request import EARLIER, FROM, GIVEN, RATE, RATE_T, TIME, Layout, Request
+from .request import ACCEPT, EARLIER, FROM, GIVEN, LARGEST_PIVOT, RATE, RATE_T, TIME, Layout, Request
 
 EULER_PARAMETERS = 4
 ABOUT = 1.5
@@ -137,8 +137,8 @@ class Tracer:
         sizes |= {f"predicted {name}": count for name, count in sizes.items()}
         sizes |= {RATE: self.unknowns, RATE_T: self.unknowns}
         pairs = [(self.layout.scalar(FROM + TIME), self.layout.scalar(EARLIER + TIME))]
-        pairs += [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, "pivot")]
-        pairs += [(self.layout.scalar(name), self.layout.scalar(name)) for name in ("tolerance", "consistent")]
+        pairs += [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, "pivot", LARGEST_PIVOT)]
+        pairs += [(self.layout.scalar(name), self.layout.scalar(name)) for name in ACCEPT]
         for name, count in sizes.items():
             pairs += zip(self.layout.vector(name, count), self.layout.vector(FROM + name, count), strict=True)
         return pairs
@@ -174,7 +174,8 @@ class Tracer:
         redundant rows, and continues the motion it is predicted from.
 
         The last is seen from the correction that Newton made of the prediction: it changes from the lane before, or where lanes
-        are no neighbours from nothing at the start, by much less than the pose does. No lane is taken that is far from there.
+        are no neighbours from nothing at the start, by much less than the pose does. No lane is taken that is far from there, nor
+        one beyond a singular pose: whether the motion passes it, or turns round a corner before it, is not seen from afar.
         """
         gap: Scalar = 0.0
         moved: Scalar = 0.0
@@ -186,16 +187,23 @@ class Tracer:
                 gap = maximum(gap, absolute((x - predicted) - (x_before - predicted_before)))
                 moved = maximum(moved, absolute(x - x_before))
                 reach = maximum(reach, absolute(x - start))
-        tol, consistent = self._in("tolerance"), self._in("consistent")
+        tol, consistent, crossing = (self._in(label) for label in ACCEPT)
+        closure, pivot, pivot_before = self._in("closure"), self._in("pivot"), self._in(FROM + "pivot")
+        largest = maximum(absolute(pivot), self._in(FROM + LARGEST_PIVOT))
+        if neighbours:
+            pivot_before = before(pivot, pivot_before)
         margins = (
             self._in(DONE) - 0.5,
-            tol - self._in("closure"),
+            tol - closure,
             consistent - self._in("leftover"),
             self._in("branch"),
             LARGEST_DEVIATION * moved + NEGLIGIBLE - gap,
             LONGEST_STEP - reach,
+            (LARGEST_RATIO * pivot - pivot_before) * (LARGEST_RATIO * pivot_before - pivot) + crossing,
+            FOLLOWED * pivot * pivot - (PIVOT * largest) * maximum(closure, EPSILON),
         )
-        return program(name, self.tape, {self.layout.scalar(MARGIN): reduce(minimum, margins)}, self.prepared)
+        out = {self.layout.scalar(MARGIN): reduce(minimum, margins), self.layout.scalar(LARGEST_PIVOT): largest}
+        return program(name, self.tape, out, self.prepared)
 
     def outputs(self) -> Program:
         """The wanted motions, and the tests of a solution: closure, redundant rows, branch."""

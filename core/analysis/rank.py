@@ -19,8 +19,8 @@ from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
 from .equations import Constraint, Style, constraints, frames
 from .freedom import RANK_TOLERANCE, FreedomAccount, account, independent_rows
-from .march import CONSISTENT
 from .poses import jacobian
+from .request import CONSISTENT
 from .screws import Screw, free_motions, screws
 
 # What a row owes to another below this is round-off of an orthogonalisation.

@@ -44,6 +44,21 @@ GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 FROM, EARLIER = "from ", "earlier "
 """Before the names of what a lane is predicted from, and of what that was predicted from."""
 
+LARGEST_PIVOT = "largest pivot"
+"""The slot of the largest size that the smallest pivot has had so far: the scale on which it is small."""
+ACCEPT = ("tolerance", "consistent", "crossing")
+"""The slots that a lane is accepted by."""
+# Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.
+CONSISTENT = 1e-9
+
+
+def accept_by(tol: float, *, crossing: bool = False) -> dict[str, float]:
+    """The numbers of `ACCEPT`: the largest residual of rows, that of redundant rows, and whether a singular pose may be crossed.
+
+    The last is more than all that a product of two pivots can lack to be accepted: they are at most one.
+    """
+    return dict(zip(ACCEPT, (tol, max(CONSISTENT, tol), 32.0 if crossing else 0.0), strict=True))
+
 
 class Layout:
     """Where everything stands in a lane: slots are numbered as they are first asked for."""

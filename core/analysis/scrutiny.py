@@ -7,7 +7,6 @@ errors are computed; where they are too large the sample is interpolated, if the
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,20 +15,23 @@ from numpy.typing import NDArray
 
 from ..motions import Path
 from ..trajectory import Array
-from .bridge import bridge, onward
+from .bridge import bridge
 from .continuation import limit_ahead
-from .continuity import AMPLIFIED, EPSILON, PIVOT
-from .march import End, March, Route, march
+from .continuity import AMPLIFIED, PIVOT
+from .followed import Followed, Passage
+from .march import End, March, Route
+from .model import TESTS
 from .request import FROM, TIME
 from .singularity import Singularity, examine, listed, solve_closely
 
-# Of one march: a crossing takes a few milliseconds to be located, and a thousand turns may cross a thousand times.
-LOCATED = 8
+# Of one march: the others are counted.
+NAMED = 8
 # A fine sweep has some tens of samples beside a singular pose that cannot be told from it.
 BRIDGED = 64
-PARTS, ROUNDS = 17, 3  # a prime number of parts: few of them end where it is singular
 # Unknowns up to which a dense decomposition is worth its time, a second.
 LARGEST = 1000
+# A passage is found this near to the sample that it is at, by the time or one.
+BESIDE = 1e-6
 CONTINUED = "the branch followed is the continuation of the motion"
 
 
@@ -64,38 +66,28 @@ class Findings:
 
 def scrutinise(route: Route, found: March, tol: float) -> Findings:
     """Solve doubtful samples again, in place, and those beyond an end that the motion passes; say what was found."""
-    scrutiny = _Scrutiny(route, found, tol)
+    scrutiny = _Scrutiny(Followed(route, found, tol))
     if len(route.model.selection.kept) > LARGEST:
         return scrutiny.too_large()
-    ends = scrutiny.resume()
+    scrutiny.followed.go_on()
     scrutiny.samples()
-    scrutiny.crossings()
-    for end in ends:
+    scrutiny.stuck()
+    scrutiny.passages()
+    for end in scrutiny.followed.ends:
         scrutiny.end(end)
     return scrutiny.findings
 
 
 class _Scrutiny:
-    """Attributes: parts: the routes that the samples were followed on; part_of: the one of each sample, shape (n,)."""
-
-    def __init__(self, route: Route, found: March, tol: float) -> None:
-        self.route, self.found, self.tol = route, found, tol
-        self.model, self.system, self.times = route.model, route.system, route.path.times
-        self.limit = AMPLIFIED * tol
+    def __init__(self, followed: Followed) -> None:
+        self.followed, self.route, self.found, self.tol = followed, followed.route, followed.found, followed.tol
+        self.model, self.system, self.times = self.route.model, self.route.system, self.route.path.times
+        self.limit = AMPLIFIED * self.tol
         self.findings = Findings()
-        self._stood: dict[int, Array] = {}
-        self.parts: list[tuple[Route, NDArray[np.intp]]] = [(route, np.arange(len(self.times)))]
-        self.part_of = np.zeros(len(self.times), dtype=np.intp)
-
-    @property
-    def doubtful(self) -> NDArray[np.bool_]:
-        """Samples that were reached and may be wrong, shape (n,)."""
-        closure, pivot = (self.found.kept[self.model.rows[name].start] for name in ("closure", "pivot"))
-        return self.found.solved & (PIVOT * np.maximum(closure, EPSILON) > self.limit * pivot**2)
 
     def too_large(self) -> Findings:
         """Say that nothing was examined."""
-        count = int(self.doubtful.sum())
+        count = int(self.followed.doubtful.sum())
         if count:
             self.findings.notes.append(
                 f"{count} samples are nearly singular by their pivots, and were not examined: {self.system.unknowns} unknowns are "
@@ -104,45 +96,14 @@ class _Scrutiny:
         self.findings.messages += self.found.messages
         return self.findings
 
-    # Ends that are none
-
-    def resume(self) -> list[End]:
-        """Go on beyond singular poses that the motion passes; the ends that remain."""
-        waiting, remaining = [*self.found.ends], list[End]()
-        while waiting:
-            end = waiting.pop(0)
-            further = self._beyond(end) if end.route in [route for route, _ in self.parts] else None
-            if further is None:
-                remaining.append(end)
-            else:
-                waiting = [*further, *waiting]
-        return remaining
-
-    def _beyond(self, end: End) -> tuple[End, ...] | None:
-        here, start = float(end.lane[self.model.slots[FROM + TIME]]), self.route.start
-        side = 1.0 if end.wanted > here else -1.0
-        lane = self._before(here, side)
-        passed = bridge(self.route, lane, here, self.tol) if lane is not None else None
-        if passed is None:
-            return None
-        samples = np.flatnonzero(~self.found.solved & (side * (self.times - start) >= side * (end.wanted - start)))
-        route = onward(self.route, passed.beyond, self.times[samples])
-        found = march(route, self.tol)
-        if not found.solved.any():
-            return None
-        self.found.kept[:, samples], self.found.solved[samples] = found.kept, found.solved
-        self.part_of[samples] = len(self.parts)
-        self.parts.append((route, samples))
-        return found.ends
-
     # Samples
 
     def samples(self) -> None:
         """Solve doubtful samples closely; interpolate or refuse those that remain in doubt."""
-        indices = np.flatnonzero(self.doubtful)
+        indices = np.flatnonzero(self.followed.doubtful)
         if not len(indices):
             return
-        visited = self._visit(indices.tolist())
+        visited = self.followed.visit(indices.tolist())
         self._lost([k for k in indices.tolist() if k not in visited])
         if not visited:
             return
@@ -163,7 +124,7 @@ class _Scrutiny:
         doubted: list[int] = np.flatnonzero(~good).tolist()
         # a motion passes singular poses one by one; where all its samples are nearly singular there is nothing to pass
         tried = doubted if len(doubted) <= BRIDGED else []
-        passed = {at for at in tried if self._passed(int(indices[at]), state[:, [at]], sample[:, [at]])}
+        passed = {at for at in tried if self._passed(int(indices[at]), lanes[:, at])}
         refused = [at for at in doubted if at not in passed]
         if refused:
             self._refuse(indices[refused], state[:, refused], sample[:, refused], solved.error[: self.model.orders, refused])
@@ -176,20 +137,37 @@ class _Scrutiny:
             why = f"reached once and not again, so near are residuals to the tolerance {self.tol:.3g}; allow more"
             self.findings.messages.append(f"refused at {places}: {why}")
 
-    def _passed(self, k: int, state: Array, sample: Array) -> bool:
+    def stuck(self) -> None:
+        """Interpolate samples beside passages that neither side could reach, or refuse them."""
+        stuck = [each for each in self.followed.stuck if not self.found.solved[each.sample]]
+        for each in stuck[:BRIDGED]:
+            self.found.solved[each.sample] = self._bridged(each.sample, each.before, each.near, passed=True)
+        for each in stuck:
+            k = each.sample
+            if not self.found.solved[k]:
+                state, sample = self.system.state(each.near[:, None]), self.route.sampled(self.times[[k]])
+                self._refuse(np.array([k]), state, sample, np.full((1, 1), self.tol**0.5))
+
+    def _passed(self, k: int, near: Array) -> bool:
         """Put what the motion has on both sides of a sample in its place, where it goes on."""
+        time, number = float(self.times[k]), int(self.followed.part_of[k])
+        side = 1.0 if time >= self.followed.parts[number].route.start else -1.0
+        lane = self.followed.before(time, side, number)
+        return lane is not None and self._bridged(k, lane, near)
+
+    def _bridged(self, k: int, lane: Array, near: Array, *, passed: bool = False) -> bool:
         time = float(self.times[k])
-        lane = self._before(time, 1.0 if time >= self.route.start else -1.0)
-        passed = bridge(self.route, lane, time, self.tol) if lane is not None else None
-        if passed is None:
+        found = bridge(self.route, lane, time, self.tol, None if passed else near)
+        if found is None:
             return False
-        motions = ~np.isnan(passed.kept)
-        self.found.kept[motions, k] = passed.kept[motions]
-        singularity = examine(self.system, state, sample)
+        tests = self.model.rows[TESTS[0]].start
+        wanted = slice(None if passed else tests)  # a sample that was reached has tests of its own
+        self.found.kept[wanted, k] = found.kept[wanted]
+        singularity = examine(self.system, self.system.state(near[:, None]), self.route.sampled(np.array([time])))
         self._say("passed", time, singularity, k)
         self.findings.notes.append(
             f"passes a singular pose at {self._where(time)}: {singularity.words}; {CONTINUED}, interpolated there to "
-            f"{passed.off:.1g} of the mechanism's size and of the rates"
+            f"{found.off:.1g} of the mechanism's size and of the rates"
         )
         return True
 
@@ -207,47 +185,28 @@ class _Scrutiny:
             f"{self._where(float(self.times[indices[worst]]))}), allowed {self.limit:.2g}; {singularity.words}; keep away from it"
         )
 
-    # Crossings
+    # Passages
 
-    def crossings(self) -> None:
-        """Say between which samples the determinant of the rows changes its sign."""
-        signs = np.sign(self.found.kept[self.model.rows["pivot"].start]) * (1.0 if self.route.ahead else -1.0)
-        away, sure = self.times - self.route.start, self.found.solved & ~self.doubtful
-        changes: list[tuple[float, float]] = []
-        for side, there in ((1.0, away >= 0.0), (-1.0, away < 0.0)):
-            order = np.flatnonzero(there & sure)
-            order = order[np.argsort(side * away[order], kind="stable")]
-            along, times = np.append(1.0, signs[order]), np.append(self.route.start, self.times[order])
-            changes += [(float(times[at]), float(times[at + 1])) for at in np.flatnonzero(along[1:] != along[:-1]).tolist()]
-        passed = [pose["time"] for pose in self.findings.poses if pose["outcome"] == "passed"]
-        changes = [(a, b) for a, b in changes if not any(min(a, b) < t < max(a, b) for t in passed)]
-        for here, there in changes[:LOCATED]:
-            self._crossed(here, there)
-        if len(changes) > LOCATED:
-            self.findings.notes.append(f"crosses {len(changes) - LOCATED} more singular poses, between samples")
+    def passages(self) -> None:
+        """Say what was passed between samples."""
+        said = [pose["time"] for pose in self.findings.poses if pose["outcome"] == "passed"]
+        others = [each for each in self.followed.passages if not any(abs(each.time - t) <= BESIDE * (1.0 + abs(t)) for t in said)]
+        for each in others[:NAMED]:
+            self._crossed(each)
+        if len(others) > NAMED:
+            self.findings.notes.append(f"crosses {len(others) - NAMED} more singular poses, between samples")
 
-    def _crossed(self, here: float, there: float) -> None:
-        lane = self._before(there, 1.0 if there >= self.route.start else -1.0)
-        if lane is None:
-            self.findings.notes.append(f"crosses a singular pose on the way to {self._where(there)}; {CONTINUED}")
-            return
-        a, b, sign = here, there, float(np.sign(lane[self.model.slots[FROM + "pivot"]]))
-        for _ in range(ROUNDS):
-            times = a + (b - a) * np.arange(1, PARTS + 1) / PARTS
-            found = march(onward(self.route, lane, times), self.tol, visit=range(PARTS))
-            good = found.solved & (np.sign(found.kept[self.model.rows["pivot"].start]) == sign)
-            first = PARTS - 1 if good.all() else int((~good).argmax())
-            if first:
-                lane, a = found.visited[first - 1], float(times[first - 1])
-            if not found.solved[first]:
-                break
-            b = float(times[first])
-        singularity = examine(self.system, self.system.state(lane[:, None]), self.route.sampled(np.array([a])))
-        self._say("crossed", 0.5 * (a + b), singularity)
-        self.findings.notes.append(
-            f"crosses a singular pose between {self._where(here)} and {self._where(there)}, near {self._where(0.5 * (a + b))}; at "
-            f"{self._where(a)} {singularity.words}; {CONTINUED}"
-        )
+    def _crossed(self, passage: Passage) -> None:
+        path, time, where = passage.route.path, passage.time, passage.route.path.where
+        singularity = examine(self.system, self.system.state(passage.lane[:, None]), passage.route.sampled(np.array([time])))
+        self._say("crossed", time, singularity, path=path)
+        if path.motions is self.route.path.motions:
+            places = np.append(self.times, self.route.start)
+            low, high = (where(float(side)) for side in (places[places <= time].max(), places[places >= time].min()))
+            beside = f"between {low} and {high}, "
+        else:
+            beside = "on the way to the first sample, "
+        self.findings.notes.append(f"crosses a singular pose {beside}near {where(time)}: {singularity.words}; {CONTINUED}")
 
     # Ends
 
@@ -265,28 +224,6 @@ class _Scrutiny:
             f"{end.message}; the limit of travel is {path.where(ahead.value)}: {ahead.singularity.words}; kincheck trace goes "
             "on beyond"
         )
-
-    # Places
-
-    def _visit(self, samples: Collection[int]) -> dict[int, Array]:
-        """Lanes that stand at samples."""
-        found: dict[int, Array] = {}
-        for number, (route, own) in enumerate(self.parts):
-            wanted = {at for at, k in enumerate(own.tolist()) if k in samples and self.part_of[k] == number}
-            if wanted:
-                found |= {int(own[at]): lane for at, lane in march(route, self.tol, visit=wanted).visited.items()}
-        return found
-
-    def _before(self, time: float, side: float) -> Array | None:
-        """The lane of the last sample before a time, going out from the start, that is not in doubt; or of the start, if known."""
-        away = side * (self.times - self.route.start)
-        good = np.flatnonzero(self.found.solved & ~self.doubtful & (away >= 0.0) & (away < side * (time - self.route.start)))
-        if not len(good):
-            return self.route.departure if self.route.from_design else None
-        nearest = int(good[away[good].argmax()])
-        if nearest not in self._stood:
-            self._stood |= self._visit({nearest})
-        return self._stood.get(nearest)
 
     def _where(self, time: float) -> str:
         return self.route.path.where(time)

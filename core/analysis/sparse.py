@@ -26,9 +26,9 @@ from .elements import Elements, Indices
 from .equations import Frames, constraints, frames, joint_points
 from .factors import Factors, SingularError
 from .freedom import RANK_TOLERANCE
-from .march import CONSISTENT
 from .model import CLOSED, MAX_ITERATIONS
 from .programs import ABOUT
+from .request import CONSISTENT
 from .sparse_rows import Jacobian
 
 # An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ..motions import Path
 from ..program import Executor
 from ..trajectory import Array
-from .march import CONSISTENT, Route, march
+from .march import Route, march
+from .request import accept_by
 
 # Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
 # it is too long is solved again alone.
@@ -52,8 +53,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     model, n, count = route.model, len(route.path.times), geometry.shape[1]
     executor = model.executor(count)
     closes = model.stand(executor, geometry)
-    tolerances = np.array([[tol], [max(CONSISTENT, tol)]])
-    executor.put([model.slots[name] for name in ("tolerance", "consistent")], tolerances)
+    accepted_by = accept_by(tol)
+    executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
     arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
     model.start(executor, route.origin)
     start = executor.get(model.ahead)

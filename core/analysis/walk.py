@@ -20,7 +20,7 @@ import numpy as np
 from ..motions import Path
 from ..trajectory import Array
 from .continuity import LARGEST_DEVIATION
-from .march import CONSISTENT
+from .request import CONSISTENT
 from .system import System
 
 # The tangent turns by less than this [rad] in a step, so that the correction is a tenth of it: another branch is farther away.

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.march import CONSISTENT, Route
+from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
-from ...analysis.request import Request
+from ...analysis.request import Request, accept_by
 from ...analysis.sweep import follow
 from ...errors import SolveError
 from ...program.compiled import available
@@ -93,7 +93,7 @@ def loops_alone(case: Case, tol: float) -> Callable[[], None]:
     model, n = route.model, len(route.path.times)
     executor = model.executor(route.lanes)
     anchor = route.departure.copy()
-    for name, value in (("tolerance", tol), ("consistent", max(CONSISTENT, tol))):
+    for name, value in accept_by(tol).items():
         anchor[model.slots[name]] = value
     out = np.empty((model.kept, n + 2 * executor.margin))
 
