@@ -12,8 +12,10 @@ from ..trajectory import Array
 from .bridge import bridge, onward
 from .continuity import AMPLIFIED, EPSILON, PIVOT
 from .march import End, March, Route, arrived, march
-from .request import FROM, TIME
+from .request import FROM, LARGEST_PIVOT, TIME
 
+# A motion that ends with a smallest pivot above this part of the largest that it has had does not end at a singular pose.
+NEAR = 1e-2
 # Each takes some milliseconds to be passed. A motion that has so many is one of thousands of turns.
 MOST = 1000
 
@@ -94,6 +96,9 @@ class Followed:
 
     def _beyond(self, end: End) -> list[End] | None:
         """What ends the motion beyond an end; None where it does not go on."""
+        slots = self.route.model.slots
+        if abs(end.lane[slots[FROM + "pivot"]]) > NEAR * end.lane[slots[FROM + LARGEST_PIVOT]]:
+            return None
         here, number = self._time(end.lane), self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0
         lane = self.before(here, side, number) if number is not None else end.route.departure

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..motions import Path
 from ..program import MARGIN
 from ..trajectory import Array
-from .continuity import EPSILON, FOLLOWED, LARGEST_RATIO, PIVOT
 from .model import Model
+from .refusal import why_refused
 from .request import FROM, LARGEST_PIVOT, TIME, accept_by
 from .system import System
 
@@ -232,11 +232,11 @@ class _Marcher:
                 self._stand(side, stops.pop(0), anchor)
                 continue
             rounds = 0 if went else rounds + 1
-            failed = self._divide(anchor, float(side.times[at]))
-            if failed or rounds > MAX_ROUNDS:
+            further, reason = self._divide(anchor, float(side.times[at]))
+            if not further or rounds > MAX_ROUNDS:
                 columns = side.first + side.step * np.arange(at, n)
                 self.kept[:, columns], self.solved[columns] = np.nan, False
-                message = self._end(side, at, anchor, failed or "the parts of the step get smaller and smaller")
+                message = self._end(side, at, anchor, reason or "the parts of the step get smaller and smaller")
                 return End(message, self.route, anchor.copy(), float(side.times[at]))
         return None
 
@@ -255,8 +255,8 @@ class _Marcher:
             if sample in self.visit:
                 self.visited[sample] = anchor.copy()
 
-    def _divide(self, anchor: Array, aim: float) -> str:
-        """Go a part of the step to a sample that could not be reached; empty, or why there is none."""
+    def _divide(self, anchor: Array, aim: float) -> tuple[bool, str]:
+        """Go a part of the step to a sample that could not be reached; whether there is one, and why the shortest refused is."""
         here = float(anchor[self.slots[FROM + TIME]])
         times: Array = here + (aim - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
         parts = self.model.executor(HALVINGS)
@@ -267,9 +267,10 @@ class _Marcher:
         lanes = parts.get(every)
         good = np.flatnonzero(lanes[self.slots[MARGIN]] > 0.0)
         if not len(good):
-            return self._reason(lanes[:, -1])
+            return False, why_refused(self.model, lanes[:, -1])
+        reason = why_refused(self.model, lanes[:, good[0] - 1]) if good[0] else ""
         anchor[:] = self.model.moving(lanes[:, good[0]], lanes[self.model.sampled, good[0]])
-        return ""
+        return True, reason
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
         where = self.route.path.where
@@ -280,23 +281,3 @@ class _Marcher:
             f"{abs(anchor[self.slots[FROM + 'pivot']]):.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "
             "another coordinate"
         )
-
-    def _reason(self, lane: Array) -> str:
-        """Why a lane was not accepted, with the number found."""
-        closure, branch, leftover, tol, consistent = (
-            lane[self.slots[name]] for name in ("closure", "branch", "leftover", "tolerance", "consistent")
-        )
-        if not np.isfinite(closure):
-            return "Newton diverges to numbers that are not finite"
-        if not branch > 0.0:
-            return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
-        if closure <= tol and leftover > consistent:
-            names = ", ".join(self.model.selection.account.redundant_rows)
-            return f"the redundant rows ({names}) contradict the others by {leftover:.3g}"
-        if closure > tol:
-            return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
-        pivot, before, largest = (float(lane[self.slots[name]]) for name in ("pivot", FROM + "pivot", LARGEST_PIVOT))
-        uncertain = FOLLOWED * pivot**2 <= PIVOT * largest * max(closure, EPSILON)
-        if uncertain or not 1.0 / LARGEST_RATIO < pivot / before < LARGEST_RATIO:
-            return "there is a singular pose ahead"
-        return "Newton jumps to another assembly"

@@ -32,6 +32,8 @@ BRIDGED = 64
 LARGEST = 1000
 # A passage is found this near to the sample that it is at, by the time or one.
 BESIDE = 1e-6
+# Above this a smallest singular value explains nothing: rates have all but four of their digits there.
+REGULAR = 1e-2
 CONTINUED = "the branch followed is the continuation of the motion"
 
 
@@ -217,7 +219,10 @@ class _Scrutiny:
         ahead = limit_ahead(self.system, path, state, time, 1 if end.wanted > time else -1, self.tol)
         if ahead is None:
             singularity = examine(self.system, state, end.route.sampled(np.array([time])))
-            self.findings.messages.append(f"{end.message}; there, {singularity.words}")
+            regular = f"the pose is regular there, smallest singular value {singularity.sigma:.3g}"
+            self.findings.messages.append(
+                f"{end.message}; there, {singularity.words}" if singularity.sigma < REGULAR else f"{end.message}; {regular}"
+            )
             return
         self._say("limit", ahead.value, ahead.singularity, path=path)
         self.findings.messages.append(

@@ -1,0 +1,40 @@
+"""Why a lane of a march was not accepted: the tests of `Tracer.test`, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..trajectory import Array
+from .continuity import EPSILON, FOLLOWED, LARGEST_RATIO, PIVOT
+from .model import Model
+from .request import FROM, LARGEST_PIVOT
+
+# Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
+ROUNDING = 64.0 * EPSILON
+
+
+def why_refused(model: Model, lane: Array) -> str:
+    """Why a lane was not accepted, with the number found.
+
+    Args:
+        lane: all its slots.
+    """
+    closure, branch, leftover, tol, consistent = (
+        lane[model.slots[name]] for name in ("closure", "branch", "leftover", "tolerance", "consistent")
+    )
+    if not np.isfinite(closure):
+        return "Newton diverges to numbers that are not finite"
+    if not branch > 0.0:
+        return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
+    if closure <= tol and leftover > consistent:
+        names = ", ".join(model.selection.account.redundant_rows)
+        return f"the redundant rows ({names}) contradict the others by {leftover:.3g}"
+    if tol < closure <= ROUNDING:
+        return f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance {tol:.3g} is less; allow more"
+    if closure > tol:
+        return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
+    pivot, before, largest = (float(lane[model.slots[name]]) for name in ("pivot", FROM + "pivot", LARGEST_PIVOT))
+    uncertain = FOLLOWED * pivot**2 <= PIVOT * largest * max(closure, EPSILON)
+    if uncertain or not 1.0 / LARGEST_RATIO < pivot / before < LARGEST_RATIO:
+        return "there is a singular pose ahead"
+    return "Newton jumps to another assembly"
