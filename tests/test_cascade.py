@@ -1,5 +1,7 @@
 """Components solved one after the other: the same motions as all at once, whatever the mechanism, and programs are shared."""
 
+from pathlib import Path as File
+
 import numpy as np
 import pytest
 from kincheck import cases
@@ -10,6 +12,7 @@ from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.sweep import follow
+from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.motions import Path, Ramp
 
 from .mechanisms import four_bar, mcpherson, slider_crank
@@ -94,3 +97,33 @@ def test_what_it_cannot_take_apart_is_refused():
     with pytest.raises(SolveError, match="not driven enough"):
         Cascade(free, Request((), ()))
     assert isinstance(m.drivers[0], JointAngle)
+
+
+def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
+    """Every loop may fold there; that the motion goes on is said."""
+    loops, turn = 20, np.linspace(-0.1, 2.4, 26)
+    found = CascadeSweep(Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    assert found.solved.all(), found.message
+    expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    assert np.abs(found.points["end"].position - expected).max() <= 1e-13
+    (note,) = found.details["notes"]
+    assert "crosses a singular pose near turn = 1.870" in note
+
+
+def test_a_sample_where_the_links_are_in_line_is_refused():
+    turn = np.array([0.0, 1.8, LEAN + np.pi / 2.0, 1.9, 2.4])
+    found = CascadeSweep(Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    assert found.solved.tolist() == [True, True, False, True, True]
+    assert "refused at turn = 1.87079633: so near a singular pose" in found.message
+
+
+@pytest.mark.parametrize("name", ["kite", "four_bar_in_one_step"])
+def test_a_narrow_gap_is_not_stepped_over(name):
+    """The sample is beyond a gap, or a corner, of less than a thousandth of the step."""
+    case = load_case(File(__file__).parent / "data" / "stress" / f"{name}.toml")
+    found, expected = both(case.mechanism, case.sweep.path, case.points)
+    if expected.solved.all():
+        assert_alike(found, expected)
+    else:
+        assert not found.solved.any()
+        assert "cannot be followed beyond" in found.message

@@ -203,11 +203,9 @@ def test_errors_do_not_grow_over_a_thousand_turns():
     assert 0.0 < last < 2.0 * first < 0.1
 
 
-
 def test_nothing_nearly_singular_is_silently_wrong():
     found, _ = stress([FAMILIES["singular"]], [Interpreted(NATIVE)], samples=150, seed=0, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
-
 
 
 @pytest.mark.parametrize("name", ["four_bar_in_one_step", "kite", "loop_of_eight_bodies"])

@@ -15,6 +15,8 @@ from kincheck.core.analysis.sweep import follow
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path
 
+from .test_chain import LEAN, chain
+
 TOL = 1e-12
 # Two ways to the same pose: the variant's lanes and a model of its own differ in the order of operations, not in equations.
 SAME = 1e-13
@@ -156,3 +158,16 @@ def test_designs_are_solved_as_one_by_one():
 def test_designs_that_make_no_sense_are_refused(geometry, message):
     with pytest.raises(SolveError, match=message):
         solve_designs(strut()[0], "stroke", [0.0], geometry)
+
+
+def test_samples_that_are_nearly_singular_are_refused():
+    """What a run by itself would solve more closely; a study of many does not, and says so."""
+    mechanism, samples = chain(1), [0.0, 1.8, LEAN + np.pi / 2.0 - 1e-4, 1.9]
+    ends = np.array([mechanism.point("end").position]) + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]])
+    found = solve_designs(mechanism, "turn", samples, {"points.end.position": ends})
+    assert found.solved.tolist() == [[True, True, False, False]] * 2
+    assert np.isnan(found.points["end"].position[:, 2:]).all()
+    for message in found.messages.values():
+        assert "cannot be followed beyond turn = 1.8707" in message
+        assert "; refused at 1 samples" in message
+        assert "as at turn = 1.87069633" in message

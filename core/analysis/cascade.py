@@ -21,7 +21,10 @@ from .components import Component, Section, components, section
 from .equations import frames
 from .geometry import places
 from .model import CLOSED, Model, compile_model
-from .request import RATE, RATE_T, Request
+from .request import FROM, LARGEST_PIVOT, RATE, RATE_T, Request
+
+# A pose with smallest pivots above this part of their largest is sound enough to look over a singular pose from.
+SOUND = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +187,35 @@ class Lanes:
             size, first = kind.model.kept, kind.base + kind.model.rows[name].start
             found.append(self.world[first : kind.base + size * len(kind.members) : size])
         return np.concatenate(found)
+
+    def kept(self, *, rates: bool = False) -> Array:
+        """States of all components, or their rates and the rates of those, shape (numbers, room)."""
+        found: list[Array] = []
+        for kind in self.cascade.kinds:
+            names = (RATE, RATE_T) if rates else kind.model.state
+            rows = np.concatenate([np.arange(kind.model.kept)[kind.model.rows[name]] for name in names])
+            first = kind.base + kind.model.kept * np.arange(len(kind.members))
+            found.append(self.world[(first[:, None] + rows).ravel()])
+        return np.concatenate(found)
+
+    def stands(self, *, rates: bool = False) -> Array:
+        """The same of what the lanes are predicted from, shape (numbers,)."""
+        found: list[Array] = []
+        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
+            names, slots = (RATE, RATE_T) if rates else kind.model.state, list(kind.model.plan.fixed)
+            columns = [slots.index(slot) for name in names for slot in kind.model.vectors[FROM + name]]
+            found.append(fixed[:, columns].ravel())
+        return np.concatenate(found)
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing is nearly singular where the lanes are predicted from."""
+        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
+            slots = list(kind.model.plan.fixed)
+            pivot, largest = (fixed[:, slots.index(kind.model.slots[FROM + name])] for name in ("pivot", LARGEST_PIVOT))
+            if not (np.abs(pivot) >= SOUND * largest).all():
+                return False
+        return True
 
     def carry(self, lane: int) -> None:
         """Predict from a solved lane from now on."""

@@ -12,14 +12,21 @@ from ..errors import SolveError
 from ..motions import Path
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .cascade import Cascade, Lanes
+from .cascade_bridge import cross
 from .march import HALVINGS, MAX_ROUNDS
 from .model import CLOSED
 from .request import accept_by
+from .singularity import CONTINUED, listed
 
 # Samples at once: enough to share a call's overhead, few enough for the world of ten thousand bodies to stay below 100 MB.
 LANES = 32
 POINT = ("position", "velocity", "acceleration")
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
+
+
+Indices = NDArray[np.intp]
+Keep = Callable[[Indices, Indices], None]
+"""Takes samples, by their number outwards, from lanes."""
 
 
 class CascadeSweep:
@@ -54,22 +61,23 @@ class CascadeSweep:
         found = {name: np.full((n, len(rows)), np.nan) for name, rows in self._outputs.items()}
         tests = {name: np.full(n, np.nan) for name in ("closure", "leftover", "pivot", "iterations")}
         messages: list[str] = []
+        self._notes: list[str] = []
         start, departure, message = self._departure
         messages += [message] if message else []
         for side in (path.times >= start, path.times < start) if not messages else ():
             order = np.flatnonzero(side)[np.argsort(np.abs(path.times[side] - start), kind="stable")]
 
-            def keep(first: int, count: int, order: NDArray[np.intp] = order) -> None:
-                at = order[first : first + count]
+            def keep(samples: Indices, lane: Indices, order: Indices = order) -> None:
+                at = order[samples]
                 for name, rows in self._outputs.items():
-                    found[name][at] = lanes.world[rows, :count].T
+                    found[name][at] = lanes.world[rows][:, lane].T
                 for name, into in tests.items():
-                    each = lanes.each(name)[:, :count]
+                    each = lanes.each(name)[:, lane]
                     into[at] = np.abs(each).min(axis=0) if name == "pivot" else each.max(axis=0)
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
-            message = self._follow(path.times[order], start, path, keep)
+            message = self._follow(path.times[order], start, path, keep, tol)
             messages += [message] if message else []
         return self._trajectory(found, tests, messages)
 
@@ -81,31 +89,48 @@ class CascadeSweep:
         if not path.from_design:
             way = path.lead_in()
             start = float(path.times[0])
-            message = self._follow(np.array([0.0, 1.0]), 0.0, way, _nothing)
+            message = self._follow(np.array([0.0, 1.0]), 0.0, way, _nothing, CLOSED)
             message = f"on the way to the first sample: {message}" if message else ""
         lanes.attempt(np.array([start]), path)  # the rates of the path where the mechanism stands
         lanes.carry(0)
         return start, lanes.anchor, message
 
-    def _follow(self, times: Array, here: float, path: Path, keep: Callable[[int, int], None]) -> str:
+    def _follow(self, times: Array, here: float, path: Path, keep: Keep, tol: float) -> str:
         """Follow the samples outwards; empty, or why they end."""
-        lanes, at, rounds = self._lanes, 0, 0
+        lanes, at, rounds, refused = self._lanes, 0, 0, list[int]()
+        sound, start = lanes.anchor, here
         while at < len(times):
             ahead = times[at : at + lanes.lanes]
             good = lanes.attempt(ahead, path) > 0.0
             accepted = len(ahead) if good.all() else int(good.argmin())
             if accepted:
-                keep(at, accepted)
+                keep(np.arange(at, at + accepted), np.arange(accepted))
                 lanes.carry(accepted - 1)
                 here, at, rounds = float(ahead[accepted - 1]), at + accepted, 0
                 continue
+            if lanes.sound:
+                sound, start = lanes.anchor, here
             rounds += 1
             parts: Array = here + (times[at] - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
             good = np.flatnonzero(lanes.attempt(parts, path) > 0.0)
-            if not len(good) or rounds > MAX_ROUNDS:
-                return self._end(here, float(times[at]), path)
-            lanes.carry(int(good[0]))
-            here = float(parts[good[0]])
+            if len(good) and rounds <= MAX_ROUNDS:
+                lanes.carry(int(good[0]))
+                here = float(parts[good[0]])
+                continue
+            message = self._end(here, float(times[at]), path)
+            beyond = cross(lanes, path, sound, start, here, float(times[at]), tol)
+            if beyond is None:
+                return message
+            self._notes.append(f"crosses a singular pose near {path.where(here)}; {CONTINUED}")
+            beside = at + np.flatnonzero(np.abs(times[at:] - here) <= abs(beyond - here))
+            for chunk in np.split(beside, range(lanes.lanes, len(beside), lanes.lanes)) if len(beside) else ():
+                good = lanes.attempt(times[chunk], path) > 0.0
+                keep(chunk[good], np.flatnonzero(good))
+                refused += chunk[~good].tolist()
+            here, at, rounds = beyond, at + len(beside), 0
+        if refused:
+            places = listed([path.where(float(times[k])) for k in refused])
+            return f"refused at {places}: so near a singular pose that neither side reaches it; keep away from it"
         return ""
 
     def _end(self, here: float, wanted: float, path: Path) -> str:
@@ -145,10 +170,11 @@ class CascadeSweep:
                 "programs": sizes,
                 "redundant_residual": float(tests["leftover"][solved].max(initial=0.0)) * unit,
                 "smallest_pivot": float(tests["pivot"][solved].min(initial=1.0)),
-            },
+            }
+            | ({"notes": self._notes} if self._notes else {}),
             bodies={name: body(name) for name in request.bodies},
         )
 
 
-def _nothing(first: int, count: int) -> None:
+def _nothing(samples: Indices, lane: Indices) -> None:
     """Keep none of the samples."""

@@ -29,12 +29,12 @@ EPSILON = float(np.finfo(np.float64).eps)
 FOLLOWED = 1e-2
 
 
-def doubtful(pivot: float, closure: float, tol: float) -> bool:
-    """Whether a sample needs scrutiny: its pivot, negative beyond a singular pose, and its residual allow errors too large.
+def doubtful(pivot: Array, closure: Array, tol: float) -> NDArray[np.bool_]:
+    """Which samples need scrutiny: their smallest pivots and residuals allow errors too large.
 
     The error of rates is that of the pose over sigma once more.
     """
-    return PIVOT * max(closure, EPSILON) > AMPLIFIED * tol * pivot * abs(pivot)
+    return PIVOT * np.maximum(closure, EPSILON) > AMPLIFIED * tol * pivot**2
 
 
 def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float | Array, size: float) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .bridge import bridge, onward
-from .continuity import AMPLIFIED, EPSILON, PIVOT
+from .continuity import doubtful
 from .march import End, March, Route, arrived, march
 from .request import FROM, LARGEST_PIVOT, TIME
 
@@ -81,7 +81,7 @@ class Followed:
     def doubtful(self) -> NDArray[np.bool_]:
         """Samples that were reached and may be wrong, shape (n,)."""
         closure, pivot = (self.found.kept[self.route.model.rows[name].start] for name in ("closure", "pivot"))
-        return self.found.solved & (PIVOT * np.maximum(closure, EPSILON) > AMPLIFIED * self.tol * pivot**2)
+        return self.found.solved & doubtful(pivot, closure, self.tol)
 
     def go_on(self) -> None:
         """Pass the singular poses at ends, one after the other, where the motion passes them."""

@@ -135,11 +135,6 @@ class Route:
         return self.model.moving(self.model.design if self.design is None else self.design, self.origin)
 
     @cached_property
-    def ahead(self) -> bool:
-        """Whether the determinant of the rows is positive at the start."""
-        return bool(self.departure[self.model.slots[FROM + "pivot"]] > 0.0)
-
-    @cached_property
     def sides(self) -> tuple[Side, ...]:
         """The side after the start and the side before it, as far as there are samples."""
         times = self.path.times[self.order]

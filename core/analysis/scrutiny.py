@@ -22,7 +22,7 @@ from .followed import Followed, Passage
 from .march import End, March, Route
 from .model import TESTS
 from .request import FROM, TIME
-from .singularity import Singularity, examine, listed, solve_closely
+from .singularity import CONTINUED, Singularity, examine, listed, solve_closely
 
 # Of one march: the others are counted.
 NAMED = 8
@@ -34,7 +34,6 @@ LARGEST = 1000
 BESIDE = 1e-6
 # Above this a smallest singular value explains nothing: rates have all but four of their digits there.
 REGULAR = 1e-2
-CONTINUED = "the branch followed is the continuation of the motion"
 
 
 @dataclass

@@ -25,6 +25,7 @@ SHARE = 0.1
 APART = 10.0
 NAMED = 4
 """Names in a message; the record has all."""
+CONTINUED = "the branch followed is the continuation of the motion"
 
 
 @dataclass(frozen=True)

@@ -22,15 +22,15 @@ def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
     model, found = route.model, march(route, tol)
     closure, leftover, pivot = _tests(route, found, whole=not found.ends)
-    details, message = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)}, ""
+    details, message = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": pivot}, ""
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
-    elif found.ends or doubtful(pivot, closure, tol):
+    elif found.ends or doubtful(np.array(pivot), np.array(closure), tol):
         from .scrutiny import scrutinise  # rarely needed
 
         findings = scrutinise(route, found, tol)
         closure, leftover, pivot = _tests(route, found, whole=False)
-        details |= {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": abs(pivot)} | findings.details
+        details |= {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": pivot} | findings.details
         message = "; ".join(findings.messages)
     iterations = found.kept[model.rows["iterations"].start]
     return Trajectory(
@@ -45,16 +45,12 @@ def follow(route: Route, tol: float) -> Trajectory:
 
 
 def _tests(route: Route, found: March, *, whole: bool) -> tuple[float, float, float]:
-    """Of all solved samples: the largest residuals of kept and redundant rows, and the smallest pivot, negative where any is.
-
-    A pivot is negative beyond a singular pose, where the determinant's sign is not that of the start.
-    """
+    """Of all solved samples: the largest residuals of kept and redundant rows, and the smallest pivot."""
     rows = route.model.rows
     tests = found.kept[rows["closure"].start : rows["pivot"].stop]
     solved = tests if whole else tests[:, found.solved]
     closure, leftover = solved[:2].max(axis=1, initial=0.0).tolist()
-    pivots = solved[3]
-    return closure, leftover, float(pivots.min(initial=1.0) if route.ahead else -pivots.max(initial=-1.0))
+    return closure, leftover, float(np.abs(solved[3]).min(initial=1.0))
 
 
 def _point(model: Model, found: March, name: str) -> PointMotion:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..motions import Path
 from ..program import Executor
 from ..trajectory import Array
+from .continuity import doubtful
 from .march import Route, march
 from .request import accept_by
 
@@ -76,6 +77,15 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         kept[:, :, k], solved[:, k] = found.kept[:, route.order], found.solved[route.order]
         if found.messages:
             messages[k] = "; ".join(found.messages)
+    closure, pivot = (kept[model.rows[name].start] for name in ("closure", "pivot"))
+    doubted = solved & doubtful(pivot, closure, tol)
+    kept[:, doubted], solved[doubted] = np.nan, False
+    for k in np.flatnonzero(doubted.any(axis=0)).tolist():
+        near = route.path.where(float(route.path.times[route.order][doubted[:, k].argmax()]))
+        refused = (
+            f"refused at {doubted[:, k].sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}; "
+        )
+        messages[k] = "; ".join(filter(None, [messages.get(k, ""), f"{refused}solve this variant by itself, or keep away from it"]))
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
 
 
