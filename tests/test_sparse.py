@@ -22,6 +22,7 @@ from kincheck.core import (
 )
 from kincheck.core.analysis.components import components
 from kincheck.core.analysis.equations import frames
+from kincheck.core.analysis.factors import Factors
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
@@ -229,3 +230,31 @@ def test_costs_are_measured_with_residuals_and_errors():
     assert all(row.residual <= 1e-15 for row in rows)
     assert all(row.error <= 1e-14 for row in rows)
     assert all(row.us_per_value.median > 0.0 for row in rows)
+
+
+@pytest.mark.parametrize("n", [6, 40])
+def test_the_sign_of_the_determinant(n):
+    """Of matrices of one pattern it is that of the signed pivot, or always the other."""
+    rng = np.random.default_rng(n)
+    rows, columns = np.nonzero((rng.random((n, n)) < 3.0 / n) | np.eye(n, k=1, dtype=bool) | np.eye(n, k=1 - n, dtype=bool))
+    factors = Factors(rows, columns, rng.normal(size=len(rows)), n)
+    products: set[float] = set()
+    signs: set[float] = set()
+    for _ in range(50):
+        values = rng.normal(size=len(rows))
+        factors.update(values)
+        factors.factor()
+        dense = np.zeros((n, n))
+        dense[rows, columns] = values
+        sign = np.linalg.slogdet(dense)[0]
+        signs.add(float(sign))
+        products.add(float(np.sign(factors.signed_pivot) * sign))
+    assert len(products) == 1
+    assert len(signs) == 2
+
+
+def test_a_singular_pose_is_not_stepped_over():
+    found = solve_sparse(SparseModel(chain(3), compiled=False), turning(*np.linspace(0.0, 2.4, 7)), ["end"])
+    assert found.solved.tolist() == [True] * 5 + [False] * 2
+    assert "cannot be followed beyond turn = 1.8707" in found.message
+    assert "there is a singular pose ahead" in found.message

@@ -65,9 +65,12 @@ class Factors:
         self._factors = self._factored(self._matrix, permc_spec="NATURAL")
 
     @property
-    def smallest_pivot(self) -> float:
-        """Of the factors; costs about half a factorisation."""
-        return float(np.abs(self._factors.U.diagonal()).min())
+    def signed_pivot(self) -> float:
+        """The pivot of the smallest size, with the sign of the determinant or always the opposite; costs half a factorisation."""
+        diagonal = self._factors.U.diagonal()
+        odd = np.count_nonzero(diagonal < 0.0) + len(diagonal) - _cycles(self._factors.perm_r)
+        smallest = float(np.abs(diagonal).min())
+        return -smallest if odd % 2 else smallest
 
     @property
     def entries(self) -> int:
@@ -79,3 +82,13 @@ class Factors:
         placed = np.empty_like(b)
         placed[self._row] = b
         return self._factors.solve(placed)[self._column]
+
+
+def _cycles(permutation: Indices) -> int:
+    """How many cycles a permutation has: n less these is the number of exchanges that make it."""
+    n = len(permutation)
+    if (permutation == np.arange(n)).all():
+        return n
+    sparse, graphs = (importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph"))
+    graph = sparse.csr_matrix((np.ones(n), permutation, np.arange(n + 1)), shape=(n, n))
+    return int(graphs.connected_components(graph, directed=False, return_labels=False))

@@ -21,7 +21,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Array
-from .continuity import LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE
+from .continuity import EPSILON, FOLLOWED, LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE, PIVOT
 from .elements import Elements, Indices
 from .equations import Frames, constraints, frames, joint_points
 from .factors import Factors, SingularError
@@ -51,6 +51,7 @@ class Stand:
         state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
         rates, accelerations: of the unknowns.
         closure, leftover, branch: largest residual of the rows solved and of the redundant ones, smallest branch test.
+        pivot: the smallest, with the determinant's sign; largest_pivot: the largest size it has had so far.
     """
 
     time: float
@@ -63,6 +64,8 @@ class Stand:
     closure: float = 0.0
     leftover: float = 0.0
     branch: float = 1.0
+    pivot: float = 0.0
+    largest_pivot: float = 0.0
 
 
 class FailedError(ArithmeticError):
@@ -119,7 +122,7 @@ class SparseModel:
         self._solved = np.flatnonzero(among >= 0)
         try:
             self.factors = Factors(among[self._solved], jacobian.columns[self._solved], jacobian.values[self._solved], unknowns)
-            pivot = self.factors.smallest_pivot
+            pivot = abs(self.factors.signed_pivot)
         except SingularError:
             pivot = 0.0
         if not pivot > RANK_TOLERANCE:
@@ -190,7 +193,9 @@ class SparseModel:
         """What stands, with the rates that the drives give it there, and no step behind it. Raises FailedError."""
         self._evaluate(at.state, drives)
         rates, accelerations = self._motion()
-        return replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
+        now = replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
+        pivot = self.factors.signed_pivot
+        return replace(now, pivot=pivot, largest_pivot=max(at.largest_pivot, abs(pivot)))
 
     def _factor(self) -> None:
         try:
@@ -204,15 +209,6 @@ class SparseModel:
         rates = self.factors.solve(self.elements.nu[self.kept])
         self.elements.accelerate(rates)
         return rates, self.factors.solve(self.elements.gamma[self.kept])
-
-    def smallest_pivot(self, at: Stand, drives: Array) -> float:
-        """The smallest pivot of the matrix where a motion stands; zero at a lock-up or dead centre."""
-        self._evaluate(at.state, drives)
-        try:
-            self.factors.factor()
-        except SingularError:
-            return 0.0
-        return self.factors.smallest_pivot
 
     @property
     def details(self) -> dict[str, Any]:
@@ -260,7 +256,12 @@ class SparseModel:
             if not gap <= LARGEST_DEVIATION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
                 raise FailedError("Newton jumps to another assembly")
             rates, accelerations = self._motion()
-        return Stand(time, here.time, state, taylor, rates, accelerations, iterations, closure, leftover, branch)
+        pivot = self.factors.signed_pivot
+        largest = max(abs(pivot), here.largest_pivot)
+        # where SuperLU exchanges rows its pivots jump tenfold: only their sign is held to, not their change
+        if not pivot * here.pivot > 0.0 or FOLLOWED * pivot**2 <= PIVOT * largest * max(closure, EPSILON):
+            raise FailedError(f"there is a singular pose ahead, smallest pivot {abs(pivot):.3g}")
+        return Stand(time, here.time, state, taylor, rates, accelerations, iterations, closure, leftover, branch, pivot, largest)
 
     def _tested(self, closure: float, tol: float, *, done: bool) -> tuple[float, float, float]:
         """Closure, leftover and branch where all was last evaluated. Raises FailedError."""

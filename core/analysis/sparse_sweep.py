@@ -151,8 +151,8 @@ class _Sweep:
             else:
                 self._end(here, path, times, k, "the parts of the step get smaller and smaller")
                 return
+            self.smallest_pivot = min(self.smallest_pivot, abs(here.pivot))
             yield here
-        self._watch(here, path)
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
         """Go a part of the way to a time that could not be reached. Raises FailedError where even the smallest part cannot."""
@@ -165,18 +165,13 @@ class _Sweep:
                 last = error
         raise last
 
-    def _watch(self, here: Stand, path: Path) -> float:
-        """The smallest pivot where the motion stands; looked at where it ends, for it costs as much as a sample."""
-        pivot = self.model.smallest_pivot(here, self.model.drives(path, np.array([here.time]))[:, 0])
-        self.smallest_pivot = min(self.smallest_pivot, pivot)
-        return pivot
-
     def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
         where = path.where
+        self.smallest_pivot = min(self.smallest_pivot, abs(here.pivot))
         last = f"last reachable sample at {where(float(times[k - 1]))}" if k else "no sample reached on this side"
         self.messages.append(
             f"cannot be followed beyond {where(here.time)} (wanted {where(float(times[k]))}): {reason}; smallest pivot there "
-            f"{self._watch(here, path):.3g} (zero at a lock-up or dead centre); {last}; "
+            f"{abs(here.pivot):.3g} (zero at a lock-up or dead centre); {last}; "
             "shorten the sweep or drive another coordinate"
         )
 
