@@ -13,6 +13,7 @@ from .bridge import bridge, onward
 from .continuity import doubtful
 from .march import End, March, Route, arrived, march
 from .request import FROM, LARGEST_PIVOT, TIME
+from .system import System
 
 # A motion that ends with a smallest pivot above this part of the largest that it has had does not end at a singular pose.
 NEAR = 1e-2
@@ -61,6 +62,7 @@ class Followed:
     """A march, and its going on beyond its ends.
 
     Attributes:
+        system: the equations.
         found: the samples; those beyond ends are put in as they are reached.
         parts: the first is the route asked for.
         part_of: the part of each sample, shape (n,).
@@ -70,6 +72,7 @@ class Followed:
 
     def __init__(self, route: Route, found: March, tol: float) -> None:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
+        self.system = System(route.model)
         self.parts = [Part(route, np.arange(len(self.times)))]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []
@@ -102,7 +105,7 @@ class Followed:
         here, number = self._time(end.lane), self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0
         lane = self.before(here, side, number) if number is not None else end.route.departure
-        passed = bridge(end.route, lane, here, self.tol, end.lane) if lane is not None else None
+        passed = bridge(self.system, end.route, lane, here, self.tol, end.lane) if lane is not None else None
         if passed is None:
             return None
         self.passages.append(Passage(end.lane, here, end.route))

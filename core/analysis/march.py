@@ -19,7 +19,6 @@ from ..trajectory import Array
 from .model import Model
 from .refusal import why_refused
 from .request import FROM, LARGEST_PIVOT, TIME, accept_by
-from .system import System
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
@@ -104,11 +103,6 @@ class Route:
     def start(self) -> float:
         """The time it starts at: where its lane stands, or else the first sample."""
         return self.since or 0.0 if self.from_design else float(self.path.times[0])
-
-    @cached_property
-    def system(self) -> System:
-        """The equations of the model, for poses that the march cannot judge."""
-        return System(self.model)
 
     @cached_property
     def order(self) -> NDArray[np.intp]:

@@ -82,7 +82,7 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
 class _Scrutiny:
     def __init__(self, followed: Followed) -> None:
         self.followed, self.route, self.found, self.tol = followed, followed.route, followed.found, followed.tol
-        self.model, self.system, self.times = self.route.model, self.route.system, self.route.path.times
+        self.model, self.system, self.times = self.route.model, followed.system, self.route.path.times
         self.limit = AMPLIFIED * self.tol
         self.findings = Findings()
 
@@ -158,7 +158,7 @@ class _Scrutiny:
 
     def _bridged(self, k: int, lane: Array, near: Array, *, passed: bool = False) -> bool:
         time = float(self.times[k])
-        found = bridge(self.route, lane, time, self.tol, None if passed else near)
+        found = bridge(self.system, self.route, lane, time, self.tol, None if passed else near)
         if found is None:
             return False
         tests = self.model.rows[TESTS[0]].start
