@@ -12,7 +12,20 @@ from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.sweep import sweep
 from kincheck.core.motions import Path, Ramp
-from kincheck.core.program import NumpyExecutor, Plan, Tape, absolute, cos, maximum, minimum, program, sin, sqrt, where_larger
+from kincheck.core.program import (
+    NODES,
+    NumpyExecutor,
+    Plan,
+    Tape,
+    absolute,
+    cos,
+    maximum,
+    minimum,
+    program,
+    sin,
+    sqrt,
+    where_larger,
+)
 from kincheck.core.program import compiled as code
 
 from .mechanisms import four_bar, mcpherson
@@ -40,6 +53,7 @@ OPERATIONS = {
     "size": lambda a, b: absolute(a),
     "smaller": minimum,
     "larger": maximum,
+    "larger size": lambda a, b: maximum(absolute(a), absolute(b)),
     "choice": lambda a, b: where_larger(a, b, a + 1.0, b - 1.0),
 }
 
@@ -57,6 +71,17 @@ def test_operations_are_numpys(name, lanes):
     a, b = (executor.get([2])[0] for executor in both)
     np.testing.assert_array_equal(np.isnan(a), np.isnan(b))
     np.testing.assert_allclose(b, a, rtol=2e-16, atol=0.0)
+
+
+def test_all_lanes_may_read_a_few_of_their_group():
+    """The first of them, the last, and some between; of machine code a group is a vector."""
+    lanes = code.vector_width()
+    values = np.random.default_rng(0).normal(size=(1, lanes))
+    read = values[0, [k * (lanes - 1) // (NODES - 1) for k in range(NODES)]]
+    for executor in executors(lambda x: sum((10.0**k * x.tape.at(k, 0) for k in range(NODES)), 0.0), 1, lanes):
+        executor.put([0], values)
+        executor.run("f")
+        np.testing.assert_allclose(executor.get([1])[0], np.full(lanes, 10.0 ** np.arange(NODES) @ read), rtol=1e-14)
 
 
 @pytest.mark.parametrize(("traced", "true"), [(sin, np.sin), (cos, np.cos)])

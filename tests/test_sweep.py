@@ -6,7 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute, Spherical, Translational
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.solve import solve
+from kincheck.core.analysis.sweep import sweep
+from kincheck.core.motions import Path, Ramp
 
 from .mechanisms import (
     CRANK,
@@ -65,6 +69,45 @@ def test_more_samples_than_lanes():
     found, short = wheel(many), wheel(many[::100])
     assert np.abs(found.position[::100] - short.position).max() <= 2e-16
     assert np.abs(found.acceleration[::100] - short.acceleration).max() <= 2e-14
+
+
+# Positions alone
+
+
+def positions(values, order=0, *, compiled=False):
+    """Of the strut, as many samples at once as a vector of machine code has lanes."""
+    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=compiled))
+    found = sweep(model, Path({"stroke": Ramp(1.0)}, np.asarray(values)), 1e-12)
+    assert found.solved.all(), found.message
+    return found
+
+
+@pytest.fixture
+def eight_lanes(monkeypatch):
+    monkeypatch.setattr("kincheck.core.analysis.march.LANES", 8)
+
+
+@pytest.mark.usefixtures("eight_lanes")
+def test_positions_alone_are_extrapolated_to_one_iteration():
+    fine = np.linspace(-0.08, 0.08, 161)
+    alone, all_orders = positions(fine), positions(fine, 2)
+    assert np.abs(alone.points["wheel"].position - all_orders.points["wheel"].position).max() <= 4e-16
+    later = np.abs(np.arange(161) - 80) > 8  # there is nothing yet to extrapolate the first eight on either side from
+    assert (alone.iterations[later] == 1).all()
+    assert (all_orders.iterations[later] == 2).sum() > 100
+
+
+@pytest.mark.usefixtures("eight_lanes")
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize(
+    "values",
+    [np.repeat(STROKES, 2), [*np.linspace(0.0, 0.008, 17), *np.linspace(0.01, 0.08, 8)], [*np.linspace(0.0, 0.008, 16), 0.08]],
+    ids=["every sample twice", "a fine grid gets coarse", "one step as long as a hundred"],
+)
+def test_where_extrapolation_fails_the_rates_take_over(values, compiled):
+    """Two samples at one time make it infinite, a long step makes it wild."""
+    found, expected = positions(values, compiled=compiled), positions(values, 2)
+    assert np.abs(found.points["wheel"].position - expected.points["wheel"].position).max() <= 4e-16
 
 
 # Closed forms

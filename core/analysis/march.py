@@ -129,10 +129,15 @@ class Route:
         return self.model.moving(self.model.design if self.design is None else self.design, self.origin)
 
     @cached_property
+    def below(self) -> int:
+        """How many samples are before the start."""
+        return int(np.searchsorted(self.path.times[self.order], self.start, side="left"))
+
+    @cached_property
     def sides(self) -> tuple[Side, ...]:
         """The side after the start and the side before it, as far as there are samples."""
         times = self.path.times[self.order]
-        n, below = len(times), int(np.searchsorted(times, self.start, side="left"))
+        n, below = len(times), self.below
         pad = self.model.executor(self.lanes).margin
         found: list[Side] = []
         for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
@@ -192,35 +197,31 @@ class _Marcher:
         if self.model.geometry:  # the lanes know their variant
             self.executor.put(range(len(self.start)), self.start[:, None])
         self.n = len(route.path.times)
-        # `follow` may write beyond the samples on either side
-        self.whole = np.empty((self.model.kept, self.n + 2 * self.executor.margin))
-        self.kept = self.whole[:, self.executor.margin : self.executor.margin + self.n]
+        self.whole, self.first = self.executor.table(self.model.kept, self.n, route.below)
+        self.kept = self.whole[:, self.first : self.first + self.n]
         self.solved = np.ones(self.n, dtype=np.bool_)
         self.visit, self.visited = visit, dict[int, Array]()
 
     def run(self) -> March:
         ends: list[End] = []
-        last = self.start
         for side in self.route.sides:
-            last = self.start.copy()
-            end = self._side(side, last)
+            self.executor.anchor[:] = self.start
+            end = self._side(side)
             if end:
                 ends.append(end)
         back = self.route.back
-        return March(self.kept[:, back], last, self.solved[back], tuple(ends), self.visited)
+        return March(self.kept[:, back], self.executor.anchor.copy(), self.solved[back], tuple(ends), self.visited)
 
-    def _side(self, side: Side, anchor: Array) -> End | None:
-        """Follow one side to its last sample, the anchor going along; None, or where and why it ends before."""
-        n, at, rounds, margin = len(side.times), 0, 0, self.executor.margin
+    def _side(self, side: Side) -> End | None:
+        """Follow one side to its last sample; None, or where and why it ends before."""
+        n, at, rounds, anchor = len(side.times), 0, 0, self.executor.anchor
         stops = self._stops(side)
         while stops:
-            first = side.first + side.step * at + margin
-            went = self.executor.follow(anchor, side.samples[:, at : stops[0] + margin], self.whole, first, side.step)
-            at += went
+            came, at = at, self.executor.follow(side.samples, at, stops[0], self.whole, self.first + side.first, side.step)
             if at == stops[0]:
                 self._stand(side, stops.pop(0), anchor)
                 continue
-            rounds = 0 if went else rounds + 1
+            rounds = 0 if at > came else rounds + 1
             further, reason = self._divide(anchor, float(side.times[at]))
             if not further or rounds > MAX_ROUNDS:
                 columns = side.first + side.step * np.arange(at, n)

@@ -38,6 +38,8 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
         programs.append(tracer.motion("motion", request.order))
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
         programs.append(tracer.motion("tangent", 2))
+        if not request.state:
+            programs.append(tracer.extrapolate())
     programs += [tracer.outputs(), tracer.test("alone", neighbours=False), tracer.test("joined", neighbours=True)]
     if request.varied:
         programs.append(tracer.prepared.program())
@@ -115,6 +117,22 @@ class Model:
         for name in TESTS:
             rows[name] = slice(row, row := row + 1)
         return rows
+
+    @cached_property
+    def of_points(self) -> Mapping[str, list[slice]]:
+        """By point: rows of its position, velocity and acceleration, as far as they are wanted."""
+        labels = ("position", "velocity", "acceleration")[: self.orders]
+        return {name: [self.rows[f"{label} {name}"] for label in labels] for name in self.request.points}
+
+    @cached_property
+    def of_bodies(self) -> Mapping[str, list[slice]]:
+        """By body: rows of its r, p, v and a, as far as they are wanted; rates of place and of rotation stand side by side."""
+        pairs = (("r", "r"), ("p", "p"), ("rdot", "omega"), ("rddot", "omega_t"))[: self.orders + 1]
+        rows = self.rows
+        return {
+            name: [slice(rows[f"{first} {name}"].start, rows[f"{last} {name}"].stop) for first, last in pairs]
+            for name in self.request.bodies
+        }
 
     @property
     def orders(self) -> int:

@@ -1,6 +1,7 @@
 """The programs of a sweep, traced from the equations: they share one layout of slots.
 
     predict   from state, v, a and time; time    -> state        Taylor step of second order
+    extrapolate   states and times of a group of lanes; time   -> state        through `NODES` of them, without v and a
     newton    state, drives                      -> state, residual, pivot   one Newton-Raphson iteration; residual is that before,
                                                     pivot the smallest, with the sign of the determinant
     motion    state, drives' rates               -> v, a         one factorisation at the converged pose, solved for nu and gamma
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
+from operator import mul
 from typing import Any
 
 from ..algebra import ZERO, Quat, Scalar, cross, rotation_less_identity, vec
@@ -22,6 +24,7 @@ from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose
 from ..program import (
     DONE,
     MARGIN,
+    NODES,
     Elimination,
     Prepared,
     Program,
@@ -41,7 +44,7 @@ from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
 from .geometry import placed, places
 from .relative import Relative
-from .request import ACCEPT, EARLIER, FROM, GIVEN, LARGEST_PIVOT, RATE, RATE_T, TIME, Layout, Request
+from .request import ACCEPT, EARLIER, FROM, GIVEN, LARGEST_PIVOT, RATE, RATE_T, STOOD, TIME, Layout, Request
 
 EULER_PARAMETERS = 4
 ABOUT = 1.5
@@ -163,11 +166,25 @@ class Tracer:
             self._store(out, f"predicted {name}", value)  # kept, to see what the iteration makes of it
             solved, predicted = start[name], self._vector(f"{FROM}predicted {name}", len(value))
             corrected[name] = [x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)]
-            if len(value) == EULER_PARAMETERS:  # of length one again, up to the square of what is lacking now
-                k = 1.5 - 0.5 * sum((x * x for x in corrected[name]), 0.0)
-                corrected[name] = [k * x for x in corrected[name]]
+            corrected[name] = _of_length_one(corrected[name])
         self._store_state(out, corrected)
         return program("predict", self.tape, out, self.prepared)
+
+    def extrapolate(self) -> Program:
+        """The state at the time by Lagrange's formula, through nodes of the group of lanes before; NaN where two share a time."""
+        time, layout = self._in(TIME), self.layout
+        nodes = [self.tape.at(k, layout.scalar(STOOD)) for k in range(NODES)]
+        weights: list[Scalar] = []
+        for node in nodes:
+            others = [each for each in nodes if each is not node]
+            weights.append(reduce(mul, (time - each for each in others)) / reduce(mul, (node - each for each in others)))
+        out: dict[int, Scalar] = {}
+        for name, value in self.formulation.design.items():
+            slots = layout.vector(name, len(value))
+            found = [sum((w * self.tape.at(k, slot) for k, w in enumerate(weights)), 0.0) for slot in slots]
+            for label in (name, f"predicted {name}"):
+                self._store(out, label, _of_length_one(found))
+        return program("extrapolate", self.tape, out, self.prepared)
 
     def test(self, name: str, *, neighbours: bool) -> Program:
         """By how much a lane passes all tests of a solution: it has converged, closes, is on its branch, agrees with the
@@ -177,16 +194,14 @@ class Tracer:
         are no neighbours from nothing at the start, by much less than the pose does. No lane is taken that is far from there, nor
         one beyond a singular pose: whether the motion passes it, or turns round a corner before it, is not seen from afar.
         """
-        gap: Scalar = 0.0
-        moved: Scalar = 0.0
-        reach: Scalar = 0.0
+        gap, moved, reach = list[Scalar](), list[Scalar](), list[Scalar]()
         for each, value in self.formulation.design.items():
             vectors = (self._vector(label, len(value)) for label in (each, f"predicted {each}", FROM + each))
             for x, predicted, start in zip(*vectors, strict=True):
                 x_before, predicted_before = (before(x, start), before(predicted, start)) if neighbours else (start, start)
-                gap = maximum(gap, absolute((x - predicted) - (x_before - predicted_before)))
-                moved = maximum(moved, absolute(x - x_before))
-                reach = maximum(reach, absolute(x - start))
+                gap.append((x - predicted) - (x_before - predicted_before))
+                moved.append(x - x_before)
+                reach.append(x - start)
         tol, consistent, crossing = (self._in(label) for label in ACCEPT)
         closure, pivot, pivot_before = self._in("closure"), self._in("pivot"), self._in(FROM + "pivot")
         largest = maximum(absolute(pivot), self._in(FROM + LARGEST_PIVOT))
@@ -197,12 +212,14 @@ class Tracer:
             tol - closure,
             consistent - self._in("leftover"),
             self._in("branch"),
-            LARGEST_DEVIATION * moved + NEGLIGIBLE - gap,
-            LONGEST_STEP - reach,
+            LARGEST_DEVIATION * _largest(moved) + NEGLIGIBLE - _largest(gap),
+            LONGEST_STEP - _largest(reach),
             (LARGEST_RATIO * pivot - pivot_before) * (LARGEST_RATIO * pivot_before - pivot) + crossing,
             FOLLOWED * pivot * pivot - (PIVOT * largest) * maximum(closure, EPSILON),
         )
         out = {self.layout.scalar(MARGIN): reduce(minimum, margins), self.layout.scalar(LARGEST_PIVOT): largest}
+        if neighbours:
+            out[self.layout.scalar(STOOD)] = self._in(TIME)
         return program(name, self.tape, out, self.prepared)
 
     def outputs(self) -> Program:
@@ -264,5 +281,13 @@ class Tracer:
             self._store(out, f"{label} {name}", value)
 
 
+def _of_length_one(value: list[Scalar]) -> list[Scalar]:
+    """Euler parameters of length one, up to the square of what they lack; any other vector as it is."""
+    if len(value) != EULER_PARAMETERS:
+        return value
+    k = 1.5 - 0.5 * sum((x * x for x in value), 0.0)
+    return [k * x for x in value]
+
+
 def _largest(values: Sequence[Scalar]) -> Scalar:
-    return reduce(maximum, (absolute(value) for value in values), 0.0)
+    return reduce(maximum, (absolute(value) for value in values)) if values else 0.0

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..motions import Path
-from ..trajectory import BodyMotion, PointMotion, Trajectory
+from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .continuity import doubtful
 from .march import March, Route, march
 from .model import Model
@@ -32,15 +34,15 @@ def follow(route: Route, tol: float) -> Trajectory:
         closure, leftover, pivot = _tests(route, found, whole=False)
         details |= {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": pivot} | findings.details
         message = "; ".join(findings.messages)
-    iterations = found.kept[model.rows["iterations"].start]
+    iterations, samples = found.kept[model.rows["iterations"].start], found.kept.T
     return Trajectory(
-        points={name: _point(model, found, name) for name in model.request.points},
+        points={name: PointMotion(*_motions(samples, rows, 3)) for name, rows in model.of_points.items()},
         solved=found.solved,
-        iterations=np.where(found.solved, iterations, 0.0).astype(np.int64),
+        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
         residual=closure * model.frame.unit,
         message=message,
         details=details,
-        bodies={name: _body(model, found, name) for name in model.request.bodies},
+        bodies={name: BodyMotion(*_motions(samples, rows, 4)) for name, rows in model.of_bodies.items()},
     )
 
 
@@ -53,15 +55,6 @@ def _tests(route: Route, found: March, *, whole: bool) -> tuple[float, float, fl
     return closure, leftover, float(np.abs(solved[3]).min(initial=1.0))
 
 
-def _point(model: Model, found: March, name: str) -> PointMotion:
-    motions = [found.kept[model.rows[f"{label} {name}"]].T for label in ("position", "velocity", "acceleration")[: model.orders]]
-    return PointMotion(*motions, *[None] * (3 - len(motions)))
-
-
-def _body(model: Model, found: March, name: str) -> BodyMotion:
-    """Rates of place and of rotation stand side by side, so that both are one view."""
-    rows = model.rows
-    motions = [found.kept[rows[f"{label} {name}"]].T for label in ("r", "p")]
-    for first, last in (("rdot", "omega"), ("rddot", "omega_t"))[: model.orders - 1]:
-        motions.append(found.kept[rows[f"{first} {name}"].start : rows[f"{last} {name}"].stop].T)
-    return BodyMotion(*motions, *[None] * (4 - len(motions)))
+def _motions(samples: Array, rows: Sequence[slice], count: int) -> list[Any]:
+    """The motions that were asked for, and None for the others."""
+    return [*(samples[:, each] for each in rows), *[None] * (count - len(rows))]

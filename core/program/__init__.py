@@ -5,12 +5,13 @@ from .executor import DONE, ITERATIONS, MARGIN, Executor, Plan
 from .llvm_executor import LlvmCode, LlvmExecutor
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
-from .trace import Tape, Traced, absolute, before, cos, maximum, minimum, sin, sqrt, where_larger
+from .trace import NODES, Tape, Traced, absolute, before, cos, maximum, minimum, sin, sqrt, where_larger
 
 __all__ = [
     "DONE",
     "ITERATIONS",
     "MARGIN",
+    "NODES",
     "Elimination",
     "Executor",
     "LlvmCode",

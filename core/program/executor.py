@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .straight_line import Program
+from .trace import NODES
 
 DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
 """Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
@@ -24,13 +25,16 @@ class Plan:
     programs in `after`, and at last the test whose margin is positive where the lane may be accepted: `alone` for lanes that know
     nothing of each other, `joined` for lanes that are neighbours on one way.
 
+    Where there is a program `extrapolate` it takes the place of `predict` for lanes that follow a group that was accepted whole:
+    it goes by what stands in those lanes, so that `onward` need not be run for them.
+
     Attributes:
         programs: by name; they share one layout of slots.
         slots: place of every scalar in a lane, by name.
         after: names of the programs that end an attempt.
         onward: names of the programs that make a solved lane ready to be predicted from.
         sampled: slots that are given anew at every sample.
-        carried: slots of a solved lane, and the slots it is predicted from that take them over.
+        carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
         kept: slots that are stored of every sample.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
         taken: slots that a part takes from what was solved before it.
@@ -52,6 +56,10 @@ class Plan:
     tolerance: float = 0.0
     most: int = 0
 
+    def extrapolates(self, lanes: int) -> bool:
+        """Whether a group of that many lanes is followed by extrapolation."""
+        return "extrapolate" in self.programs and lanes >= NODES
+
 
 class Executor(Protocol):
     """A plan bound to a number of lanes. Lanes that divide by zero hold inf or nan afterwards; nothing is raised."""
@@ -60,7 +68,7 @@ class Executor(Protocol):
     def lanes(self) -> int: ...
     @property
     def margin(self) -> int:
-        """Samples that `follow` may overwrite beyond either end of its output."""
+        """Samples that `follow` may read beyond the last."""
         ...
 
     def clear(self) -> None:
@@ -83,17 +91,31 @@ class Executor(Protocol):
         """Make an attempt at all lanes, each alone."""
         ...
 
-    def follow(self, anchor: Array, samples: Array, out: Array, first: int, step: int) -> int:
+    def table(self, rows: int, n: int, at: int) -> tuple[Array, int]:
+        """Room for what `follow` keeps of n samples, shape (rows, columns), and the column of the first; both ways from the sample
+        `at` its vectors are cache lines.
+        """
+        ...
+
+    @property
+    def anchor(self) -> Array:
+        """Slots of where the motion stands that `follow` follows, shape (slots,)."""
+        ...
+
+    def follow(self, samples: Array, at: int, stop: int, out: Array, first: int, step: int) -> int:
         """Follow one motion: attempt its next samples as neighbouring lanes, go on from the last one accepted, until none is.
 
+        The anchor goes along.
+
         Args:
-            anchor: slots of where the motion stands, shape (slots,); goes along.
-            samples: `Plan.sampled` of the samples ahead, shape (sampled, n + margin); the last column repeated at the end.
-            out: takes `Plan.kept` of the samples, shape (kept, columns), rows contiguous.
-            first, step: column of the first sample, and from each to the next: 1 or -1.
+            samples: `Plan.sampled` of the samples of the motion, shape (sampled, n + margin), contiguous; the last column repeated
+                at the end.
+            at, stop: the sample that comes next, and the one before which to end.
+            out: takes `Plan.kept` of the samples; a `table`.
+            first, step: column of the first of the samples, and from each to the next: 1 or -1.
 
         Returns:
-            How many samples were accepted.
+            The first sample that was not accepted, or stop.
         """
         ...
 

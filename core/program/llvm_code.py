@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 
 from .straight_line import Program
-from .trace import Node
+from .trace import operands, place_of
 
 # The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after reduction.
 SINE_TERMS, COSINE_TERMS = 9, 9
@@ -86,6 +86,13 @@ class Lines:
         # nsz: which of two zeros is the larger does not matter, and costs three more instructions
         return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
 
+    def larger_size(self, a: str, b: str) -> str:
+        """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and NaN comes last."""
+        words = f"<{self.width} x i64>"
+        x, y = (self.let(f"bitcast {self.vector} {each} to {words}") for each in (a, b))
+        larger = self.let(f"call {words} @llvm.umax.v{self.width}i64({words} {x}, {words} {y})")
+        return self.let(f"bitcast {words} {larger} to {self.vector}")
+
     def arithmetic(self, op: str, a: str, b: str) -> str:
         """a op b."""
         return self.let(f"{BINARY[op]} {self.vector} {a}, {b}")
@@ -121,9 +128,8 @@ class Lines:
         value = self.choose(swapped, cosine, sine)
         return self.choose(negative, self.let(f"fneg {self.vector} {value}"), value)
 
-    def operation(self, node: Node, operands: Sequence[str]) -> str:
+    def operation(self, op: str, operands: Sequence[str]) -> str:
         """The value of a traced operation."""
-        op = node[0]
         if op in BINARY:
             return self.arithmetic(op, *operands)
         if op in CALLS:
@@ -146,13 +152,21 @@ def function(program: Program, width: int) -> str:
     """A program as a function of its W lanes."""
     body = Lines(width)
     values: list[str] = []
-    for node in program.nodes:
+    sizes: set[int] = set()  # nodes without a sign
+    for number, node in enumerate(program.nodes):
+        if node[0] == "abs" or (node[0] == "max" and sizes.issuperset(operands(node))):
+            sizes.add(number)
         if node[0] == "input":
             values.append(body.read(int(node[1])))
         elif node[0] == "const":
             values.append(body.constant(float(node[1])))
+        elif node[0] == "node":
+            place = body.number(body.slot(int(node[1])), place_of(int(node[2]), width))
+            values.append(body.spread(body.let(f"load double, ptr {place}, align 8")))
+        elif node[0] == "max" and number in sizes:
+            values.append(body.larger_size(*(values[k] for k in operands(node))))
         else:
-            values.append(body.operation(node, [values[int(k)] for k in node[1:]]))
+            values.append(body.operation(node[0], [values[k] for k in operands(node)]))
     for number, position in program.outputs.items():
         body.write(number, values[position])
     return f"define internal void @{program.name}(ptr %lane) {{\n  {body.text}\n  ret void\n}}\n"
@@ -163,4 +177,5 @@ def declarations(width: int) -> str:
     vector = f"<{width} x double>"
     one = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector})" for name in ("sqrt", "fabs", "rint", "floor"))
     two = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})" for name in ("minimum", "maximum"))
-    return f"{one}\n{two}\n"
+    words = f"<{width} x i64>"
+    return f"{one}\n{two}\ndeclare {words} @llvm.umax.v{width}i64({words}, {words})\n"

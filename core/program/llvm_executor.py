@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
 import inspect
-import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
@@ -14,8 +14,10 @@ from ..trajectory import Array
 from . import compiled, llvm_code, llvm_loops
 from .executor import Plan
 
+LINE = 8
+"""Numbers in a cache line."""
 LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], str]] = {
-    "follow": (llvm_loops.follow, "pppiipiii"),
+    "follow": (llvm_loops.follow, "pppiiipiii"),
     "fan": (llvm_loops.fan, "pipiipiiii"),
     "part": (llvm_loops.part, "pippippi"),
 }
@@ -39,7 +41,8 @@ class LlvmCode:
         text = [llvm_code.function(program, width) for program in plan.programs.values()]
         text += [llvm_loops.over_groups(f"run_{name}", [name], self.slots, width) for name in plan.programs]
         if plan.after:  # a plan that is only run makes no attempt
-            text += [llvm_loops.settle(plan, width), llvm_loops.over_groups("attempt", ["settle", "alone"], self.slots, width)]
+            text.append(llvm_loops.settle(plan, width))
+            text.append(llvm_loops.over_groups("attempt", ["predict", "settle", "alone"], self.slots, width))
         text += [LOOPS[loop][0](plan, width) for loop in plan.loops]
         return "\n".join([*text, llvm_code.declarations(width)])
 
@@ -53,8 +56,10 @@ class LlvmExecutor:
     def __init__(self, code: LlvmCode, lanes: int) -> None:
         self.lanes, self.margin = lanes, code.width
         self._code, self._groups = code, -(-lanes // code.width)
-        self._memory = _aligned(self._groups, code.slots, code.width)
-        self._address = self._memory.ctypes.data
+        self._memory = _aligned(self._groups * code.slots, code.width).reshape(self._groups, code.slots, code.width)
+        self.anchor: Array = np.zeros(code.slots)
+        self.clear()
+        self._address, self._place = _address(self._memory), _address(self.anchor)
 
     def clear(self) -> None:
         """See `Executor`."""
@@ -79,12 +84,15 @@ class LlvmExecutor:
         """See `Executor`."""
         self._code.functions["attempt"](self._address, self._groups)
 
-    def follow(self, anchor: Array, samples: Array, out: Array, first: int, step: int) -> int:
+    def table(self, rows: int, n: int, at: int) -> tuple[Array, int]:
         """See `Executor`."""
-        stride, row = samples.strides[0] // samples.itemsize, out.strides[0] // out.itemsize
-        addresses = anchor.ctypes.data, samples.ctypes.data
-        wanted = samples.shape[1] - self.margin
-        return self._code.functions["follow"](self._address, *addresses, stride, wanted, out.ctypes.data, row, first, step)
+        first = self.margin + -at % self.margin  # `follow` may write a vector beyond either end
+        return _aligned(rows, first + n + self.margin), first
+
+    def follow(self, samples: Array, at: int, stop: int, out: Array, first: int, step: int) -> int:
+        """See `Executor`."""
+        given = self._address, self._place, _address(samples), samples.shape[1], at, stop
+        return self._code.functions["follow"](*given, _address(out), out.shape[1], first, step)
 
     @property
     def room(self) -> int:
@@ -103,10 +111,14 @@ class LlvmExecutor:
         return partial(self._code.functions["part"], self._address, self._groups, *given)
 
 
-def _aligned(*shape: int) -> Array:
-    """Zeros that begin with a cache line, so that no vector is in two of them."""
-    line = 64
-    size = 8 * math.prod(shape)
-    room = np.zeros(size + line, dtype=np.uint8)
-    start = -room.ctypes.data % line
-    return room[start : start + size].view(np.float64).reshape(shape)
+def _aligned(rows: int, columns: int) -> Array:
+    """Room for numbers, at least as many columns: every row begins with a cache line, so that no vector is in two of them."""
+    columns += -columns % LINE
+    room = np.empty(rows * columns + LINE)
+    start = -(_address(room) // room.itemsize) % LINE
+    return room[start : start + rows * columns].reshape(rows, columns)
+
+
+def _address(array: Array) -> int:
+    """Of a contiguous array; four times as quick as its own `ctypes`."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array.data))

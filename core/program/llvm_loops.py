@@ -10,7 +10,7 @@ from .llvm_code import Lines
 
 
 def settle(plan: Plan, width: int) -> str:
-    """One attempt at W lanes but for the test: predict, iterate until every lane has met the tolerance or is lost, finish."""
+    """An attempt at W lanes that are predicted, but for the test: iterate until every one has met the tolerance or is lost."""
     vector, mask, lines = f"<{width} x double>", f"<{width} x i1>", Lines(width)
     at = {name: lines.slot(plan.slots[name]) for name in ("residual", ITERATIONS, DONE)}
     places = "\n  ".join(lines.lines)
@@ -18,7 +18,6 @@ def settle(plan: Plan, width: int) -> str:
 define internal void @settle(ptr %lane) {{
 entry:
   {places}
-  call void @predict(ptr %lane)
   br label %iterate
 iterate:
   %pass = phi i64 [1, %entry], [%next_pass, %iterate]
@@ -69,9 +68,12 @@ end:
 
 def follow(plan: Plan, width: int) -> str:
     """See `Executor.follow`: W samples at a time, and on from the last one accepted."""
-    vector, begin, test, up, down, move = (f"<{width} x double>", *(Lines(width, prefix) for prefix in "btudm"))
+    vector = f"<{width} x double>"
+    enter, begin, test, up, down, back, move, leave = (Lines(width, prefix) for prefix in "ebtudrml")
     for _, slot in plan.carried:
-        begin.write(slot, begin.spread(begin.let(f"load double, ptr {begin.number('%anchor', slot)}, align 8")))
+        enter.write(slot, enter.spread(enter.let(f"load double, ptr {enter.number('%anchor', slot)}, align 8")))
+        x = leave.let(f"load double, ptr {leave.slot(slot)}, align 8")
+        leave.lines.append(f"store double {x}, ptr {leave.number('%anchor', slot)}, align 8")
     for row, slot in enumerate(plan.sampled):
         place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%at"))
         begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
@@ -83,20 +85,37 @@ def follow(plan: Plan, width: int) -> str:
         place = down.number("%out", down.sum(down.product("%row", row), last_column))
         down.lines.append(f"store {vector} {down.turned(down.read(slot))}, ptr {place}, align 8")
     for source, target in plan.carried:
-        x = move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")
-        move.lines.append(f"store double {x}, ptr {move.number('%anchor', target)}, align 8")
+        move.write(target, move.spread(move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")))
+    for source, target in reversed(plan.carried):
+        back.write(source, back.read(target))
+    for row, slot in enumerate(plan.sampled):
+        place = back.number("%samples", back.sum(back.sum(back.product("%stride", row), "%at"), -1))
+        back.write(slot, back.spread(back.let(f"load double, ptr {place}, align 8")))
+    extrapolates = plan.extrapolates(width)
+    inputs = "ptr %samples, i64 %stride, i64 %from, i64 %stop, ptr %out"
     return f"""declare i64 @llvm.cttz.i64(i64, i1)
 declare i64 @llvm.smin.i64(i64, i64)
-define i64 @follow(ptr %lane, ptr %anchor, ptr %samples, i64 %stride, i64 %wanted, ptr %out, i64 %row, i64 %first, i64 %step) {{
+declare i64 @llvm.smax.i64(i64, i64)
+define i64 @follow(ptr %lane, ptr %anchor, {inputs}, i64 %row, i64 %first, i64 %step) {{
 entry:
   %descending = icmp slt i64 %step, 0
+  {enter.text}
   br label %head
 head:
-  %at = phi i64 [0, %entry], [%next, %move]
-  %more = icmp slt i64 %at, %wanted
+  %at = phi i64 [%from, %entry], [%next, %move]
+  %smooth = phi i1 [false, %entry], [%whole, %move]
+  %more = icmp slt i64 %at, %stop
   br i1 %more, label %begin, label %end
 begin:
   {begin.text}
+  br i1 %smooth, label %extrapolate, label %predict
+extrapolate:
+  call void @{"extrapolate" if extrapolates else "predict"}(ptr %lane)
+  br label %attempt
+predict:
+  call void @predict(ptr %lane)
+  br label %attempt
+attempt:
   call void @settle(ptr %lane)
   call void @joined(ptr %lane)
   {test.text}
@@ -104,25 +123,39 @@ begin:
   %wide = zext i{width} %bits to i64
   %rejected = xor i64 %wide, {2 ** (width + 1) - 1}
   %leading = call i64 @llvm.cttz.i64(i64 %rejected, i1 true)
-  %left = sub i64 %wanted, %at
+  %left = sub i64 %stop, %at
   %accepted = call i64 @llvm.smin.i64(i64 %leading, i64 %left)
+  %next = add i64 %at, %accepted
+  %full = icmp eq i64 %accepted, {width if extrapolates else -1}
+  %further = icmp slt i64 %next, %stop
+  %whole = and i1 %full, %further
   %none = icmp eq i64 %accepted, 0
-  br i1 %none, label %end, label %keep
+  br i1 %none, label %missed, label %keep
+missed:
+  br i1 %smooth, label %back, label %end
+back:
+  {back.text}
+  br label %onward
 keep:
   br i1 %descending, label %down, label %up
 up:
   {up.text}
-  br label %move
+  br label %kept
 down:
   {down.text}
+  br label %kept
+kept:
+  br i1 %whole, label %move, label %onward
+onward:
+  {_calls(plan.onward)}
   br label %move
 move:
-  {_calls(plan.onward)}
-  %last = sub i64 %accepted, 1
+  %before = sub i64 %accepted, 1
+  %last = call i64 @llvm.smax.i64(i64 %before, i64 0)
   {move.text}
-  %next = add i64 %at, %accepted
   br label %head
 end:
+  {leave.text}
   ret i64 %at
 }}
 """
@@ -158,6 +191,7 @@ sample:
   %k = phi i64 [0, %group], [%next, %sample]
   %alive = phi {mask} [<{", ".join(["i1 true"] * width)}>, %group], [%still, %sample]
   {begin.text}
+  call void @predict(ptr %lane)
   call void @settle(ptr %lane)
   call void @alone(ptr %lane)
   {test.text}
@@ -203,6 +237,7 @@ group:
   %lane = getelementptr double, ptr %memory, i64 %offset
   %first = mul i64 %g, {width}
   {begin.text}
+  call void @predict(ptr %lane)
   call void @settle(ptr %lane)
   call void @alone(ptr %lane)
   {keep.text}

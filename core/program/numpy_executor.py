@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..trajectory import Array
 from .executor import DONE, ITERATIONS, MARGIN, Plan
 from .straight_line import Program
-from .trace import operands
+from .trace import LEAVES, operands, place_of
 
 
 def _min(a: Array, b: Array, out: Array) -> None:
@@ -61,6 +61,7 @@ class NumpyExecutor:
     def __init__(self, plan: Plan, lanes: int) -> None:
         self.lanes = lanes
         self._block: Array = np.zeros((len(plan.slots), lanes))
+        self.anchor: Array = np.zeros(len(plan.slots))
         self._plan = plan
         self._scratch = np.empty((2, lanes))
         self._calls: dict[str, list[Call]] = {}
@@ -85,13 +86,16 @@ class NumpyExecutor:
             for call, arguments in self._calls[name]:
                 call(*arguments)
 
-    def attempt(self, test: str = "alone") -> None:
+    def attempt(self) -> None:
         """See `Executor`."""
+        self._settle("predict", "alone")
+
+    def _settle(self, start: str, test: str) -> None:
         slots = self._plan.slots
         residual, iterations = (self._block[slots[name]] for name in ("residual", ITERATIONS))
         done = np.zeros(self.lanes, dtype=np.bool_)
         iterations[:] = 0.0
-        self.run("predict")
+        self.run(start)
         for _ in range(self._plan.most):
             self.run("newton")
             iterations += ~done
@@ -103,27 +107,35 @@ class NumpyExecutor:
         self._block[slots[DONE]] = done
         self.run(test)
 
-    def follow(self, anchor: Array, samples: Array, out: Array, first: int, step: int) -> int:
+    def table(self, rows: int, n: int, at: int) -> tuple[Array, int]:
         """See `Executor`."""
-        plan, block = self._plan, self._block
+        return np.empty((rows, n)), 0
+
+    def follow(self, samples: Array, at: int, stop: int, out: Array, first: int, step: int) -> int:
+        """See `Executor`."""
+        plan, block, anchor = self._plan, self._block, self.anchor
         source, target = np.array(plan.carried).T
-        wanted, kept = samples.shape[1], list(plan.kept)
-        at = 0
-        while at < wanted:
-            count = min(self.lanes, wanted - at)
-            block[target] = anchor[target, None]
-            block[list(plan.sampled), :count] = samples[:, at : at + count]
-            block[list(plan.sampled), count:] = samples[:, -1:]
-            self.attempt("joined")
+        kept, sampled, smooth = list(plan.kept), list(plan.sampled), False
+        block[target] = anchor[target, None]
+        while at < stop:
+            count = min(self.lanes, stop - at)
+            block[sampled, :count] = samples[:, at : at + count]
+            block[sampled, count:] = samples[:, stop - 1 : stop]
+            self._settle("extrapolate" if smooth else "predict", "joined")
             good = block[plan.slots[MARGIN], :count] > 0.0
             accepted = count if good.all() else int(good.argmin())
-            if not accepted:
+            if accepted:
+                out[:, first + step * np.arange(at, at + accepted)] = block[kept, :accepted]
+            elif smooth:  # back to where the motion stands, and on from there by its rates
+                block[source], block[sampled] = block[target], samples[:, at - 1 : at]
+            else:
                 break
-            out[:, first + step * np.arange(at, at + accepted)] = block[kept, :accepted]
-            for name in plan.onward:
+            smooth = plan.extrapolates(self.lanes) and accepted == self.lanes and at + accepted < stop
+            for name in () if smooth else plan.onward:
                 self.run(name)
-            anchor[target] = block[source, accepted - 1]
+            block[target] = block[source, max(accepted - 1, 0), None]
             at += accepted
+        anchor[target] = block[target, 0]
         return at
 
     @property
@@ -138,7 +150,7 @@ class NumpyExecutor:
         alive = np.ones(self.lanes, dtype=np.bool_)
         for k, sample in enumerate(samples.T):
             block[list(plan.sampled)] = sample[:, None]
-            self.attempt("alone")
+            self.attempt()
             alive &= block[plan.slots[MARGIN]] > 0.0
             out[:, first + step * k] = np.where(alive, block[list(plan.kept)], np.nan)
             for name in plan.onward:
@@ -153,7 +165,7 @@ class NumpyExecutor:
             block[list(plan.fixed)] = fixed[:, None]
             block[list(plan.sampled)] = samples
             block[list(plan.taken)] = world[taken]
-            self.attempt("alone")
+            self.attempt()
             world[base : base + len(plan.kept)] = block[list(plan.kept)]
 
         return call
@@ -169,6 +181,10 @@ class NumpyExecutor:
             if op == "input":
                 place.append(self._block[int(rest[0])])
                 continue
+            if op == "node":
+                lane = place_of(int(rest[1]), self.lanes)
+                place.append(self._block[int(rest[0]), lane : lane + 1])
+                continue
             if op == "const":
                 place.append(np.float64(rest[0]))
                 continue
@@ -182,7 +198,7 @@ class NumpyExecutor:
             else:
                 calls.append((_where if op == "where" else _UFUNCS[op], (*read, out)))
             for x in set(arguments):
-                if last[x] == k and x not in kept and program.nodes[x][0] not in ("input", "const"):
+                if last[x] == k and x not in kept and program.nodes[x][0] not in LEAVES:
                     free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
         for node in kept:  # an input that is put out elsewhere must survive the output that overwrites its slot
             if program.nodes[node][0] == "input":

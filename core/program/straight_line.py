@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..algebra import Scalar
-from .trace import Node, Tape, Traced, operands
+from .trace import LEAVES, Node, Tape, Traced, operands
 
 FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"})
 
@@ -49,8 +49,7 @@ def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prep
             waiting += operands(node)
     position = {number: k for k, number in enumerate(sorted(live))}
     nodes = tuple(
-        node if node[0] in ("input", "const") else (node[0], *(position[int(x)] for x in node[1:]))
-        for _, node in sorted(live.items())
+        node if node[0] in LEAVES else (node[0], *(position[int(x)] for x in node[1:])) for _, node in sorted(live.items())
     )
     return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()})
 
@@ -72,7 +71,7 @@ class Prepared:
         """The node, or where it is prepared the input that reads it."""
         node = self.tape.nodes[number]
         # a decision is no number that a slot could hold: it is made anew of what is prepared
-        if node[0] in ("input", "const", "larger") or not self._is_fixed(number):
+        if node[0] in LEAVES or node[0] == "larger" or not self._is_fixed(number):
             return node
         if number not in self._kept:
             self._kept[number] = self._slot(f"prepared {len(self._kept)}")
@@ -89,6 +88,8 @@ class Prepared:
 
     def _is_fixed(self, number: int) -> bool:
         for node in self.tape.nodes[len(self._fixed) :]:
-            here = node[1] in self._given if node[0] == "input" else all(self._fixed[x] for x in operands(node))
-            self._fixed.append(here)
+            if node[0] == "input":
+                self._fixed.append(node[1] in self._given)
+            else:
+                self._fixed.append(node[0] != "node" and all(self._fixed[x] for x in operands(node)))
         return self._fixed[number]

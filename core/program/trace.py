@@ -13,11 +13,15 @@ from typing import TypeAlias
 from ..algebra import Scalar
 
 Node: TypeAlias = tuple[str, *tuple[float, ...]]
-"""An operation and its operands: node numbers, or for "input" a slot, or for "const" a value.
+"""An operation and its operands: node numbers, or for "input" a slot, or for "const" a value; see `LEAVES`.
 
 "+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max" propagate NaN); "larger" a b is
 true where |a| > |b|; "where" m p q is p where m is true, else q; "before" x a is the x of the lane before, and a in the first lane.
 """
+LEAVES = frozenset({"input", "const", "node"})
+"""What has no operands. "node" s k is what stands in slot s of lane k among `NODES` of a group of lanes, for all lanes alike."""
+NODES = 6
+"""Lanes of a group that later ones may be extrapolated from, from the first to the last, about as far from each other."""
 
 
 class Tape:
@@ -39,6 +43,10 @@ class Tape:
     def input(self, slot: int) -> Traced:
         """The value that stands in a slot of the lanes when the program runs."""
         return self.node("input", slot)
+
+    def at(self, k: int, slot: int) -> Traced:
+        """The value that stands in a slot of a lane: the one that is number k of `NODES`."""
+        return self.node("node", slot, k)
 
     def number(self, a: Scalar) -> int:
         """The node of a scalar, constants included."""
@@ -220,4 +228,9 @@ def before(x: Traced, first: Traced) -> Scalar:
 
 def operands(node: Node) -> tuple[int, ...]:
     """The nodes an operation reads."""
-    return () if node[0] in ("input", "const") else tuple(int(x) for x in node[1:])
+    return () if node[0] in LEAVES else tuple(int(x) for x in node[1:])
+
+
+def place_of(k: int, lanes: int) -> int:
+    """The lane of a group that is number k of `NODES`."""
+    return k * (lanes - 1) // (NODES - 1)

@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request, accept_by
@@ -92,15 +90,15 @@ def loops_alone(case: Case, tol: float) -> Callable[[], None]:
     route = Level().build(case)
     model, n = route.model, len(route.path.times)
     executor = model.executor(route.lanes)
-    anchor = route.departure.copy()
+    start = route.departure.copy()
     for name, value in accept_by(tol).items():
-        anchor[model.slots[name]] = value
-    out = np.empty((model.kept, n + 2 * executor.margin))
+        start[model.slots[name]] = value
+    out, begin = executor.table(model.kept, n, route.below)
 
     def work() -> None:
         for side in route.sides:
-            first = side.first + executor.margin
-            went = executor.follow(anchor.copy(), side.samples, out, first, side.step)
+            executor.anchor[:] = start
+            went = executor.follow(side.samples, 0, len(side.times), out, begin + side.first, side.step)
             if went < len(side.times):
                 raise SolveError(f"case {case.name!r}: the loops alone end after {went} of {len(side.times)} samples on one side")
 
