@@ -3,10 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from .executor import DONE, ITERATIONS, MARGIN, Plan
 from .llvm_code import Lines
+
+
+class Rows(Lines):
+    """A loop over the rows of tables of whole numbers: its lines are those of one row."""
+
+    def __init__(self, width: int, name: str) -> None:
+        super().__init__(width, name)
+        self.row, self.count, self.constants = f"%{name}_row", 0, ""
+
+    def table(self, *columns: Sequence[int]) -> list[str]:
+        """Go through these columns; names of their entries in the row."""
+        entries: list[str] = []
+        for k, column in enumerate(columns):
+            self.count = len(column)
+            numbers = ", ".join(f"i64 {x}" for x in column)
+            self.constants += f"@{self.prefix}_{k} = internal constant [{self.count} x i64] [{numbers}]\n"
+            place = self.let(f"getelementptr i64, ptr @{self.prefix}_{k}, i64 {self.row}")
+            entries.append(self.let(f"load i64, ptr {place}, align 8"))
+        return entries
+
+    def loop(self, before: str) -> str:
+        """The loop, to be entered from the block before; what follows stands in the block "NAME_end"."""
+        name = self.prefix
+        return f"""br label %{name}
+{name}:
+  {self.row} = phi i64 [0, %{before}], [%{name}_next, %{name}]
+  {self.text}
+  %{name}_next = add i64 {self.row}, 1
+  %{name}_more = icmp ult i64 %{name}_next, {self.count}
+  br i1 %{name}_more, label %{name}, label %{name}_end
+{name}_end:"""
 
 
 def settle(plan: Plan, width: int) -> str:
@@ -69,33 +100,37 @@ end:
 
 def follow(plan: Plan, width: int) -> str:
     """See `Executor.follow`: W samples at a time, and on from the last one accepted."""
-    vector, begin, test, up, down, move = (f"<{width} x double>", *(Lines(width, prefix) for prefix in "btudm"))
-    for _, slot in plan.carried:
-        begin.write(slot, begin.spread(begin.let(f"load double, ptr {begin.number('%anchor', slot)}, align 8")))
+    vector, begin, test = f"<{width} x double>", Lines(width, "b"), Lines(width, "t")
+    # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and no faster
+    start, up, down, move = (Rows(width, name) for name in ("start", "up", "down", "move"))
+    (slot,) = start.table([target for _, target in plan.carried])
+    start.write(slot, start.spread(start.let(f"load double, ptr {start.number('%anchor', slot)}, align 8")))
     for row, slot in enumerate(plan.sampled):
         place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%at"))
         begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
     accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
-    last_column = down.let(f"sub i64 {down.let('sub i64 %first, %at')}, {width - 1}")
-    for row, slot in enumerate(plan.kept):
-        place = up.number("%out", up.sum(up.product("%row", row), up.sum("%first", "%at")))
-        up.lines.append(f"store {vector} {up.read(slot)}, ptr {place}, align 8")
-        place = down.number("%out", down.sum(down.product("%row", row), last_column))
-        down.lines.append(f"store {vector} {down.turned(down.read(slot))}, ptr {place}, align 8")
-    for source, target in plan.carried:
-        x = move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")
-        move.lines.append(f"store double {x}, ptr {move.number('%anchor', target)}, align 8")
-    return f"""declare i64 @llvm.cttz.i64(i64, i1)
+    for keep in (up, down):
+        (slot,) = keep.table(plan.kept)
+        value = keep.turned(keep.read(slot)) if keep is down else keep.read(slot)
+        place = keep.number("%out", keep.sum(keep.product("%row", keep.row), f"%{keep.prefix}_column"))
+        keep.lines.append(f"store {vector} {value}, ptr {place}, align 8")
+    source, target = move.table([source for source, _ in plan.carried], [target for _, target in plan.carried])
+    x = move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")
+    move.lines.append(f"store double {x}, ptr {move.number('%anchor', target)}, align 8")
+    tables = "\n".join(each.constants for each in (start, up, down, move))
+    return f"""{tables}
+declare i64 @llvm.cttz.i64(i64, i1)
 declare i64 @llvm.smin.i64(i64, i64)
 define i64 @follow(ptr %lane, ptr %anchor, ptr %samples, i64 %stride, i64 %wanted, ptr %out, i64 %row, i64 %first, i64 %step) {{
 entry:
   %descending = icmp slt i64 %step, 0
   br label %head
 head:
-  %at = phi i64 [0, %entry], [%next, %move]
+  %at = phi i64 [0, %entry], [%next, %move_end]
   %more = icmp slt i64 %at, %wanted
   br i1 %more, label %begin, label %end
 begin:
+  {start.loop("begin")}
   {begin.text}
   call void @settle(ptr %lane)
   call void @joined(ptr %lane)
@@ -109,17 +144,20 @@ begin:
   %none = icmp eq i64 %accepted, 0
   br i1 %none, label %end, label %keep
 keep:
-  br i1 %descending, label %down, label %up
-up:
-  {up.text}
-  br label %move
-down:
-  {down.text}
-  br label %move
-move:
+  %up_column = add i64 %first, %at
+  %down_first = sub i64 %first, %at
+  %down_column = sub i64 %down_first, {width - 1}
+  br i1 %descending, label %backward, label %forward
+forward:
+  {up.loop("forward")}
+  br label %onward
+backward:
+  {down.loop("backward")}
+  br label %onward
+onward:
   {_calls(plan.onward)}
   %last = sub i64 %accepted, 1
-  {move.text}
+  {move.loop("onward")}
   %next = add i64 %at, %accepted
   br label %head
 end:

@@ -220,4 +220,4 @@ def before(x: Traced, first: Traced) -> Scalar:
 
 def operands(node: Node) -> tuple[int, ...]:
     """The nodes an operation reads."""
-    return () if node[0] in ("input", "const") else tuple(int(x) for x in node[1:])
+    return () if node[0] in ("input", "const") else tuple(map(int, node[1:]))
