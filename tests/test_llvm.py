@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
-from kincheck.core import solve
+from kincheck.core import Revolute, solve
+from kincheck.core.analysis import tracing
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
@@ -14,6 +18,8 @@ from kincheck.core.analysis.sweep import sweep
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import (
     NODES,
+    LlvmCode,
+    LlvmExecutor,
     NumpyExecutor,
     Plan,
     Tape,
@@ -35,8 +41,6 @@ llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
 def executors(function, inputs: int, lanes: int):
     """The same program of `inputs` slots, its value in the next one, in both executors."""
-    from kincheck.core.program import LlvmCode, LlvmExecutor
-
     tape = Tape()
     traced = program("f", tape, {inputs: function(*(tape.input(k) for k in range(inputs)))})
     plan = Plan({"f": traced}, {str(k): k for k in range(inputs + 1)})
@@ -134,14 +138,70 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
         return solve(mechanism, mechanism.drivers[0].name, wanted).points[mechanism.points[0].name].position
 
     fresh = positions()
-    (entry,) = (tmp_path / "kincheck").iterdir()
-    kept = entry.read_bytes()
+    entries = [*(tmp_path / "kincheck").iterdir()]
+    assert len(entries) == 2  # what was traced, and its machine code
+    monkeypatch.setattr(tracing, "_trace", None)
+    monkeypatch.setattr(LlvmCode, "_text", None)
     np.testing.assert_array_equal(positions(), fresh)
-    assert entry.read_bytes() == kept
-    for damage in (b"", kept[:100], kept[:-1] + bytes([kept[-1] ^ 1]), b"\0" * len(kept)):
-        entry.write_bytes(damage)
-        np.testing.assert_array_equal(positions(), fresh)
-        assert entry.read_bytes() == kept
+    monkeypatch.undo()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for entry, other in (entries, entries[::-1]):
+        kept = entry.read_bytes()
+        for damage in (b"", kept[:100], kept[:-1] + bytes([kept[-1] ^ 1]), b"\0" * len(kept), other.read_bytes()):
+            entry.write_bytes(damage)
+            np.testing.assert_array_equal(positions(), fresh)
+            assert entry.read_bytes() == kept
+
+
+def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    times: list[str] = []
+    trace = tracing._trace
+    monkeypatch.setattr(tracing, "_trace", lambda *given: times.append("traced") or trace(*given))
+    mechanism = four_bar()
+    request = Request((mechanism.drivers[0].name,), ())
+    moved = replace(mechanism.bodies[0], origin=(1e-16, 0.0, 0.0))
+    for different in (
+        lambda: (mechanism, request),
+        lambda: (mechanism, replace(request, order=1)),
+        lambda: (replace(mechanism, bodies=[moved, *mechanism.bodies[1:]]), request),
+        lambda: monkeypatch.setattr(tracing, "_source", lambda: b"changed") or (mechanism, request),
+    ):
+        times.clear()
+        for _ in range(2):
+            tracing.traced(*different())
+        assert times == ["traced"]
+
+
+def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    known = four_bar()
+    hinge = next(joint for joint in known.joints if isinstance(joint, Revolute))
+
+    class Mine(Revolute):
+        type = "mine"
+
+    monkeypatch.setattr(Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine"})
+    mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
+    mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])
+    tracing.traced(mechanism, Request((known.drivers[0].name,), ()))
+    assert not (tmp_path / "kincheck").exists()
+
+
+def test_a_program_may_need_more_values_at_once_than_there_are_registers_and_exchange_its_inputs():
+    tape, rng, n = Tape(), np.random.default_rng(0), 80
+    x = [tape.input(k) for k in range(n)]
+    products = [a * b for a, b in pairwise(x)]
+    back = [where_larger(a, b, a - c, a * b) for a, b, c in zip(products, reversed(products), reversed(x[1:]), strict=True)]
+    outputs = {0: x[1], 1: x[0], 2: sum(back[1:], back[0]), 3: products[40], 70: x[30], n: products[7], n + 1: products[7]}
+    traced = program("f", tape, outputs | {slot: back[slot] for slot in range(4, 60)})
+    plan = Plan({"f": traced}, {str(k): k for k in range(n + 2)})
+    values, found = rng.normal(size=(n, 9)), list[Any]()
+    for executor in (NumpyExecutor(plan, 9), LlvmExecutor(LlvmCode(plan), 9)):
+        executor.put(range(n), values)
+        executor.run("f")
+        found.append(executor.get(range(n + 2)))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-13)  # a product and a sum may be rounded once
 
 
 def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):

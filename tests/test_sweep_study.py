@@ -147,7 +147,7 @@ def test_large_motions_are_solved_in_parts_of_a_chunk(tmp_path, monkeypatch):
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     study = Study(case, variation, 300, 4)
     whole = Ready(study).chunk(0)
-    monkeypatch.setattr(room, "ROOM", 40_000)
+    monkeypatch.setattr(room, "ROOM", 22_000)
     ready = Ready(study)
     assert 8 < ready.lanes < 100
     parts = ready.chunk(0)

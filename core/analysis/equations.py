@@ -19,7 +19,6 @@ from ..errors import SolveError
 from ..joints import Attachment, AxialJoint, Joint
 from ..joints.base import unit
 from ..mechanism import GROUND, Mechanism
-from ..primitives import conventional, paper
 from ..primitives.base import Drive
 from ..topology import spanning_tree
 
@@ -178,12 +177,12 @@ def _driven(mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, m
 
 def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
     """The constraints with every primitive replaced by its twins in the style."""
-    tables = {Style.PAPER: paper.TWINS, Style.CONVENTIONAL: conventional.TWINS}
-    if style not in tables:
+    if style not in (Style.PAPER, Style.CONVENTIONAL):
         return list(found)
+    from ..primitives import conventional, paper  # rarely asked for
+
+    twins = {Style.PAPER: paper.TWINS, Style.CONVENTIONAL: conventional.TWINS}[style]
     styled: list[Constraint | Relation] = []
     for c in found:
-        styled += (
-            [c] if isinstance(c, Relation) else [replace(c, primitive=t) for t in tables[style][type(c.primitive)](c.primitive)]
-        )
+        styled += [c] if isinstance(c, Relation) else [replace(c, primitive=t) for t in twins[type(c.primitive)](c.primitive)]
     return styled

@@ -16,14 +16,16 @@ from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, Nump
 from ..program.compiled import available
 from ..trajectory import Array
 from .components import Section
-from .programs import Tracer
 from .request import EARLIER, FROM, LARGEST_PIVOT, RATE, RATE_T, TIME, Request
+from .tracing import Tracing, traced
 
 MAX_ITERATIONS = 12
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
 TESTS = ("closure", "leftover", "branch", "pivot", LARGEST_PIVOT, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
+TESTS_OF_VARIANTS = ("closure", "pivot", ITERATIONS)
+"""Of variants these: where there is a solution, how sure, and what it took; there are very many to be written."""
 
 
 def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
@@ -32,18 +34,7 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
-    tracer = Tracer(mechanism, request, section)
-    programs = [tracer.newton(), tracer.predict()]
-    if request.order:
-        programs.append(tracer.motion("motion", request.order))
-    if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
-        programs.append(tracer.motion("tangent", 2))
-        if not request.state:
-            programs.append(tracer.extrapolate())
-    programs += [tracer.outputs(), tracer.test("alone", neighbours=False), tracer.test("joined", neighbours=True)]
-    if request.varied:
-        programs.append(tracer.prepared.program())
-    return Model(tracer, programs)
+    return Model(mechanism, request, traced(mechanism, request, section))
 
 
 class Model:
@@ -61,36 +52,29 @@ class Model:
         kept: how many rows there are.
     """
 
-    def __init__(self, tracer: Tracer, programs: Sequence[Program]) -> None:
-        self.mechanism, self.request, self.selection, self.frame = (
-            tracer.mechanism,
-            tracer.request,
-            tracer.selection,
-            tracer.frame,
-        )
-        self.programs: Mapping[str, Program] = {program.name: program for program in programs}
-        carried = tracer.carried
-        tracer.layout.scalar(ITERATIONS)
-        self.slots, self.vectors = tracer.layout.slots, tracer.layout.vectors
-        self.state = tracer.formulation.design
-        self._geometry = tracer.geometry
-        self.given = tracer.at_rest
-        self.geometry = [slot for place in tracer.geometry for slot in self.vectors[place]]
+    def __init__(self, mechanism: Mechanism, request: Request, tracing: Tracing) -> None:
+        self.mechanism, self.request = mechanism, request
+        self.selection, self.frame = tracing.selection, tracing.frame
+        self.programs: Mapping[str, Program] = {program.name: program for program in tracing.programs}
+        self.slots, self.vectors = tracing.slots, tracing.vectors
+        self.state, self.given = tracing.state, tracing.given
+        self._geometry = tracing.geometry
+        self.geometry = [slot for place in tracing.geometry for slot in self.vectors[place]]
         self.sampled = [self.slots[TIME]]
         self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
         self._tangent = "motion" if self.request.order == 2 else "tangent"
         kept = [slot for name in self._wanted() for slot in self.vectors[name]]
         self.rows = self._rows()
-        self.kept = len(kept) + len(TESTS)
+        self.kept = len(kept) + len(self._tests)
         self._plan = Plan(
             self.programs,
             self.slots,
             after=("motion", "outputs") if self.request.order else ("outputs",),
             onward=() if self.request.order == 2 else ("tangent",),
             sampled=self.sampled,
-            carried=carried,
-            kept=[*kept, *(self.slots[name] for name in TESTS)],
-            fixed=[*(target for _, target in carried), *self.geometry, *tracer.prepared.slots],
+            carried=tracing.carried,
+            kept=[*kept, *(self.slots[name] for name in self._tests)],
+            fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
             taken=[slot for name in self.given for slot in self.vectors[name]],
             loops=("part",) if self.request.state else ("follow", "fan") if self.request.varied else ("follow",),
             tolerance=self.request.last_iteration,
@@ -109,12 +93,16 @@ class Model:
         labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
         return found + [f"{label} {name}" for name in self.request.bodies for group in labels for label in group]
 
+    @property
+    def _tests(self) -> Sequence[str]:
+        return TESTS_OF_VARIANTS if self.request.varied and not self.request.state else TESTS
+
     def _rows(self) -> dict[str, slice]:
         rows: dict[str, slice] = {}
         row = 0
         for name in self._wanted():
             rows[name] = slice(row, row := row + len(self.vectors[name]))
-        for name in TESTS:
+        for name in self._tests:
             rows[name] = slice(row, row := row + 1)
         return rows
 

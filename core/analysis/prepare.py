@@ -14,15 +14,10 @@ from functools import partial
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Trajectory
-from .cascade import Cascade
-from .cascade_sweep import CascadeSweep
-from .components import components
 from .equations import Style, frames
 from .march import Route
 from .model import compile_model
 from .request import Request
-from .sparse import SparseModel
-from .sparse_sweep import solve_sparse
 from .sweep import follow
 
 # Up to as many bodies one program is made in about a second.
@@ -42,10 +37,18 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """
     count = len(mechanism.moving)
     if count > ONE_PROGRAM and request.style is Style.NATIVE and not mechanism.couplers:
+        # few mechanisms are so large: the others need not wait for the import
+        from .cascade import Cascade
+        from .cascade_sweep import CascadeSweep
+        from .components import components
+
         parts = components(mechanism, frames(mechanism))
         if max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
             return CascadeSweep(Cascade(mechanism, request, parts), path).solve
         if count > IRREDUCIBLE:
+            from .sparse import SparseModel
+            from .sparse_sweep import solve_sparse
+
             model = SparseModel(mechanism, compiled=request.compiled)
             return partial(solve_sparse, model, path, request.points, request.bodies, request.order)
     return partial(follow, Route(compile_model(mechanism, request), path))

@@ -14,7 +14,7 @@ Each is traced for what is asked: no acceleration, no gamma; no velocity, no fac
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import reduce
+from functools import cached_property, reduce
 from operator import mul
 from typing import Any
 
@@ -105,26 +105,29 @@ class Tracer:
     def _kept(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.kept]
 
+    @cached_property
+    def _factor(self) -> Elimination:
+        """The rows at the state, factored: to iterate, and where the iteration ends for the rates."""
+        return Elimination(self._kept(self.formulation.rows(self.at)))
+
     def newton(self) -> Program:
         """One Newton-Raphson iteration."""
         phi = self._kept(self.formulation.phi(self.at))
-        factor = Elimination(self._kept(self.formulation.rows(self.at)))
         out: dict[int, Scalar] = {
             self.layout.scalar("residual"): _largest(phi),
-            self.layout.scalar("pivot"): factor.signed_pivot,
+            self.layout.scalar("pivot"): self._factor.signed_pivot,
         }
-        step = factor.solve(phi)
+        step = self._factor.solve(phi)
         self._store_state(out, self.formulation.retract(self.at, [-x for x in step]))
         return program("newton", self.tape, out, self.prepared)
 
     def motion(self, name: str, order: int) -> Program:
         """Rates of the unknowns, and with order 2 their accelerations: one factorisation for both."""
-        factor = Elimination(self._kept(self.formulation.rows(self.at)))
         out: dict[int, Scalar] = {}
-        v = factor.solve(self._kept(self.formulation.nu(self.at)))
+        v = self._factor.solve(self._kept(self.formulation.nu(self.at)))
         self._store(out, RATE, v)
         if order == 2:
-            self._store(out, RATE_T, factor.solve(self._kept(self.formulation.gamma(self.at, v))))
+            self._store(out, RATE_T, self._factor.solve(self._kept(self.formulation.gamma(self.at, v))))
         return program(name, self.tape, out, self.prepared)
 
     @property

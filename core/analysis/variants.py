@@ -58,10 +58,12 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
     arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
     model.start(executor, route.origin)
-    start = executor.get(model.ahead)
+    ahead = model.ahead
+    start = executor.get(ahead)
     whole = np.empty((model.kept, n, executor.room))
-    for side in route.sides:
-        executor.put(model.ahead, start)
+    for k, side in enumerate(route.sides):
+        if k:
+            executor.put(ahead, start)
         samples = np.ascontiguousarray(side.samples[:, : len(side.times)])
         executor.fan(samples, whole, side.first, side.step)
     kept = whole[:, :, :count]

@@ -168,7 +168,8 @@ class Output:
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """The coordinate [m]; of components that do not count nothing is computed, for there may be very many samples."""
         each = zip(self.direction, at[self.point], design[self.point], strict=True)
-        return reduce(add, [along * (x - start if self.relative else x) for along, x, start in each if along])
+        moved = [(along, x - start if self.relative else x) for along, x, start in each if along]
+        return reduce(add, [x if along == 1.0 else along * x for along, x in moved])
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,14 +7,13 @@ import hashlib
 import importlib
 import importlib.util
 import os
-import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 DIGEST = 32
-"""Bytes of the checksum at the head of a cached object."""
+"""Bytes of the checksum at the head of what is cached."""
 
 
 def available() -> bool:
@@ -55,12 +54,7 @@ def load(content: str, text: Callable[[], str], signatures: Mapping[str, str]) -
     """
     llvm = _llvm()
     machine, identity = _target()
-    entry = folder() / hashlib.sha256(f"{identity}\n{content}".encode()).hexdigest()
-    code = _read(entry)
-    if code is None:
-        module = llvm.parse_assembly(text())
-        code = machine.emit_object(module)
-        _write(entry, code)
+    code = kept(f"{identity}\n{content}".encode(), lambda: machine.emit_object(llvm.parse_assembly(text())))
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -69,29 +63,46 @@ def load(content: str, text: Callable[[], str], signatures: Mapping[str, str]) -
     return engine, {name: kind(engine.get_function_address(name)) for name, kind in types.items()}
 
 
+def kept(content: bytes, make: Callable[[], bytes]) -> bytes:
+    """What the content meant before, from the cache; or made now, and kept."""
+    entry = folder() / hashlib.sha256(content).hexdigest()
+    found = _read(entry)
+    if found is None:
+        found = make()
+        _write(entry, found)
+    return found
+
+
 def folder() -> Path:
-    """Where compiled code is kept; below XDG_CACHE_HOME where that is set."""
+    """Where compiled code and traced programs are kept; below XDG_CACHE_HOME where that is set."""
     home = os.environ.get("XDG_CACHE_HOME")
     return (Path(home) if home else Path.home() / ".cache") / "kincheck"
 
 
 def _read(entry: Path) -> bytes | None:
-    """A cached object, or None where there is none that is whole."""
+    """What is cached, or None where there is nothing that is whole."""
     try:
         kept = entry.read_bytes()
     except OSError:
         return None
     code = kept[DIGEST:]
-    return code if hashlib.sha256(code).digest() == kept[:DIGEST] else None
+    return code if _checksum(entry, code) == kept[:DIGEST] else None
 
 
 def _write(entry: Path, code: bytes) -> None:
-    """Keep an object; a place that cannot be written only costs the next process a compilation."""
+    """Keep it; a place that cannot be written only costs the next process a compilation."""
+    import tempfile  # slow to import, and what is cached already needs none
+
     try:
         entry.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=entry.parent) as folder:
             whole = Path(folder) / entry.name
-            whole.write_bytes(hashlib.sha256(code).digest() + code)
+            whole.write_bytes(_checksum(entry, code) + code)
             whole.replace(entry)  # whole or not at all, whoever else is writing it
     except OSError:
         return
+
+
+def _checksum(entry: Path, code: bytes) -> bytes:
+    """Of an entry under its name: what was written for another is none."""
+    return hashlib.sha256(entry.name.encode() + code).digest()

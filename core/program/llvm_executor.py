@@ -67,6 +67,9 @@ class LlvmExecutor:
 
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
+        if values.shape[1] == 1:  # the same in all lanes
+            self._memory[:, slots] = values
+            return
         padded = np.empty((len(slots), self._groups * self.margin))
         padded[:, : self.lanes] = values
         padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]

@@ -3,10 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from .executor import DONE, ITERATIONS, MARGIN, Plan
 from .llvm_code import Lines
+
+
+class Rows(Lines):
+    """A loop over the rows of tables of whole numbers: its lines are those of one row."""
+
+    def __init__(self, width: int, name: str) -> None:
+        super().__init__(width, name)
+        self.row, self.count, self.constants = f"%{name}_row", 0, ""
+
+    def table(self, *columns: Sequence[int]) -> list[str]:
+        """Go through these columns; names of their entries in the row."""
+        entries: list[str] = []
+        for k, column in enumerate(columns):
+            self.count = len(column)
+            numbers = ", ".join(f"i64 {x}" for x in column)
+            self.constants += f"@{self.prefix}_{k} = internal constant [{self.count} x i64] [{numbers}]\n"
+            place = self.let(f"getelementptr i64, ptr @{self.prefix}_{k}, i64 {self.row}")
+            entries.append(self.let(f"load i64, ptr {place}, align 8"))
+        return entries
+
+    def loop(self, before: str) -> str:
+        """The loop, to be entered from the block before; what follows stands in the block "NAME_end"."""
+        name = self.prefix
+        return f"""br label %{name}
+{name}:
+  {self.row} = phi i64 [0, %{before}], [%{name}_next, %{name}]
+  {self.text}
+  %{name}_next = add i64 {self.row}, 1
+  %{name}_more = icmp ult i64 %{name}_next, {self.count}
+  br i1 %{name}_more, label %{name}, label %{name}_end
+{name}_end:"""
 
 
 def settle(plan: Plan, width: int) -> str:
@@ -68,42 +99,48 @@ end:
 
 def follow(plan: Plan, width: int) -> str:
     """See `Executor.follow`: W samples at a time, and on from the last one accepted."""
-    vector = f"<{width} x double>"
-    enter, begin, test, up, down, back, move, leave = (Lines(width, prefix) for prefix in "ebtudrml")
-    for _, slot in plan.carried:
-        enter.write(slot, enter.spread(enter.let(f"load double, ptr {enter.number('%anchor', slot)}, align 8")))
-        x = leave.let(f"load double, ptr {leave.slot(slot)}, align 8")
-        leave.lines.append(f"store double {x}, ptr {leave.number('%anchor', slot)}, align 8")
+    vector, begin, test, given = f"<{width} x double>", *(Lines(width, prefix) for prefix in "btg")
+    # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and no faster
+    enter, up, down, back, move, leave = (Rows(width, name) for name in ("enter", "up", "down", "back", "move", "leave"))
+    sources, targets = zip(*plan.carried, strict=True)
+    for each in (enter, leave):
+        (slot,) = each.table([slot for _, slot in plan.carried])
+        place = each.number("%anchor", slot)
+        if each is enter:
+            each.write(slot, each.spread(each.let(f"load double, ptr {place}, align 8")))
+        else:
+            x = each.let(f"load double, ptr {each.slot(slot)}, align 8")
+            each.lines.append(f"store double {x}, ptr {place}, align 8")
     for row, slot in enumerate(plan.sampled):
         place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%at"))
         begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
+        place = given.number("%samples", given.sum(given.sum(given.product("%stride", row), "%at"), -1))
+        given.write(slot, given.spread(given.let(f"load double, ptr {place}, align 8")))
     accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
-    last_column = down.let(f"sub i64 {down.let('sub i64 %first, %at')}, {width - 1}")
-    for row, slot in enumerate(plan.kept):
-        place = up.number("%out", up.sum(up.product("%row", row), up.sum("%first", "%at")))
-        up.lines.append(f"store {vector} {up.read(slot)}, ptr {place}, align 8")
-        place = down.number("%out", down.sum(down.product("%row", row), last_column))
-        down.lines.append(f"store {vector} {down.turned(down.read(slot))}, ptr {place}, align 8")
-    for source, target in plan.carried:
-        move.write(target, move.spread(move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")))
-    for source, target in reversed(plan.carried):
-        back.write(source, back.read(target))
-    for row, slot in enumerate(plan.sampled):
-        place = back.number("%samples", back.sum(back.sum(back.product("%stride", row), "%at"), -1))
-        back.write(slot, back.spread(back.let(f"load double, ptr {place}, align 8")))
+    for keep in (up, down):
+        (slot,) = keep.table(plan.kept)
+        value = keep.turned(keep.read(slot)) if keep is down else keep.read(slot)
+        place = keep.number("%out", keep.sum(keep.product("%row", keep.row), f"%{keep.prefix}_column"))
+        keep.lines.append(f"store {vector} {value}, ptr {place}, align 8")
+    source, target = move.table(sources, targets)
+    move.write(target, move.spread(move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")))
+    source, target = back.table(sources[::-1], targets[::-1])
+    back.write(source, back.read(target))
+    tables = "\n".join(each.constants for each in (enter, up, down, back, move, leave))
     extrapolates = plan.extrapolates(width)
     inputs = "ptr %samples, i64 %stride, i64 %from, i64 %stop, ptr %out"
-    return f"""declare i64 @llvm.cttz.i64(i64, i1)
+    return f"""{tables}
+declare i64 @llvm.cttz.i64(i64, i1)
 declare i64 @llvm.smin.i64(i64, i64)
 declare i64 @llvm.smax.i64(i64, i64)
 define i64 @follow(ptr %lane, ptr %anchor, {inputs}, i64 %row, i64 %first, i64 %step) {{
 entry:
   %descending = icmp slt i64 %step, 0
-  {enter.text}
+  {enter.loop("entry")}
   br label %head
 head:
-  %at = phi i64 [%from, %entry], [%next, %move]
-  %smooth = phi i1 [false, %entry], [%whole, %move]
+  %at = phi i64 [%from, %enter_end], [%next, %move_end]
+  %smooth = phi i1 [false, %enter_end], [%whole, %move_end]
   %more = icmp slt i64 %at, %stop
   br i1 %more, label %begin, label %end
 begin:
@@ -132,30 +169,34 @@ attempt:
   %none = icmp eq i64 %accepted, 0
   br i1 %none, label %missed, label %keep
 missed:
-  br i1 %smooth, label %back, label %end
-back:
-  {back.text}
+  br i1 %smooth, label %return, label %end
+return:
+  {back.loop("return")}
+  {given.text}
   br label %onward
 keep:
-  br i1 %descending, label %down, label %up
-up:
-  {up.text}
+  %up_column = add i64 %first, %at
+  %down_first = sub i64 %first, %at
+  %down_column = sub i64 %down_first, {width - 1}
+  br i1 %descending, label %backward, label %forward
+forward:
+  {up.loop("forward")}
   br label %kept
-down:
-  {down.text}
+backward:
+  {down.loop("backward")}
   br label %kept
 kept:
-  br i1 %whole, label %move, label %onward
+  br i1 %whole, label %carry, label %onward
 onward:
   {_calls(plan.onward)}
-  br label %move
-move:
+  br label %carry
+carry:
   %before = sub i64 %accepted, 1
   %last = call i64 @llvm.smax.i64(i64 %before, i64 0)
-  {move.text}
+  {move.loop("carry")}
   br label %head
 end:
-  {leave.text}
+  {leave.loop("end")}
   ret i64 %at
 }}
 """

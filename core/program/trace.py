@@ -228,7 +228,7 @@ def before(x: Traced, first: Traced) -> Scalar:
 
 def operands(node: Node) -> tuple[int, ...]:
     """The nodes an operation reads."""
-    return () if node[0] in LEAVES else tuple(int(x) for x in node[1:])
+    return () if node[0] in LEAVES else tuple(map(int, node[1:]))
 
 
 def place_of(k: int, lanes: int) -> int:

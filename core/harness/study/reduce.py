@@ -57,23 +57,23 @@ def summary(values: Array, first: int) -> Summary:
         first: index of the first variant.
     """
     quantities, n, variants = values.shape
-    if np.isnan(values.sum()):  # some are missing
+    mean = values.mean(axis=2)
+    if np.isnan(mean).any():  # some are missing
         there = ~np.isnan(values)
         count = there.sum(axis=2)
+        low, high = np.where(there, values, np.inf), np.where(there, values, -np.inf)
         with np.errstate(all="ignore"):
-            least, most = np.fmin.reduce(values, axis=2), np.fmax.reduce(values, axis=2)
             mean = np.where(count, np.where(there, values, 0.0).sum(axis=2) / count, np.nan)
         centered = np.where(there, values - mean[:, :, None], 0.0)
     else:
-        count = np.full((quantities, n), variants)
-        least, most, mean = values.min(axis=2), values.max(axis=2), values.mean(axis=2)
+        count, low, high = np.full((quantities, n), variants), values, values
         centered = values - mean[:, :, None]
+    least, most = low.min(axis=2), high.max(axis=2)
     extremes = np.full((quantities, 2), -1, dtype=np.int64)
-    for q in range(quantities):
-        for side, ends in enumerate((least[q], -most[q])):
-            if not np.isnan(ends).all():
-                sample = values[q, int(np.nanargmin(ends))]
-                extremes[q, side] = first + int(np.nanargmin(sample) if side == 0 else np.nanargmax(sample))
+    for q in np.flatnonzero(count.any(axis=1)).tolist():
+        lowest, highest = low[q, least[q].argmin()], high[q, most[q].argmax()]
+        extremes[q] = first + lowest.argmin(), first + highest.argmax()
+    least[count == 0] = most[count == 0] = np.nan
     return Summary(count, least, most, mean, np.einsum("qnv,qnv->qn", centered, centered), extremes)
 
 
@@ -90,9 +90,10 @@ def merged(a: Summary, b: Summary) -> Summary:
         mean = np.where(a.count == 0, b.mean, np.where(b.count == 0, a.mean, a.mean + step * share))
         both = np.where((a.count == 0) | (b.count == 0), 0.0, step * step * a.count * share)
         least, most = np.fmin(a.least, b.least), np.fmax(a.most, b.most)
-        # b's only where it is further out: the first of equals stays
-        below = np.fmin.reduce(b.least, axis=1) < np.nan_to_num(np.fmin.reduce(a.least, axis=1), nan=np.inf)
-        above = np.fmax.reduce(b.most, axis=1) > np.nan_to_num(np.fmax.reduce(a.most, axis=1), nan=-np.inf)
+        # b's only where it is further out, or a has none: the first of equals stays
+        none = a.extremes[:, 0] < 0
+        below = none | (np.fmin.reduce(b.least, axis=1) < np.fmin.reduce(a.least, axis=1))
+        above = none | (np.fmax.reduce(b.most, axis=1) > np.fmax.reduce(a.most, axis=1))
     extremes = np.where(np.stack([below, above], axis=1), b.extremes, a.extremes)
     return Summary(count, least, most, mean, a.squares + b.squares + both, extremes)
 
@@ -132,7 +133,8 @@ def quantiles(kept: Sequence[Array], *, exact: bool) -> Quantiles:
         some = ~np.isnan(values).all(axis=1)
         found[:, some] = np.nanquantile(values[some], wanted, axis=1)
     else:
-        found = np.quantile(values, wanted, axis=1)
+        values.sort(axis=1)  # by vectors of numbers: half the time of looking for each quantile in turn
+        found = np.quantile(values, wanted, axis=1, overwrite_input=True)
     if exact:
         return Quantiles(found, None, count)
     here, below, above = found.reshape(3, len(p), -1)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from itertools import islice
 from time import perf_counter, process_time
 from typing import Any, Protocol
@@ -117,7 +119,9 @@ def sweep_designs(
     measured = _measured(study, jobs if source is None else None, perf_counter() - begin, process_time() - cpu)
     slopes = gradients(ready)
     exact = study.subset >= 1.0 and variation.mode is not Mode.MONTE_CARLO
-    kept = [quantiles([part[k] for part in found.kept], exact=exact) for k in range(len(study.rows))]
+    by_row = [[part[k] for part in found.kept] for k in range(len(study.rows))]
+    with ThreadPoolExecutor(jobs) as pool:  # sorting is done without Python's lock
+        kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     checked = (
         checking.check(study, check.engine, check.solver, found.picked, check.tol, check.progress) if check is not None else []
     )  # fmt: skip

@@ -1,0 +1,105 @@
+"""A mechanism traced: its programs and how they are laid out, kept on disk beside the machine code that is made of them.
+
+What is kept is found again by the mechanism, the request and the source of all that traces: where any of it differs, it is traced
+anew. Joints of the user's own are traced every time, for their source may be anywhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from ..mechanism import Mechanism
+from ..program import ITERATIONS, Program
+from ..program.compiled import available, kept
+from .components import Section
+from .equations import Frames
+from .freedom import Selection
+from .programs import Tracer
+from .request import Request
+
+CORE = Path(__file__).parents[1]
+PACKAGE = __name__.split(".analysis.")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Tracing:
+    """What tracing a mechanism for a request gives.
+
+    Attributes:
+        slots: name of a scalar -> its place in a lane.
+        vectors: name of a vector -> the places of its components.
+        state: name of a vector of the state -> its value at design.
+        geometry: the values of all varied places at design.
+        given: name of a vector that tells how a given body moves -> its value at rest at design.
+        carried: slots of a solved lane, and of what the lanes after it are predicted from.
+        prepared: slots of what depends on the geometry alone.
+    """
+
+    programs: Sequence[Program]
+    slots: Mapping[str, int]
+    vectors: Mapping[str, Sequence[int]]
+    state: Mapping[str, Sequence[float]]
+    geometry: Mapping[str, Sequence[float]]
+    given: Mapping[str, Sequence[float]]
+    carried: Sequence[tuple[int, int]]
+    prepared: Sequence[int]
+    selection: Selection
+    frame: Frames
+
+
+def traced(mechanism: Mechanism, request: Request, section: Section | None = None) -> Tracing:
+    """Select the rows and trace the programs that the request needs, or take what is known of an earlier time.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match.
+    """
+    parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers)
+    ours = all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
+    if section or request.varied or not (ours and request.compiled and available()):
+        return _trace(mechanism, request, section)
+    content = _source() + pickle.dumps((mechanism, request))
+    found: Tracing = pickle.loads(kept(content, lambda: pickle.dumps(_trace(mechanism, request, None))))
+    return found
+
+
+@cache
+def _source() -> bytes:
+    """A digest of the source that tracing runs through, and whatever stands beside it."""
+    digest = hashlib.sha256()
+    for folder in (CORE, *(CORE / name for name in ("primitives", "joints", "program", "analysis"))):
+        for file in sorted(folder.glob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.digest()
+
+
+def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> Tracing:
+    tracer = Tracer(mechanism, request, section)
+    programs = [tracer.newton(), tracer.predict()]
+    if request.order:
+        programs.append(tracer.motion("motion", request.order))
+    if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
+        programs.append(tracer.motion("tangent", 2))
+        if not request.state:
+            programs.append(tracer.extrapolate())
+    programs += [tracer.outputs(), tracer.test("alone", neighbours=False), tracer.test("joined", neighbours=True)]
+    if request.varied:
+        programs.append(tracer.prepared.program())
+    carried = tracer.carried
+    tracer.layout.scalar(ITERATIONS)
+    return Tracing(
+        programs,
+        tracer.layout.slots,
+        tracer.layout.vectors,
+        tracer.formulation.design,
+        tracer.geometry,
+        tracer.at_rest,
+        carried,
+        tracer.prepared.slots,
+        tracer.selection,
+        tracer.frame,
+    )
