@@ -14,7 +14,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
-from .equations import Frames, constraints, frames
+from .equations import Frames, constraints
 from .formulation import Formulation
 
 # Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
@@ -123,15 +123,14 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     )
 
 
-def require_driven(mechanism: Mechanism, frame: Frames | None = None) -> FreedomAccount:
-    """The account of a mechanism that has as many drivers as degrees of freedom.
+def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
+    """The account of a mechanism that has as many drivers as degrees of freedom; for any size there is `driven.require_driven`.
 
     Raises:
         SolveError: it has more or fewer, or nothing moves.
     """
     if not mechanism.moving:
         raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
-    frame = frame or frames(mechanism)
     found = account(mechanism, frame)
     if found.dof != len(mechanism.drivers):
         raise SolveError(_mismatch(mechanism, frame, found))
@@ -144,7 +143,7 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -
     Raises:
         SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
     """
-    found, drivers = require_driven(mechanism, frame), len(mechanism.drivers)
+    found, drivers = driven_account(mechanism, frame), len(mechanism.drivers)
     matrix = design_jacobian(formulation)
     kept = independent_rows(matrix, drivers)
     if len(kept) < formulation.unknowns:
@@ -165,13 +164,19 @@ def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
     return formulation, design_jacobian(formulation)
 
 
+def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:
+    """Says how many degrees of freedom and how many drivers there are."""
+    drivers = len(mechanism.drivers)
+    return (
+        f"mechanism {mechanism.name!r}: {dof} degree{'s' * (dof != 1)} of freedom "
+        f"({unknowns} coordinates - rank {unknowns - dof}) but {drivers} driver{'s' * (drivers != 1)}"
+    )
+
+
 def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:
     """Says what is still free with the drivers held, by name: the bodies that move in the null space of all rows."""
     matrix, drivers = _matrix(mechanism, frame)[1], len(mechanism.drivers)
-    head = (
-        f"mechanism {mechanism.name!r}: {found.dof} degree{'s' * (found.dof != 1)} of freedom "
-        f"({found.moving_coordinates} coordinates - rank {found.rank}) but {drivers} driver{'s' * (drivers != 1)}"
-    )
+    head = mismatch(mechanism, found.dof, found.moving_coordinates)
     if found.dof < drivers:
         return f"{head}; remove {drivers - found.dof} or free the mechanism"
     motions = np.linalg.svd(matrix, full_matrices=True)[2][len(independent_rows(matrix, 0)) :]
