@@ -4,7 +4,6 @@ import importlib
 import os
 import signal
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from kincheck.core.harness.record import Outcome
@@ -20,21 +19,11 @@ from .drill import Slow
 from .fakes import Fake, crank, raising
 from .test_workers import timeless
 
-ROOT = Path(__file__).parent.parent
 TOL = 1e-12
 LIMITS = Limits(timeout=60.0, memory=1.0)
-distributed = pytest.importorskip("distributed")
+pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
-
-
-@pytest.fixture
-def cluster(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT))  # for the cluster's workers too, which are spawned from here
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as found:
-        yield found
 
 
 def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost(cluster):

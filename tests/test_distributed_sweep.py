@@ -3,7 +3,6 @@
 import importlib
 import os
 import signal
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -19,20 +18,10 @@ from kincheck.core.harness.workers.frames import pack
 from .fakes import crank
 from .test_vary import vary
 
-ROOT = Path(__file__).parent.parent
 POINTS = {"ball": {"at": "ball", "sigma": 1.0}, "axis": {"at": "joints.lca_pivot.axis", "sigma": 0.1}}
-distributed = pytest.importorskip("distributed")
+pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
-
-
-@pytest.fixture
-def cluster(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT))  # for the cluster's workers too, which are spawned from here
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as found:
-        yield found
 
 
 def timeless(results):

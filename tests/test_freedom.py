@@ -175,7 +175,7 @@ def test_too_many_drivers():
 def test_a_driver_at_its_dead_centre():
     """Stretched out, the slider does not move the crank to first order."""
     pushed = replace(slider_crank(), drivers=[JointDisplacement("push", "guide")])
-    with pytest.raises(SolveError, match=r"driven by 'push' .*dead"):
+    with pytest.raises(SolveError, match=r"driver 'push' does not move it .*dead"):
         solve(pushed, "push", [0.0, -0.01])
 
 
@@ -278,3 +278,19 @@ def test_independent_rows_of_random_matrices(seed):
     kept = independent_rows(matrix, 1)
     assert len(kept) == rank == np.linalg.matrix_rank(matrix[kept])
     assert 11 in kept
+
+
+@pytest.mark.parametrize("style", ["native", "mixed", "conventional"])
+def test_a_driver_that_is_locked_at_the_design_is_named_with_what_locks_it_and_what_to_do(style):
+    pushed = replace(slider_crank(), drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
+    said = r"driver 'push' does not move it .* already from 'pivot', 'rod'; give the design in another pose"
+    with pytest.raises(SolveError, match=said):
+        solve(pushed, "push", [0.0], style=style)
+
+
+def test_drivers_that_repeat_each_other_are_named_and_no_others():
+    axles = [Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0)) for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))]
+    drivers = [JointAngle("first", "a"), JointAngle("second", "a"), JointAngle("sound", "b")]
+    twice = Mechanism("twice", [Body("a"), Body("b"), Body("c")], axles, [], drivers)
+    with pytest.raises(SolveError, match=r"drivers 'first', 'second' do not move it .* follows already from each other; give"):
+        solve(twice, "first", [0.0])

@@ -62,7 +62,7 @@ def test_cells_say_how_far_off_or_why_not(run):
         "unavailable",
     ]
     assert "against native: position [m]" in markdown
-    assert "Unsupported: crank in unable: joint 'pivot' (revolute) has no | counterpart." in markdown
+    assert r"Unsupported: crank in unable: joint 'pivot' (revolute) has no \| counterpart." in markdown
     assert "no [axis] there" in markdown
 
 

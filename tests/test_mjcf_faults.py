@@ -43,6 +43,7 @@ FAULTS = {
     "unknown section": (("<tendon>", "<legs/><tendon>"), ["<legs>", "unknown in a model"]),
     "two numbers": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132"'), ["'right_spring_link'", "pos", "3 numbers"]),
     "no number": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132 O"'), ["'right_spring_link'", "pos", "'0 0.0132 O'"]),
+    "digit separators": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132 1_0"'), ["'right_spring_link'", "pos", "'0 0.0132 1_0'"]),
     "not finite": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132 inf"'), ["'right_spring_link'", "pos"]),
     "two orientations": ((BASE, f'{BASE} euler="0 0 90"'), ["'base_mount'", "quat and euler", "one orientation"]),
     "no orientation": (('quat="1 0 0 -1"', 'quat="0 0 0 0"'), ["'base'", "quat", "no direction"]),

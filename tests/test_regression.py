@@ -223,7 +223,7 @@ def test_rules_find_the_run_to_compare_with(path):
     with pytest.raises(KincheckError, match="there is no run 8"):
         reported(path, against="8")
     with pytest.raises(
-        KincheckError, match=r"run 'green' cannot be read .*; give a number of the history, a results.json, last-green or"
+        KincheckError, match=r"there is no run 'green'; give a number of the history, a results.json, last-green or"
     ):
         reported(path, against="green")
 
@@ -287,5 +287,5 @@ def test_markdown_takes_foreign_text_as_text_and_folds_what_is_alike(path):
     message = "</details> | `x` @team"
     keep(path, [msgspec.structs.replace(each, outcome=Outcome.ERROR, message=message) for each in records()])
     text = to_markdown(reported(path))
-    assert "| mujoco | first, second | pass → error: &lt;/details> \\| \\`x\\` @\u200bteam" in text
+    assert "| mujoco | first, second | pass → error: &lt;/details&gt; \\| \\`x\\` @\u2060team" in text
     assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")

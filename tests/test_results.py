@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 
 import msgspec
 import pytest
+from kincheck.core.harness import cli
 from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.reporting.junit import to_junit
 from kincheck.core.harness.reporting.table import print_table
@@ -100,3 +101,18 @@ def test_the_table_names_modes_where_there_are_several(capsys):
     assert "projection" not in capsys.readouterr().out
     print_table(run([crank()], [Fake("one"), Fake("two", mode="simulate")], tol=TOL), sys.stdout)
     assert "two · simulate" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [('{"run": {"a": ' + "[" * 100_000, "recursion"), ("{}", "expected results"), ('{"schema": "other"}', "expected results")],
+    ids=["nested", "empty", "another schema"],
+)
+def test_a_file_that_holds_no_results_is_refused_in_one_line(tmp_path, capsys, text, said):
+    file = tmp_path / "results.json"
+    file.write_text(text)
+    assert cli.main(["report", str(file)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"kincheck: {file}: found ")
+    assert said in line
+    assert line.endswith("make it anew with kincheck run --json")

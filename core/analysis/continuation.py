@@ -12,8 +12,8 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Path, Ramp
 from ..trajectory import Array
+from .driven import require_driven
 from .equations import Style
-from .freedom import require_driven
 from .model import compile_model
 from .request import Request
 from .singularity import Singularity, examine

@@ -7,9 +7,11 @@ alike in size. Every moving body gets an internal origin at one of its joints, s
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from statistics import median
 from typing import Any
 
 from .. import primitives as p
@@ -78,6 +80,19 @@ def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
         position = at[0] if at else mechanism.body(branch.child).origin
         origins[branch.child] = (1.0 / length_unit) * vec(position)
     return Frames(length_unit, origins, tuple(body.name for body in mechanism.moving))
+
+
+def measured(mechanism: Mechanism) -> tuple[float, Frames]:
+    """A large mechanism's size, and frames whose unit of length is near the size of its bodies; powers of two of metres."""
+    whole = frames(mechanism)
+    points: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+    for joint in mechanism.joints:
+        for body in joint.bodies:
+            points[body] += joint_points(joint, body)
+    extents = [max(max(axis) - min(axis) for axis in zip(*points[body], strict=True)) for body in whole.moving if points[body]]
+    sizes = [extent for extent in extents if extent > 0.0]
+    unit = 2.0 ** round(math.log2(median(sizes))) if sizes else whole.unit
+    return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
 
 
 def joint_points(joint: Joint, body: str | None = None) -> list[tuple[float, float, float]]:

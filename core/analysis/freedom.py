@@ -14,12 +14,14 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
-from .equations import Frames, constraints, frames
+from .equations import Frames, constraints
 from .formulation import Formulation
 
 # Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
 # sound linkages is near 1e-2. In between lies nearly singular geometry, which is to be solved, not reduced.
 RANK_TOLERANCE = 1e-9
+SHARE = 1e-6
+"""A row takes part in a sum that vanishes with at least this weight, the weights' squares adding up to one: round-off is 1e-15."""
 EULER_PARAMETERS = 7
 """Coordinates of a body in the paper's count: r and p."""
 
@@ -123,15 +125,14 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     )
 
 
-def require_driven(mechanism: Mechanism, frame: Frames | None = None) -> FreedomAccount:
-    """The account of a mechanism that has as many drivers as degrees of freedom.
+def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
+    """The account of a mechanism that has as many drivers as degrees of freedom; for any size there is `driven.require_driven`.
 
     Raises:
         SolveError: it has more or fewer, or nothing moves.
     """
     if not mechanism.moving:
         raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
-    frame = frame or frames(mechanism)
     found = account(mechanism, frame)
     if found.dof != len(mechanism.drivers):
         raise SolveError(_mismatch(mechanism, frame, found))
@@ -144,15 +145,11 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -
     Raises:
         SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
     """
-    found, drivers = require_driven(mechanism, frame), len(mechanism.drivers)
+    found, drivers = driven_account(mechanism, frame), len(mechanism.drivers)
     matrix = design_jacobian(formulation)
     kept = independent_rows(matrix, drivers)
     if len(kept) < formulation.unknowns:
-        raise SolveError(
-            f"mechanism {mechanism.name!r}: driven by {', '.join(repr(d.name) for d in mechanism.drivers)} it can still move "
-            f"at the design position (rank {len(kept)} of {formulation.unknowns}): a driver does not move it there (lock-up or "
-            "dead centre), or repeats what a joint or another driver prescribes; drive another coordinate or shift the design"
-        )
+        raise SolveError(_locked(mechanism, formulation, matrix))
     dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))
     names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
     # taken with the drivers first, and in this formulation, the rows that are left out may be others
@@ -160,18 +157,44 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -
     return Selection(found, tuple(kept), dropped)
 
 
+def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> str:
+    """Says which drivers do not move the mechanism at the design position, and which joints and drivers hold them."""
+    joint_rows = len(matrix) - len(mechanism.drivers)
+    rows = [*independent_rows(matrix[:joint_rows], 0), *range(joint_rows, len(matrix))]
+    # the sums of rows that vanish; those of joints are independent, so there is a driver in each
+    left, sizes, _ = np.linalg.svd(matrix[rows])
+    sums = left[:, int((sizes > RANK_TOLERANCE * sizes.max()).sum()) :]
+    share = np.linalg.norm(sums, axis=1)
+    involved = dict.fromkeys(formulation.owners[k][0] for k, x in zip(rows, share, strict=True) if x > SHARE)
+    drivers = [repr(each.name) for each in mechanism.drivers if each.name in involved]
+    joints = [repr(name) for name in involved if repr(name) not in drivers]
+    many = len(drivers) > 1
+    return (
+        f"mechanism {mechanism.name!r}: driver{'s' * many} {', '.join(drivers)} do{'es' * (not many)} not move it at the design "
+        f"position (lock-up or dead centre): what {'they prescribe' if many else 'it prescribes'} there follows already from "
+        f"{', '.join([*joints, *['each other'] * many])}; give the design in another pose, some degrees on, and sweep from there, "
+        "or drive another coordinate"
+    )
+
+
 def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     return formulation, design_jacobian(formulation)
 
 
+def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:
+    """Says how many degrees of freedom and how many drivers there are."""
+    drivers = len(mechanism.drivers)
+    return (
+        f"mechanism {mechanism.name!r}: {dof} degree{'s' * (dof != 1)} of freedom "
+        f"({unknowns} coordinates - rank {unknowns - dof}) but {drivers} driver{'s' * (drivers != 1)}"
+    )
+
+
 def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:
     """Says what is still free with the drivers held, by name: the bodies that move in the null space of all rows."""
     matrix, drivers = _matrix(mechanism, frame)[1], len(mechanism.drivers)
-    head = (
-        f"mechanism {mechanism.name!r}: {found.dof} degree{'s' * (found.dof != 1)} of freedom "
-        f"({found.moving_coordinates} coordinates - rank {found.rank}) but {drivers} driver{'s' * (drivers != 1)}"
-    )
+    head = mismatch(mechanism, found.dof, found.moving_coordinates)
     if found.dof < drivers:
         return f"{head}; remove {drivers - found.dof} or free the mechanism"
     motions = np.linalg.svd(matrix, full_matrices=True)[2][len(independent_rows(matrix, 0)) :]

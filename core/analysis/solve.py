@@ -11,8 +11,8 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, Trajectory
+from .driven import require_driven
 from .equations import Style
-from .freedom import require_driven
 from .prepare import prepare
 from .request import Request
 

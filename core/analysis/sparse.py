@@ -10,7 +10,6 @@ not of the whole: that is what the entries of the matrix and the round-off of th
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,7 +22,7 @@ from ..motions import Path
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE, PIVOT
 from .elements import Elements, Indices
-from .equations import Frames, constraints, frames, joint_points
+from .equations import constraints, measured
 from .factors import Factors, SingularError
 from .freedom import RANK_TOLERANCE
 from .model import CLOSED, MAX_ITERATIONS
@@ -88,7 +87,7 @@ class SparseModel:
         if not mechanism.moving:
             raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
         self.mechanism = mechanism
-        self.extent, self.frame = _measured(mechanism)
+        self.extent, self.frame = measured(mechanism)
         self.elements = Elements(
             constraints(mechanism, self.frame, {}), self.frame.moving, len(mechanism.drivers), compiled=compiled
         )
@@ -283,16 +282,3 @@ def euler_parameters(components: Array) -> Quat:
     """Four rows as Euler parameters whose scalars are arrays."""
     e0, x, y, z = components
     return Quat(e0, Vec3(x, y, z))
-
-
-def _measured(mechanism: Mechanism) -> tuple[float, Frames]:
-    """The mechanism's size, and frames whose unit of length is near the size of its bodies; powers of two of metres."""
-    whole = frames(mechanism)
-    points: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    for joint in mechanism.joints:
-        for body in joint.bodies:
-            points[body] += joint_points(joint, body)
-    extents = [max(max(axis) - min(axis) for axis in zip(*points[body], strict=True)) for body in whole.moving if points[body]]
-    sizes = [extent for extent in extents if extent > 0.0]
-    unit = 2.0 ** round(math.log2(float(np.median(sizes)))) if sizes else whole.unit
-    return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)

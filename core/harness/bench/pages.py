@@ -117,5 +117,5 @@ def page(report: Report) -> str:
             "plotlyjs": packed(plotly.get_plotlyjs()),
             "script": (reporting / "report.js").read_text("utf-8"),
         }
-    style = (reporting / "report.css").read_text("utf-8")
-    return environment.get_template("bench.html").render(report=report, style=style, shown=shown)
+    css = (reporting / "report.css").read_text("utf-8")
+    return environment.get_template("bench.html").render(report=report, css=css, shown=shown)

@@ -57,8 +57,7 @@ class House:
         Raises:
             KincheckError: there is none, its file does not make sense, or its drivers do not match its freedom.
         """
-        from ...analysis.freedom import require_driven
-        from ...analysis.prepare import IRREDUCIBLE
+        from ...analysis.driven import require_driven
         from ..reading.files import SUFFIXES, load
 
         known = self.cases()
@@ -73,8 +72,7 @@ class House:
         if not driven:
             return case
         try:
-            if len(case.mechanism.moving) <= IRREDUCIBLE:  # the rank of a larger one is found where it is solved, part by part
-                require_driven(case.mechanism)
+            require_driven(case.mechanism)
         except SolveError as error:  # it names the mechanism; the file is what the reader has to open
             raise KincheckError(f"{name}: {error}") from error
         return case

@@ -17,6 +17,7 @@ from .series import History
 from .trends import trends
 
 _HERE = Path(__file__).parent
+_LOOK = _HERE.parent / "reporting"
 
 
 def write_plot(history: History, path: Path, *, title: str) -> None:
@@ -46,13 +47,13 @@ def page(history: History, *, title: str) -> str:
             figures.append(_grounded(figure))
         cases.append((case, places))
     environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader([_HERE, _LOOK]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     return environment.get_template("history.html").render(
         title=title,
         runs=len(history.runs),
         cases=cases,
-        css=(_HERE.parent / "reporting" / "report.css").read_text("utf-8"),
+        css=(_LOOK / "report.css").read_text("utf-8"),
         data=packed(json.dumps(figures, allow_nan=False)),
         plotlyjs=packed(plotly.get_plotlyjs()),
     )

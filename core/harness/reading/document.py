@@ -95,6 +95,17 @@ def brief(text: str) -> str:
     return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 6]} [...]"
 
 
+def decimal(text: str) -> float:
+    """The number that a text is, as every language reads it.
+
+    Raises:
+        ValueError: it is none, or of digits that only Python takes: 1_0 is ten there, and a slip of the pen anywhere else.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return float(text)
+
+
 def read_text(file: Path, limit: int, why_limit: str) -> str:
     """The text of a file of at most `limit` bytes.
 

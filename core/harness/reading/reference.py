@@ -28,7 +28,7 @@ from ...trajectory import Array
 from ..case import Quantity, Series
 from ..references import read, series
 from ..suspension import PerTravel, SuspensionOutput
-from .document import fault, read_text, remedy, shown
+from .document import decimal, fault, read_text, remedy, shown
 
 LARGEST_FILE = 64_000_000
 # As many samples as a sweep can have, and as many lines between them.
@@ -187,7 +187,7 @@ def _beside(case_file: Path, name: str) -> Path:
 
 def _number(file: Path, line: str, column: str, cell: str) -> float:
     try:
-        number = float(cell)
+        number = decimal(cell)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

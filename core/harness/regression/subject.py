@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from ...errors import KincheckError
 from ..history.series import green
 from ..history.store import RunRow, Store
-from ..record import Results, from_json
+from ..reading.results import read_results
+from ..record import Results
 from .findings import RunName
 
 LAST_GREEN = "last-green"
@@ -87,13 +86,10 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
 
 
 def _in_file(file: Path) -> Subject:
-    try:
-        return Subject(str(file), None, from_json(file.read_bytes()))
-    except OSError as error:
+    if not file.exists():
         known = f"a number of the history, a results.json, {LAST_GREEN} or BRANCH{BASELINE}"
-        raise KincheckError(f"report: run {str(file)!r} cannot be read ({error.strerror}); give {known}") from None
-    except msgspec.MsgspecError as error:
-        raise KincheckError(f"report: {file} holds no results ({error}); `kincheck run --json FILE` writes some") from None
+        raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
+    return Subject(str(file), None, read_results(file))
 
 
 def _kept(store: Store, row: RunRow, rule: str = "") -> Subject:

@@ -8,13 +8,14 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from ..markdown import escaped, row
 from .findings import WHY, Kind, Regressions, Step
 from .wording import LONGEST, headline, loose_says, product, rows, step_says
 
 
 def to_markdown(found: Regressions) -> str:
     """What changed, the worst first; what is long is folded away."""
-    return "\n".join([f"## {_escaped(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
+    return "\n".join([f"## {escaped(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
 
 
 def to_markup(found: Regressions) -> Markup:
@@ -36,7 +37,7 @@ def to_markup(found: Regressions) -> Markup:
 
 def _lines(found: Regressions) -> Iterator[str]:
     if found.changes:
-        yield f"Changed: {_escaped(', '.join(map(str, found.changes)))}."
+        yield f"Changed: {escaped(', '.join(map(str, found.changes)))}."
     elif found.against is not None:
         yield "Neither versions nor machine nor commit changed."
     yield ""
@@ -46,31 +47,25 @@ def _lines(found: Regressions) -> Iterator[str]:
             continue
         folded = not kind.regression and kind is not Kind.FIXED
         title = f"{kind.capitalize()} ({len(group)}): {WHY[kind]}"
-        yield from [f"<details><summary>{_escaped(title)}</summary>", ""] if folded else [f"**{_escaped(title)}**", ""]
+        yield from [f"<details><summary>{escaped(title)}</summary>", ""] if folded else [f"**{escaped(title)}**", ""]
         yield from ("| engine | case | what |", "| --- | --- | --- |")
-        for row in group[:LONGEST]:
-            yield f"| {_escaped(row.engine)} | {_escaped(row.where)} | {_escaped(row.what)} |"
+        for each in group[:LONGEST]:
+            yield row(map(escaped, (each.engine, each.where, each.what)))
         yield ""
         if len(group) > LONGEST:
             yield from (f"and {len(group) - LONGEST} more, all in the JSON.", "")
         yield from ["</details>", ""] if folded else []
     if found.steps:
         yield from ("**Steps in the history that still stand**", "")
-        yield from (f"- {_escaped(_step(step))}" for step in found.steps[:LONGEST])
+        yield from (f"- {escaped(_step(step))}" for step in found.steps[:LONGEST])
         yield from [f"- and {len(found.steps) - LONGEST} more, all in the JSON"] if len(found.steps) > LONGEST else []
         yield ""
     if found.loose:
         lines = loose_says(found.loose)
         yield from (f"<details><summary>Tolerances that could be tightened ({len(lines)} cases)</summary>", "")
-        yield from (f"- {_escaped(line)}" for line in lines)
+        yield from (f"- {escaped(line)}" for line in lines)
         yield from ("", "</details>", "")
 
 
 def _step(step: Step) -> str:
     return f"{product(step.engine, step.mode)} on {step.case}: {step_says(step)}"
-
-
-def _escaped(text: str) -> str:
-    """Text that is no mark-up in a line or a cell of a table: messages are foreign, and one could fold away what follows it."""
-    plain = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
-    return plain.replace("`", "\\`").replace("*", "\\*").replace("[", "\\[").replace("@", "@\u200b")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
 from typing import TextIO
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
 from .table import COLOURS, LOG_WIDTH, QUANTITIES, messages, print_messages, signs, worst
@@ -37,14 +36,14 @@ def to_markdown(results: Results) -> str:
     engines, rows = _laid_out(results)
     versions = {record.engine: record.version for record in results.records if record.version}
     head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
-    lines = [_row(map(_escaped, head)), _row(["---"] * len(head))]
+    lines = [row(map(escaped, head)), row(["---"] * len(head))]
     for case, records in rows.items():
-        cells = (_escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
-        lines.append(_row([_as_code(case), *cells]))
-    lines += ["", f"{_escaped(_reading(results))}."]
-    lines += [_escaped(f"Signs of {', '.join(cases)}: {words}.") for words, cases in signs(results).items()]
+        cells = (escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
+        lines.append(row([code(case), *cells]))
+    lines += ["", f"{escaped(_reading(results))}."]
+    lines += [escaped(f"Signs of {', '.join(cases)}: {words}.") for words, cases in signs(results).items()]
     lines += [
-        _escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
+        escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()
         if outcome is not Outcome.PASS
     ]
@@ -79,23 +78,5 @@ def _reading(results: Results) -> str:
     return f"Largest errors against {', '.join(standards).replace('_', ' ') or 'nothing'}: {units}"
 
 
-def _row(cells: Iterable[str]) -> str:
-    """A row of cells, bars in which do not divide them."""
-    whole = " | ".join(each.replace("|", "\\|") for each in cells)
-    return f"| {whole} |"
-
-
 def _cell(record: Record) -> Text:
     return Text(visible(cell(record)), COLOURS.get(record.outcome, "bold red"))
-
-
-def _escaped(text: str) -> str:
-    """Text that Markdown shows as it is, on one line: no mark-up, no links, no HTML, nobody notified."""
-    text = re.sub(r"([\\`*<>~]|(?<=\])\()", r"\\\1", visible(" ".join(text.split())))
-    return re.sub(r"(?<!\w)@(?=\w)", "@\N{WORD JOINER}", text)
-
-
-def _as_code(name: str) -> str:
-    """A name as code, in which nothing can be escaped."""
-    shown = visible(name).replace("`", "'")
-    return f"`{shown}`"

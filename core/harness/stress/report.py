@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..bench.pages import Report, Section
+from ..markdown import escaped, row
 from .outcomes import ELSEWHERE, Verdict
 from .results import Cell, Finding, Stress
 
@@ -155,20 +156,10 @@ def _ratio(value: float | None) -> str:
 
 def markdown(made: Report) -> str:
     """The same tables in Markdown."""
-    lines = [f"# {_cell(made.headline)}", "", _cell(" · ".join(made.facts))]
+    lines = [f"# {escaped(made.headline)}", "", escaped(" · ".join(made.facts))]
     for section in made.sections:
-        lines += ["", f"## {section.title}", "", *(_cell(each) for each in section.verdict), ""]
-        lines += [_row(section.columns), _row(["---"] * section.labels + ["---:"] * (len(section.columns) - section.labels))]
-        lines += [_row(map(_cell, row)) for row in section.rows]
-        lines += ["", *(f"{_cell(note)}\n" for note in section.notes)]
+        lines += ["", f"## {section.title}", "", *(escaped(each) for each in section.verdict), ""]
+        lines += [row(section.columns), row(["---"] * section.labels + ["---:"] * (len(section.columns) - section.labels))]
+        lines += [row(map(escaped, each)) for each in section.rows]
+        lines += ["", *(f"{escaped(note)}\n" for note in section.notes)]
     return "\n".join(lines) + "\n"
-
-
-def _row(cells: Sequence[str] | map[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _cell(text: str) -> str:
-    """Text of any origin: nothing in it is markup."""
-    plain = text.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("`", "\\`").replace("*", "\\*")
-    return " ".join(plain.replace("_", "\\_").split())

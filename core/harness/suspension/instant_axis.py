@@ -75,7 +75,8 @@ class _Anti(Rate):
 
     measure = "1"
     reads = _CARRIER
-    braking: ClassVar[bool]
+    needs = ("axle", "wheel_radius", "wheelbase", "cg_height", "brake_share")
+    braking: ClassVar[bool] = True
     axle: ClassVar[Axle]
 
     @property
@@ -99,18 +100,12 @@ class _Anti(Rate):
         return towards_middle * share * car.wheelbase / car.cg_height * (v.x / v.z)
 
 
-_BRAKING = ("axle", "wheel_radius", "wheelbase", "cg_height", "brake_share")
-_DRIVING = ("axle", "wheel_radius", "wheelbase", "cg_height", "drive_share")
-
-
 @dataclass(frozen=True)
 class AntiDive(_Anti):
     """Of the front axle, in braking."""
 
     type = "anti_dive"
-    needs = _BRAKING
     positive = "less dive in braking, none at 1"
-    braking = True
     axle = Axle.FRONT
 
 
@@ -119,9 +114,7 @@ class AntiLift(_Anti):
     """Of the rear axle, in braking."""
 
     type = "anti_lift"
-    needs = _BRAKING
     positive = "less lift in braking, none at 1"
-    braking = True
     axle = Axle.REAR
 
 
@@ -130,7 +123,7 @@ class AntiSquat(_Anti):
     """Of the driven rear axle, in acceleration."""
 
     type = "anti_squat"
-    needs = _DRIVING
+    needs = (*_Anti.needs[:-1], "drive_share")
     positive = "less squat in acceleration, none at 1"
     braking = False
     axle = Axle.REAR

@@ -8,18 +8,21 @@ from ...jet import Jet, arctan2
 from .base import Attitude
 from .corner import Corner
 
-_OFFSET = ("wheel_radius", "kingpin")
-_OFFSET_READS = ("wheel_center", "spin_marker", "kingpin")
-
 
 @dataclass(frozen=True)
-class Caster(Attitude):
-    """Angle between the steering axis and the vertical, seen from the side."""
+class _Inclination(Attitude):
+    """Angle between the steering axis and the vertical, in a view along an axis of the vehicle."""
 
-    type = "caster"
     measure = "rad"
     needs = ("kingpin",)
     reads = ("kingpin",)
+
+
+@dataclass(frozen=True)
+class Caster(_Inclination):
+    """Angle between the steering axis and the vertical, seen from the side."""
+
+    type = "caster"
     positive = "top rearward"
 
     def value(self, corner: Corner) -> Jet:
@@ -29,13 +32,10 @@ class Caster(Attitude):
 
 
 @dataclass(frozen=True)
-class KingpinInclination(Attitude):
+class KingpinInclination(_Inclination):
     """Angle between the steering axis and the vertical, seen from the front."""
 
     type = "kingpin_inclination"
-    measure = "rad"
-    needs = ("kingpin",)
-    reads = ("kingpin",)
     positive = "top inboard"
 
     def value(self, corner: Corner) -> Jet:
@@ -45,16 +45,22 @@ class KingpinInclination(Attitude):
 
 
 @dataclass(frozen=True)
-class ScrubRadius(Attitude):
+class _GroundOffset(Attitude):
+    """A component of the way between the contact centre and where the steering axis meets the road."""
+
+    measure = "m"
+    needs = ("wheel_radius", "kingpin")
+    reads = ("wheel_center", "spin_marker", "kingpin")
+
+
+@dataclass(frozen=True)
+class ScrubRadius(_GroundOffset):
     """Steering axis offset at ground: from where the axis meets the road to the contact centre, across the wheel's heading.
 
     As in ISO 8855 and Adams/Car it is measured along the tyre's axes, which turn with the wheel, not along the vehicle's.
     """
 
     type = "scrub_radius"
-    measure = "m"
-    needs = _OFFSET
-    reads = _OFFSET_READS
     positive = "the axis meeting the road inboard of the contact centre"
 
     def value(self, corner: Corner) -> Jet:
@@ -63,13 +69,10 @@ class ScrubRadius(Attitude):
 
 
 @dataclass(frozen=True)
-class MechanicalTrail(Attitude):
+class MechanicalTrail(_GroundOffset):
     """Castor offset at ground (ISO 8855, 7.2.3): from the contact centre to where the axis meets the road, along the heading."""
 
     type = "mechanical_trail"
-    measure = "m"
-    needs = _OFFSET
-    reads = _OFFSET_READS
     positive = "the axis meeting the road ahead of the contact centre"
 
     def value(self, corner: Corner) -> Jet:

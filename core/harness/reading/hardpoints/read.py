@@ -14,7 +14,7 @@ from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ..casefile import AXES
 from ..coordinates import all_coordinates
-from ..document import MOST_NAMED, brief, explained, fault, remedy, shown, similar
+from ..document import MOST_NAMED, brief, decimal, explained, fault, remedy, shown, similar
 from ..supplied import LEFT_OUT, Supplied
 from .table import HardpointTable, placed, require_size
 from .templates import TEMPLATES, Template
@@ -142,7 +142,7 @@ def _travel(file: Path, said: str | None) -> Array:
     if said is not None:
         try:
             first, _, last = said.partition(":")
-            travel, samples = float(first), int(last or SAMPLES)
+            travel, samples = decimal(first), int(last or SAMPLES)
         except ValueError:
             travel = math.nan
         if not (0.0 < travel < math.inf and 1 < samples <= 1_000_000):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ....mechanism import Vector
-from ..document import fault, remedy, shown, usable
+from ..document import decimal, fault, remedy, shown, usable
 
 UNITS: Mapping[str, Callable[[float], float]] = {
     "m": float,
@@ -72,7 +72,7 @@ def number(file: Path, where: str, text: object) -> float:
     found = math.nan
     if isinstance(text, str | int | float) and not isinstance(text, bool):
         try:
-            found = float(text)
+            found = decimal(text) if isinstance(text, str) else float(text)
         except (ValueError, OverflowError):
             found = math.nan
     if not usable(found):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....errors import CaseError
 from ....trajectory import Array
-from ..document import fault, remedy, shown
+from ..document import decimal, fault, remedy, shown
 from ..supplied import Supplied
 from .elements import Element
 from .tree import Tree
@@ -77,7 +77,7 @@ def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
         if tree.joints[name].type == "ball":
             raise fault(file, "--drive", f"{name!r} is a ball joint, expected a hinge or a slide; drive one of those")
         try:
-            start, stop, steps = float(numbers[0]), float(numbers[1]), int(numbers[2]) if len(numbers) == 3 else SAMPLES
+            start, stop, steps = decimal(numbers[0]), decimal(numbers[1]), int(numbers[2]) if len(numbers) == 3 else SAMPLES
         except ValueError:
             start, stop, steps = math.nan, math.nan, 0
         if not (math.isfinite(start) and math.isfinite(stop) and start != stop and 1 < steps <= MOST_SAMPLES):

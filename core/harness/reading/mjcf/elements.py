@@ -13,7 +13,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from ....errors import CaseError
-from ..document import fault, remedy, shown, usable
+from ..document import decimal, fault, remedy, shown, usable
 
 # Robots are some ten bodies deep; what nests beyond this only exhausts the stack.
 DEEPEST = 200
@@ -66,7 +66,7 @@ class Element:
                 raise self.fault(f"{name}: missing, expected {expected}; add the attribute")
             return tuple(default)
         try:
-            found = tuple(map(float, text.split()))
+            found = tuple(map(decimal, text.split()))
         except ValueError:
             found = (math.nan,)
         if len(found) not in counts or not all(map(usable, found)):

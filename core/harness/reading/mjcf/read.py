@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ....algebra import Quat
-from ....analysis.equations import frames
-from ....analysis.freedom import account
+from ....analysis.driven import degrees_of_freedom
 from ....drivers import JointAngle, JointDisplacement, JointDriver
 from ....joints import Revolute
 from ....mechanism import Body, Mechanism, Point
@@ -49,7 +48,7 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
         drivers = [_driver(parts, name) for name in driving.joints]
         joints, couplers = list(parts.joints.values()), list(parts.couplers.values())
         mechanism = Mechanism(file.stem, bodies, joints, points, drivers, couplers)
-    dof = account(mechanism, frames(mechanism)).dof
+    dof = degrees_of_freedom(mechanism)
     if driving.joint is None or dof != len(drivers):
         raise undriven(file, root, tree, driving, dof)
     others = [*parts.left_out, *(f"{what} ({count})" for what, count in tree.left_out.items())]

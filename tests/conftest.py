@@ -1,0 +1,57 @@
+"""What several rooms are tested with."""
+
+import sys
+from pathlib import Path
+
+import kincheck.adapters
+import kincheck.cases
+import pytest
+from kincheck.core import Joint
+from kincheck.core.harness import cli
+
+from .fakes import Fake, crank
+
+NATIVE = Fake("native")
+
+
+@pytest.fixture
+def cluster(monkeypatch):
+    """A dask.distributed cluster of two workers, with a real scheduler, on loopback."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent))  # for its workers too, which are spawned from here
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as found:
+        yield found
+
+
+@pytest.fixture
+def own_joint_types(monkeypatch):
+    """Joint types that a test makes are forgotten after it."""
+    monkeypatch.setattr(Joint, "registry", dict(Joint.registry))
+
+
+@pytest.fixture
+def in_folder(monkeypatch):
+    """In the folder of the joint types of users, as a user is."""
+    monkeypatch.chdir(Path(__file__).parent / "user_joints")
+    monkeypatch.setattr("sys.path", ["", *sys.path])
+
+
+@pytest.fixture
+def kincheck_main(monkeypatch):
+    """main() with the cases and engines of the test."""
+
+    def main(*argv, engines=(NATIVE,), cases=None, jobs="0"):
+        cases = {"crank": crank(), "crank_two": crank("crank_two")} if cases is None else cases
+        by_name = {engine.name: engine for engine in engines}
+        monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
+        monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
+        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
+        monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
+        monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
+        monkeypatch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
+        # in this process, to which fakes with answers of their own belong; isolation has a room of its own
+        return cli.main([*map(str, argv), *(["--jobs", jobs] if argv[0] == "run" and jobs else [])])
+
+    return main

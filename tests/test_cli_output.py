@@ -1,0 +1,118 @@
+"""What a run writes, and to which stream: JSON, the table, files, and what is kept where something fails."""
+
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+
+import pytest
+from kincheck.core.harness.case import Truth
+from kincheck.core.harness.record import from_json
+
+from .fakes import Fake, crank, off, raising
+from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
+
+
+def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
+    def chatty(case):
+        print("from Python")
+        os.write(1, b"from the file descriptor\n")
+        return off("position", lambda p: p)(case)
+
+    assert kincheck_main("run", "crank", "--json", "-", engines=[Fake("native", answer=chatty)]) == 0
+    captured = capfd.readouterr()
+    assert len(from_json(captured.out.encode()).records) == 1
+    for said in ("from Python", "from the file descriptor", "[1/1] crank native: pass", "truth"):
+        assert said in captured.err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="finds the C library by its POSIX name")
+def test_what_c_keeps_in_its_buffer_does_not_come_after_the_json():
+    code = (
+        "import ctypes\n"
+        "from kincheck.core.harness.reporting.deliver import json_only\n"
+        "with json_only():\n"
+        "    ctypes.CDLL(None).puts(b'from C')\n"
+        "print('json')\n"
+    )
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
+    assert (done.stdout, done.stderr) == ("json\n", "from C\n")
+
+
+def test_the_table_says_what_happened_and_never_too_much(kincheck_main, capsys):
+    engines = [RIGHT, WRONG, PARTIAL, BROKEN, MISSING, UNABLE]
+    assert kincheck_main("run", "crank", engines=engines) == 1
+    captured = capsys.readouterr()
+    rows = {line.split()[1]: line for line in captured.out.splitlines() if line.startswith("crank")}
+    assert "pass" in rows["native"]
+    assert "closed form (validated)" in rows["native"]
+    for engine in engines[1:]:
+        assert "validated" not in rows[engine.name]
+    assert "2.0e-06" in rows["wrong"]
+    assert "fail: crank · wrong: x: acceleration is off by 2e-06 m/s^2" in captured.out
+    assert "error: crank · broken: ValueError: no [axis] there" in captured.out
+    assert "1 pass, 2 fail, 1 error, 1 unsupported, 1 unavailable" in captured.out
+    assert captured.err.splitlines() == [
+        f"[{k + 1}/6] crank {engine.name}: {outcome}"
+        for k, (engine, outcome) in enumerate(
+            zip(engines, ("pass", "fail", "fail", "error", "unavailable", "unsupported"), strict=True)
+        )
+    ]
+
+
+@pytest.mark.parametrize("truth", [Truth.IN_HOUSE_ORACLE, Truth.CONSENSUS_ONLY])
+def test_agreement_with_ourselves_is_never_called_validated(kincheck_main, capsys, tmp_path, truth):
+    case = crank(truth=truth, reference=truth is Truth.IN_HOUSE_ORACLE)
+    assert kincheck_main("run", "--json", tmp_path / "results.json", engines=[RIGHT, Fake()], cases={"crank": case}) == 0
+    captured = capsys.readouterr()
+    assert str(truth).replace("_", " ") in captured.out
+    assert "validated" not in captured.out + captured.err + (tmp_path / "results.json").read_text()
+
+
+def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
+    out = tmp_path / "made" / "here"
+    assert kincheck_main("run", "crank", "--out", out, "--json", tmp_path / "r.json", "--junit", tmp_path / "j.xml") == 0
+    results = from_json((out / "results.json").read_bytes())
+    assert results == from_json((tmp_path / "r.json").read_bytes())
+    assert results.run["command"].startswith("kincheck run crank --out ")
+    assert "crank" in (out / "report.html").read_text()
+    assert len(ET.parse(tmp_path / "j.xml").findall(".//testcase")) == 2
+    assert "[1/1]" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("option", "name"), [("--out", "file/sub"), ("--out", "file"), ("--json", "no/r.json"), ("--junit", ".")])
+def test_a_destination_that_cannot_be_written_is_found_before_the_work(kincheck_main, capsys, tmp_path, option, name):
+    (tmp_path / "file").write_text("here already")
+    RIGHT.solves = 0
+    assert kincheck_main("run", "crank", option, tmp_path / name) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f"kincheck: {option} ")
+    assert len(captured.err.splitlines()) == 1
+    assert RIGHT.solves == 0
+
+
+def test_a_file_that_fails_in_the_end_does_not_keep_back_the_others(kincheck_main, capsys, tmp_path):
+    def hostile(case):
+        (tmp_path / "j.xml").mkdir(exist_ok=True)  # in the way, since the destinations were checked
+        return off("position", lambda p: p)(case)
+
+    argv = ["run", "crank", "--junit", tmp_path / "j.xml", "--json", tmp_path / "r.json"]
+    assert kincheck_main(*argv, engines=[Fake("native", answer=hostile)]) == 2
+    assert "j.xml: cannot be written (Is a directory)" in capsys.readouterr().err
+    assert len(from_json((tmp_path / "r.json").read_bytes()).records) == 1
+
+
+def test_an_interrupt_keeps_what_was_made(kincheck_main, capsys):
+    stopped = Fake("stopped", answer=raising(KeyboardInterrupt()))
+    assert kincheck_main("run", "--json", "-", engines=[RIGHT, stopped]) == 2
+    captured = capsys.readouterr()
+    assert [each["engine"] for each in json.loads(captured.out)["records"]] == ["native"]
+    assert "interrupted: 1 of 4 records" in captured.err
+
+
+def test_a_defect_of_ours_is_shown_and_is_no_deviation(kincheck_main, capsys, monkeypatch):
+    monkeypatch.setattr("kincheck.core.harness.run.run", lambda *_, **__: 1 / 0)
+    assert kincheck_main("run") == 2
+    assert "ZeroDivisionError" in capsys.readouterr().err
