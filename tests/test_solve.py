@@ -171,15 +171,15 @@ def flops(found):
 def test_lower_orders_give_the_same_and_cost_less():
     by_order = [solve(mcpherson(), "stroke", STROKES, bodies=MOVING, order=order) for order in (0, 1, 2)]
     position, velocity, acceleration = by_order
-    for found in by_order:
-        assert (found.points["wheel"].position == acceleration.points["wheel"].position).all()
-        assert (found.bodies["strut"].p == acceleration.bodies["strut"].p).all()
+    for found in by_order:  # lower orders are predicted otherwise, and end at the same pose but for its rounding
+        assert np.abs(found.points["wheel"].position - acceleration.points["wheel"].position).max() <= 3e-16
+        assert np.abs(found.bodies["strut"].p - acceleration.bodies["strut"].p).max() <= 3e-16
     assert position.points["wheel"].velocity is None
     assert position.bodies["strut"].v is None
     assert velocity.points["wheel"].acceleration is None
     assert velocity.bodies["strut"].a is None
-    assert (velocity.points["wheel"].velocity == acceleration.points["wheel"].velocity).all()
-    assert (velocity.bodies["strut"].v == acceleration.bodies["strut"].v).all()
+    assert np.abs(velocity.points["wheel"].velocity - acceleration.points["wheel"].velocity).max() <= 2e-15
+    assert np.abs(velocity.bodies["strut"].v - acceleration.bodies["strut"].v).max() <= 2e-15
     cost = [sum(flops(found).get(name, 0) for name in ("newton", "motion", "outputs")) for found in by_order]
     assert cost[0] < cost[1] < cost[2]
     assert "motion" not in flops(position)

@@ -29,7 +29,7 @@ EPSILON = float(np.finfo(np.float64).eps)
 FOLLOWED = 1e-2
 
 
-def doubtful(pivot: Array, closure: Array, tol: float) -> NDArray[np.bool_]:
+def doubtful(pivot: float | Array, closure: float | Array, tol: float) -> bool | NDArray[np.bool_]:
     """Which samples need scrutiny: their smallest pivots and residuals allow errors too large.
 
     The error of rates is that of the pose over sigma once more.

@@ -27,7 +27,7 @@ def follow(route: Route, tol: float) -> Trajectory:
     details, message = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": pivot}, ""
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
-    elif found.ends or doubtful(np.array(pivot), np.array(closure), tol):
+    elif found.ends or doubtful(pivot, closure, tol):
         from .scrutiny import scrutinise  # rarely needed
 
         findings = scrutinise(route, found, tol)
