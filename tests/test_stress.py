@@ -254,3 +254,24 @@ def test_rounding_keeps_names_and_shapes(case):
     assert [j.name for j in short.mechanism.joints] == [j.name for j in case.mechanism.joints]
     assert short.mechanism != case.mechanism
     assert isinstance(solve(short.mechanism, "turn", [0.1]).points["C"], PointMotion)
+
+
+def test_a_family_that_cannot_be_run_costs_no_other(monkeypatch):
+    def defective(rng, samples):
+        raise KincheckError("cannot be made")
+
+    monkeypatch.setattr(FAMILIES["units"], "specimen", defective, raising=False)
+    found, _ = stress([FAMILIES["units"], FAMILIES["offset"]], [NATIVE], samples=20, seed=0, prove=False)
+    assert found.unfinished == {"units": "cannot be made"}
+    assert [cell.family for cell in found.cells] == ["offset"]
+
+
+def test_what_cannot_be_proved_is_counted(monkeypatch):
+    def refused(truth, sample):
+        raise SolveError("singular at the design")
+
+    monkeypatch.setattr("kincheck.core.harness.stress.run.distance_from_proof", refused)
+    found, _ = stress([FAMILIES["loops"]], [NATIVE], samples=12, seed=0)
+    (proofs,) = found.proofs
+    assert proofs.tried > proofs.proved == 0
+    assert "singular at the design" in proofs.reasons[0]

@@ -9,6 +9,7 @@ Inputs that were found are in build/fuzz/NAME, from where the next run goes on; 
 
 import argparse
 import importlib
+import os
 import pkgutil
 import random
 import sys
@@ -18,6 +19,8 @@ from typing import Any
 
 from .keeping import keep, kept
 
+# Before numpy is there: small matrices gain nothing by threads, which on a busy machine wait for each other as in a hang.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 HERE = Path(__file__).parent
 BUILD = HERE.parent.parent / "build" / "fuzz"
 READERS = sorted({each.name for each in pkgutil.iter_modules([str(HERE)])} - {"__main__", "fuzzing", "keeping", "trees"})

@@ -85,6 +85,8 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     deliver(made, found, out=options.out, json=options.json)
     if options.out is not None:
         (options.out / FILES[2]).write_text(markdown(made), encoding="utf-8")
+    if found.unfinished:
+        raise KincheckError("\n".join(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()))
     bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
     return Status.DEVIATES if bad else Status.WITHIN
 

@@ -39,7 +39,12 @@ def report(found: Stress) -> Report:
     return Report(
         NAME,
         f"{wrong} of {total} samples silently wrong" if wrong else f"None of {total} samples silently wrong",
-        [f"kincheck {found.kincheck}", f"seed {found.seed}", spent],
+        [
+            f"kincheck {found.kincheck}",
+            f"seed {found.seed}",
+            spent,
+            *(f"not finished: {k}: {v}" for k, v in found.unfinished.items()),
+        ],
         sections,
     )
 

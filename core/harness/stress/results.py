@@ -84,7 +84,7 @@ class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Stress(msgspec.Struct, frozen=True, kw_only=True):
-    """A run. abouts: what each family is; seconds: by what took them."""
+    """A run. abouts: what each family is; seconds: by what took them; unfinished: families that could not be run, and why."""
 
     schema: Literal["kincheck-stress/1"] = "kincheck-stress/1"
     kincheck: str
@@ -97,3 +97,4 @@ class Stress(msgspec.Struct, frozen=True, kw_only=True):
     proofs: list[Proofs]
     acceptances: list[Acceptance]
     seconds: dict[str, float]
+    unfinished: dict[str, str] = {}

@@ -11,7 +11,7 @@ from time import perf_counter
 import numpy as np
 
 from ...analysis.enclosure import UnprovedError
-from ...errors import KincheckError
+from ...errors import KincheckError, SolveError
 from ..attempt import Failure, Pair
 from ..case import Case
 from ..circumstances import plain
@@ -63,6 +63,7 @@ class _Results:
     proofs: list[Proofs] = field(default_factory=list[Proofs])
     examples: list[Example] = field(default_factory=list[Example])
     acceptances: list[Acceptance] = field(default_factory=list[Acceptance])
+    unfinished: dict[str, str] = field(default_factory=dict[str, str])
 
 
 def stress(
@@ -89,16 +90,11 @@ def stress(
     require_extended()
     found, seconds = _Results(), {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
     for family in families:
-        begun = perf_counter()
-        made = specimens(family, seed, max(1, samples // len(families)))
-        seconds["truth"] += (now := perf_counter()) - begun
-        if prove:
-            found.proofs += _proofs(family.name, made, seed)
-        seconds["proofs"] += (then := perf_counter()) - now
-        for engine in engines:
-            _solve(family, engine, made, found)
-        seconds["engines"] += perf_counter() - then
-        tell(f"{family.name}: {sum(each.samples for each in made)} samples of {len(made)} specimens")
+        try:
+            _family(family, engines, found, seconds, samples=max(1, samples // len(families)), seed=seed, prove=prove, tell=tell)
+        except KincheckError as error:  # what the others gave is not lost
+            found.unfinished[family.name] = str(error)
+            tell(f"{family.name}: not finished: {error}")
     results = Stress(
         kincheck=importlib.metadata.version("kincheck"),
         command=command,
@@ -110,8 +106,32 @@ def stress(
         proofs=found.proofs,
         acceptances=found.acceptances,
         seconds=seconds,
+        unfinished=found.unfinished,
     )
     return results, found.examples
+
+
+def _family(
+    family: Family,
+    engines: Sequence[Engine],
+    found: _Results,
+    seconds: dict[str, float],
+    *,
+    samples: int,
+    seed: int,
+    prove: bool,
+    tell: Callable[[str], object],
+) -> None:
+    begun = perf_counter()
+    made = specimens(family, seed, samples)
+    seconds["truth"] += (now := perf_counter()) - begun
+    if prove:
+        found.proofs += _proofs(family.name, made, seed)
+    seconds["proofs"] += (then := perf_counter()) - now
+    for engine in engines:
+        _solve(family, engine, made, found)
+    seconds["engines"] += perf_counter() - then
+    tell(f"{family.name}: {sum(each.samples for each in made)} samples of {len(made)} specimens")
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Made]:
@@ -227,6 +247,6 @@ def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
         try:
             worst = max(worst, distance_from_proof(truth, int(rng.choice(reached))))
             proved += 1
-        except UnprovedError as error:
+        except (UnprovedError, SolveError) as error:  # or its equations cannot even be written, so near is it to a singular design
             reasons.append(f"{one.specimen.name}: {error}")
     return [Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)] if tried else []
