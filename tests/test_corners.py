@@ -40,7 +40,7 @@ def loop(start, beside, rod=ROD, rocker=ROD):
 
 @pytest.mark.parametrize("order", [0, 2])
 @pytest.mark.parametrize("count", [2, 3, 8, 400])
-@pytest.mark.parametrize("beside", [1e-2, 1e-4, -1e-5])
+@pytest.mark.parametrize("beside", [1e-2, 1e-3, -1e-4])
 def test_a_corner_is_turned_round(beside, count, order):
     """The rocker makes half a turn while the crank's pin passes its pivot."""
     turn = np.linspace(0.0, 2.0, count)
@@ -51,7 +51,7 @@ def test_a_corner_is_turned_round(beside, count, order):
     assert "notes" not in found.details
 
 
-@pytest.mark.parametrize("beside", [1e-7, 1e-9, -1e-12])
+@pytest.mark.parametrize("beside", [1e-6, 1e-9, -1e-12])
 def test_a_corner_that_is_too_narrow_is_no_straight_way(beside):
     turn = np.linspace(0.0, 2.0, 9)
     found = solve(loop(-1.0, beside), "turn", turn)

@@ -24,9 +24,11 @@ AMPLIFIED = 1e3
 # Partial pivoting leaves a smallest pivot of no less than sigma; over the case library it is 1.5 to 14 times as much.
 PIVOT = 30.0
 EPSILON = float(np.finfo(np.float64).eps)
-# A motion is followed as long as rounding leaves its rates uncertain by less than this part: nearer to a singular pose it seems to
-# turn any way, also into another motion that crosses it there. The pivot is then 1e-6 of the largest that it has had.
-FOLLOWED = 1e-2
+# A motion is followed towards a singular pose as long as rounding leaves its rates uncertain by less than the first part, estimated
+# from the pivot: nearer it seems to turn any way, also into another motion that crosses it there. Away from one it is followed only
+# where they are surer than the second, for sigma has been seen to be a hundredth of the pivot (a parallelogram with cylinders), and
+# counts squared: what turns there may have been turned by rounding. The pivots are then 1e-6 and 3e-5 of the largest so far.
+FOLLOWED, TURNED = 1e-2, 1e-5
 
 
 def doubtful(pivot: float | Array, closure: float | Array, tol: float) -> bool | NDArray[np.bool_]:

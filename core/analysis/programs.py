@@ -38,7 +38,7 @@ from ..program import (
 )
 from .cartesian import Cartesian, Given
 from .components import Section, select_section
-from .continuity import EPSILON, FOLLOWED, LARGEST_DEVIATION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, PIVOT
+from .continuity import EPSILON, FOLLOWED, LARGEST_DEVIATION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, PIVOT, TURNED
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
@@ -210,6 +210,7 @@ class Tracer:
         largest = maximum(absolute(pivot), self._in(FROM + LARGEST_PIVOT))
         if neighbours:
             pivot_before = before(pivot, pivot_before)
+        uncertain = (PIVOT * largest) * maximum(closure, EPSILON)
         margins = (
             self._in(DONE) - 0.5,
             tol - closure,
@@ -218,7 +219,8 @@ class Tracer:
             LARGEST_DEVIATION * _largest(moved) + NEGLIGIBLE - _largest(gap),
             LONGEST_STEP - _largest(reach),
             (LARGEST_RATIO * pivot - pivot_before) * (LARGEST_RATIO * pivot_before - pivot) + crossing,
-            FOLLOWED * pivot * pivot - (PIVOT * largest) * maximum(closure, EPSILON),
+            FOLLOWED * pivot * pivot - uncertain,
+            maximum(TURNED * pivot * pivot - uncertain, absolute(pivot_before) - absolute(pivot)),
         )
         out = {self.layout.scalar(MARGIN): reduce(minimum, margins), self.layout.scalar(LARGEST_PIVOT): largest}
         if neighbours:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..trajectory import Array
-from .continuity import EPSILON, FOLLOWED, LARGEST_RATIO, PIVOT
+from .continuity import EPSILON, FOLLOWED, LARGEST_RATIO, PIVOT, TURNED
 from .model import Model
 from .request import FROM, LARGEST_PIVOT
 
@@ -34,7 +34,8 @@ def why_refused(model: Model, lane: Array) -> str:
     if closure > tol:
         return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
     pivot, before, largest = (float(lane[model.slots[name]]) for name in ("pivot", FROM + "pivot", LARGEST_PIVOT))
-    uncertain = FOLLOWED * pivot**2 <= PIVOT * largest * max(closure, EPSILON)
-    if uncertain or not 1.0 / LARGEST_RATIO < pivot / before < LARGEST_RATIO:
+    uncertain = PIVOT * largest * max(closure, EPSILON) / pivot**2 if pivot else np.inf
+    lost = uncertain >= FOLLOWED or (uncertain >= TURNED and abs(pivot) >= abs(before))
+    if lost or not 1.0 / LARGEST_RATIO < pivot / before < LARGEST_RATIO:
         return "there is a singular pose ahead"
     return "Newton jumps to another assembly"
