@@ -10,6 +10,9 @@ from ..trajectory import Array
 # Along one motion the trapezoidal rule predicts the change between neighbours; on a sinusoid sampled every 70 degrees it is
 # off by 13 %. A step that is off by more than a quarter is divided and tried again, so a coarse grid costs steps, not samples.
 LARGEST_DEVIATION = 0.25
+# Newton corrects a predicted pose by what its prediction lacks, of third order: on a sinusoid by a tenth of the way in steps of 45
+# degrees. At a quarter a loop of four bodies was found beyond the limit of its travel, in another assembly.
+LARGEST_CORRECTION = 0.1
 # Changes below this part of the mechanism's size are not another assembly: as well is a pose known where it is followed (FOLLOWED).
 NEGLIGIBLE = 1e-8
 # A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or

@@ -38,7 +38,7 @@ from ..program import (
 )
 from .cartesian import Cartesian, Given
 from .components import Section, select_section
-from .continuity import EPSILON, FOLLOWED, LARGEST_DEVIATION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, PIVOT, TURNED
+from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, PIVOT, TURNED
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
@@ -216,7 +216,7 @@ class Tracer:
             tol - closure,
             consistent - self._in("leftover"),
             self._in("branch"),
-            LARGEST_DEVIATION * _largest(moved) + NEGLIGIBLE - _largest(gap),
+            LARGEST_CORRECTION * _largest(moved) + NEGLIGIBLE - _largest(gap),
             LONGEST_STEP - _largest(reach),
             (LARGEST_RATIO * pivot - pivot_before) * (LARGEST_RATIO * pivot_before - pivot) + crossing,
             FOLLOWED * pivot * pivot - uncertain,

@@ -20,7 +20,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Array
-from .continuity import EPSILON, FOLLOWED, LARGEST_DEVIATION, LONGEST_STEP, NEGLIGIBLE, PIVOT, TURNED
+from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, PIVOT, TURNED
 from .elements import Elements, Indices
 from .equations import constraints, measured
 from .factors import Factors, SingularError
@@ -252,7 +252,7 @@ class SparseModel:
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
             closure, leftover, branch = self._tested(residual, tol, done=done)
             gap, reach = (float((self._scale * np.abs(state - other)).max()) for other in (taylor, here.state))
-            if not gap <= LARGEST_DEVIATION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
+            if not gap <= LARGEST_CORRECTION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
                 raise FailedError("Newton jumps to another assembly")
             rates, accelerations = self._motion()
         pivot = self.factors.signed_pivot
