@@ -46,8 +46,7 @@ def cross(lanes: Lanes, path: Path, sound: Sequence[Array], start: float, here: 
 
 def _eight(lanes: Lanes, path: Path, start: float, times: Array, tol: float) -> tuple[Array, Array] | None:
     """States and rates at eight times, a singular pose between the fourth and the fifth; then it goes on there."""
-    found: list[tuple[Array, Array]] = []
-    here = start
+    found, here = list[tuple[Array, Array]](), start
     for k, time in enumerate(times.tolist()):
         lanes.accept_by(accept_by(tol, crossing=k == BEYOND))
         if not _reach(lanes, path, here, time):
