@@ -66,13 +66,13 @@ CASES = {case.name: case for case in ALL if len(case.mechanism.moving) <= MOST_B
 @pytest.mark.parametrize("name", CASES)
 def test_all_cases_move_alike_in_all_styles(name):
     reference = run(CASES[name], Style.NATIVE)
-    # a hundred roundings, divided by the smallest pivot once for positions, and once more for each derivative
-    pivot = reference.details["smallest_pivot"]
+    # a hundred roundings, divided by the smallest singular value once for positions, and once more for each derivative
+    sigma = reference.details["smallest_singular_value"]
     for style in OTHERS:
         found = run(CASES[name], style)
         for k, order in enumerate(ORDERS):
             size = max(1.0, *(np.abs(getattr(motion, order)).max() for motion in reference.points.values()))
-            assert deviation(found, reference, order) < 1e-14 * size / pivot ** (k + 1), (style, order)
+            assert deviation(found, reference, order) < 1e-14 * size / sigma ** (k + 1), (style, order)
 
 
 # Where the simplified rows are exact

@@ -160,15 +160,47 @@ def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
 
 
 @pytest.mark.parametrize("n", [2, 5, 11])
-def test_signed_pivot(n):
-    """The smallest pivot in size, with the determinant's sign in all lanes, or in all the opposite."""
+def test_sigma_has_the_sign_of_the_determinant(n):
+    """In all lanes, or in all the opposite; it is no more than any pivot."""
     matrices = np.random.default_rng(n).normal(size=(64, n, n))
     tape = Tape()
     slots = np.arange(n * n).reshape(n, n)
     elimination = Elimination([{j: tape.input(int(slots[i, j])) for j in range(n)} for i in range(n)])
     block = np.vstack([matrices.reshape(64, -1).T, np.zeros((n + 1, 64))])
-    run_on([program("p", tape, dict(enumerate([elimination.signed_pivot, *elimination.pivots], n * n)))], block)
+    run_on([program("p", tape, dict(enumerate([elimination.sigma, *elimination.pivots], n * n)))], block)
     found, pivots = block[n * n], block[n * n + 1 :]
     signs = np.sign(found) * np.linalg.slogdet(matrices)[0]
     assert (signs == signs[0]).all()
-    assert (np.abs(found) == np.minimum(np.abs(pivots).min(axis=0), 1.0)).all()
+    assert (np.abs(found) <= np.minimum(np.abs(pivots).min(axis=0), 1.0)).all()
+
+
+def estimated(matrices):
+    """Size of the estimate of sigma, and of the smallest pivot, of matrices of shape (lanes, n, n)."""
+    lanes, n, _ = matrices.shape
+    tape = Tape()
+    slots = np.arange(n * n).reshape(n, n)
+    elimination = Elimination([{j: tape.input(int(slots[i, j])) for j in range(n)} for i in range(n)])
+    block = np.vstack([matrices.reshape(lanes, -1).T, np.zeros((n + 1, lanes))])
+    run_on([program("p", tape, dict(enumerate([elimination.sigma, *elimination.pivots], n * n)))], block)
+    return np.abs(block[n * n]), np.abs(block[n * n + 1 :]).min(axis=0)
+
+
+@pytest.mark.parametrize("n", [2, 4, 6, 10])
+@pytest.mark.parametrize("sigma", [1.0, 1e-3, 1e-9])
+def test_sigma_is_about_the_smallest_singular_value(n, sigma):
+    """Whichever rows depend on each other. Of 10,000 such matrices of each n it was 0.021 to 2.04 times as much, and the smallest
+    pivot up to 35,000 times."""
+    rng = np.random.default_rng(n)
+    left, right = (np.linalg.qr(rng.normal(size=(200, n, n)))[0] for _ in range(2))
+    sizes = np.linspace(1.0, 0.3, n)
+    sizes[-1] *= sigma
+    found, _ = estimated(left * sizes @ right)
+    assert found.min() > 0.01 * sizes[-1]
+    assert found.max() < 4.0 * sizes[-1]
+
+
+def test_pivots_may_stay_where_a_matrix_becomes_singular():
+    """Two rows with pivots of a thousandth, tied by a one."""
+    found, pivot = estimated(np.array([[[1e-3, 1.0], [0.0, 1e-3]]]))
+    assert pivot[0] == 1e-3
+    assert found[0] == pytest.approx(np.linalg.svd([[1e-3, 1.0], [0.0, 1e-3]])[1][-1], rel=2e-3)

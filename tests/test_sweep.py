@@ -250,7 +250,8 @@ def test_lock_up(far, limit, steps):
     beyond, wanted, pivot, last = (
         float(x)
         for x in re.match(
-            r"cannot be followed beyond stroke = (\S+) \(wanted stroke = (\S+)\): .*; smallest pivot there (\S+) .*lock-up.*"
+            r"cannot be followed beyond stroke = (\S+) \(wanted stroke = (\S+)\): .*; smallest singular value there "
+            r"about (\S+) .*lock-up.*"
             r"last reachable sample at stroke = (\S+); shorten the sweep",
             found.message,
         ).groups()

@@ -15,10 +15,10 @@ import numpy as np
 
 from ..motions import Path
 from ..trajectory import Array
-from .continuity import AMPLIFIED, EPSILON, PIVOT
+from .continuity import AMPLIFIED, EPSILON, WORSE
 from .march import Route, arrived, march
 from .model import TESTS, Model
-from .request import FROM, RATE, TIME
+from .request import FROM, RATE, SIGMA, TIME
 from .singularity import solve_closely
 from .system import System
 
@@ -70,8 +70,8 @@ def bridge(system: System, route: Route, lane: Array, time: float, tol: float, n
         if found is None:
             continue
         whole, lanes = found
-        closure, pivot = (whole[model.rows[name].start] for name in ("closure", "pivot"))
-        own = PIVOT * float((np.maximum(closure, EPSILON) / np.abs(pivot)).max())
+        closure, sigma = (whole[model.rows[name].start] for name in ("closure", SIGMA))
+        own = WORSE * float((np.maximum(closure, EPSILON) / np.abs(sigma)).max())
         differences = np.abs(whole @ (EIGHT - SIX))
         off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in _scales(model, whole, speed))])
         if off <= AMPLIFIED * tol and (near is None or _on_curve(system, route, lanes, near)):
@@ -88,7 +88,7 @@ def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, 
     if not before.solved.all():
         return None
     beyond = march(onward(route, before.visited[3], times[4:]), tol, visit=range(4), crossing=True)
-    signs = np.sign(beyond.kept[route.model.rows["pivot"].start])
+    signs = np.sign(beyond.kept[route.model.rows[SIGMA].start])
     if not (beyond.solved.all() and (signs == signs[0]).all()):
         return None
     lanes = [march.visited[k] for march in (before, beyond) for k in range(4)]
@@ -101,7 +101,7 @@ def _on_curve(system: System, route: Route, lanes: Array, near: Array) -> bool:
     solved = solve_closely(system, system.state(near[:, None]), route.sampled(time))
     eight = system.state(lanes)
     off, known = np.abs(eight @ EIGHT - solved.state[:, 0]), COVERED * np.abs(eight @ (EIGHT - SIX))
-    return bool((off <= known + PIVOT * solved.error[0, 0]).all())
+    return bool((off <= known + WORSE * solved.error[0, 0]).all())
 
 
 def _scales(model: Model, kept: Array, speed: float) -> Iterator[tuple[slice, float]]:

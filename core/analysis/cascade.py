@@ -21,9 +21,9 @@ from .components import Component, Section, components, section
 from .equations import frames
 from .geometry import places
 from .model import CLOSED, Model, compile_model
-from .request import FROM, LARGEST_PIVOT, RATE, RATE_T, Request
+from .request import FROM, LARGEST_SIGMA, RATE, RATE_T, SIGMA, Request
 
-# A pose with smallest pivots above this part of their largest is sound enough to look over a singular pose from.
+# A pose with smallest singular values above this part of their largest is sound enough to look over a singular pose from.
 SOUND = 0.1
 
 
@@ -212,8 +212,8 @@ class Lanes:
         """Whether nothing is nearly singular where the lanes are predicted from."""
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             slots = list(kind.model.plan.fixed)
-            pivot, largest = (fixed[:, slots.index(kind.model.slots[FROM + name])] for name in ("pivot", LARGEST_PIVOT))
-            if not (np.abs(pivot) >= SOUND * largest).all():
+            sigma, largest = (fixed[:, slots.index(kind.model.slots[FROM + name])] for name in (SIGMA, LARGEST_SIGMA))
+            if not (np.abs(sigma) >= SOUND * largest).all():
                 return False
         return True
 

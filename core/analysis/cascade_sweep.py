@@ -15,7 +15,7 @@ from .cascade import Cascade, Lanes
 from .cascade_bridge import cross
 from .march import HALVINGS, MAX_ROUNDS
 from .model import CLOSED
-from .request import accept_by
+from .request import SIGMA, accept_by
 from .singularity import CONTINUED, listed
 
 # Samples at once: enough to share a call's overhead, few enough for the world of ten thousand bodies to stay below 100 MB.
@@ -59,7 +59,7 @@ class CascadeSweep:
         path, lanes = self.path, self._lanes
         n = len(path.times)
         found = {name: np.full((n, len(rows)), np.nan) for name, rows in self._outputs.items()}
-        tests = {name: np.full(n, np.nan) for name in ("closure", "leftover", "pivot", "iterations")}
+        tests = {name: np.full(n, np.nan) for name in ("closure", "leftover", SIGMA, "iterations")}
         messages: list[str] = []
         self._notes: list[str] = []
         start, departure, message = self._departure
@@ -73,7 +73,7 @@ class CascadeSweep:
                     found[name][at] = lanes.world[rows][:, lane].T
                 for name, into in tests.items():
                     each = lanes.each(name)[:, lane]
-                    into[at] = np.abs(each).min(axis=0) if name == "pivot" else each.max(axis=0)
+                    into[at] = np.abs(each).min(axis=0) if name == SIGMA else each.max(axis=0)
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
@@ -135,14 +135,14 @@ class CascadeSweep:
 
     def _end(self, here: float, wanted: float, path: Path) -> str:
         lane = HALVINGS - 1
-        closure, pivot = self._lanes.each("closure")[:, lane], self._lanes.each("pivot")[:, lane]
+        closure, sigma = (np.abs(self._lanes.each(name)[:, lane]) for name in ("closure", SIGMA))
         worst = int(np.nan_to_num(closure, nan=np.inf).argmax())
         order = [part for kind in self.cascade.kinds for part in kind.members]
         bodies = ", ".join(self.cascade.parts[order[worst]].bodies)
         return (
             f"cannot be followed beyond {path.where(here)} (wanted {path.where(wanted)}): the component of {bodies} is left with "
-            f"residual {closure[worst]:.3g} of its size, smallest pivot {np.nanmin(np.abs(pivot)):.3g} (zero at a lock-up or dead "
-            "centre); shorten the sweep or drive another coordinate"
+            f"residual {closure[worst]:.3g} of its size, smallest singular value about {np.nanmin(sigma):.3g} (zero at a lock-up "
+            "or dead centre); shorten the sweep or drive another coordinate"
         )
 
     def _trajectory(self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]) -> Trajectory:
@@ -169,7 +169,7 @@ class CascadeSweep:
                 "largest_component": self.cascade.largest,
                 "programs": sizes,
                 "redundant_residual": float(tests["leftover"][solved].max(initial=0.0)) * unit,
-                "smallest_pivot": float(tests["pivot"][solved].min(initial=1.0)),
+                "smallest_singular_value": float(tests[SIGMA][solved].min(initial=1.0)),
             }
             | ({"notes": self._notes} if self._notes else {}),
             bodies={name: body(name) for name in request.bodies},

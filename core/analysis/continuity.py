@@ -18,28 +18,29 @@ NEGLIGIBLE = 1e-8
 # A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or
 # parts of the mechanism's size, says nothing of what is between: a whole turn ends where it began, on whatever assembly.
 LONGEST_STEP = 0.5
-# Nor does a step over which the smallest pivot changes by more than this factor, or changes its sign: beside a singular pose rates
-# change as fast. Steps towards it get shorter and shorter, and nothing there is stepped over.
-LARGEST_RATIO = 4.0
+# Nor does a step over which sigma changes by more than this factor, or the determinant its sign: beside a singular pose rates
+# change as fast. Steps towards it get shorter and shorter, and nothing there is stepped over. Where rows are exchanged the estimate
+# of sigma jumps, over the case library by up to 3.6 times.
+LARGEST_RATIO = 16.0
 # Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9
 # m that outputs are held to.
 AMPLIFIED = 1e3
-# Partial pivoting leaves a smallest pivot of no less than sigma; over the case library it is 1.5 to 14 times as much.
-PIVOT = 30.0
+# The estimate of sigma (`Elimination.sigma`) is 0.16 to 4 times as much over the case library: a bound by sigma is worse
+# than by the estimate by up to this. Where there are only pivots (sparse systems), which are 1.3 to 17 times as much, by more.
+WORSE, WORSE_BY_PIVOTS = 10.0, 30.0
 EPSILON = float(np.finfo(np.float64).eps)
 # A motion is followed towards a singular pose as long as rounding leaves its rates uncertain by less than the first part, estimated
-# from the pivot: nearer it seems to turn any way, also into another motion that crosses it there. Away from one it is followed only
-# where they are surer than the second, for sigma has been seen to be a hundredth of the pivot (a parallelogram with cylinders), and
-# counts squared: what turns there may have been turned by rounding. The pivots are then 1e-6 and 3e-5 of the largest so far.
+# from sigma: nearer it seems to turn any way, also into another motion that crosses it there. Away from one it is followed only
+# where they are surer than the second: what turns there may have been turned by rounding.
 FOLLOWED, TURNED = 1e-2, 1e-5
 
 
-def doubtful(pivot: float | Array, closure: float | Array, tol: float) -> bool | NDArray[np.bool_]:
-    """Which samples need scrutiny: their smallest pivots and residuals allow errors too large.
+def doubtful(sigma: float | Array, closure: float | Array, tol: float) -> bool | NDArray[np.bool_]:
+    """Which samples need scrutiny: their residuals and estimates of sigma allow errors too large.
 
     The error of rates is that of the pose over sigma once more.
     """
-    return PIVOT * np.maximum(closure, EPSILON) > AMPLIFIED * tol * pivot**2
+    return WORSE * np.maximum(closure, EPSILON) > AMPLIFIED * tol * np.square(sigma)
 
 
 def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float | Array, size: float) -> NDArray[np.bool_]:

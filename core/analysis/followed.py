@@ -12,10 +12,10 @@ from ..trajectory import Array
 from .bridge import bridge, onward
 from .continuity import doubtful
 from .march import End, March, Route, arrived, march
-from .request import FROM, LARGEST_PIVOT, TIME
+from .request import FROM, LARGEST_SIGMA, SIGMA, TIME
 from .system import System
 
-# A motion that ends with a smallest pivot above this part of the largest that it has had does not end at a singular pose.
+# A motion that ends with a smallest singular value above this part of the largest that it has had does not end at a singular pose.
 NEAR = 1e-2
 # Each takes some milliseconds to be passed. A motion that has so many is one of thousands of turns.
 MOST = 1000
@@ -83,8 +83,8 @@ class Followed:
     @property
     def doubtful(self) -> NDArray[np.bool_]:
         """Samples that were reached and may be wrong, shape (n,)."""
-        closure, pivot = (self.found.kept[self.route.model.rows[name].start] for name in ("closure", "pivot"))
-        return self.found.solved & doubtful(pivot, closure, self.tol)
+        closure, sigma = (self.found.kept[self.route.model.rows[name].start] for name in ("closure", SIGMA))
+        return self.found.solved & doubtful(sigma, closure, self.tol)
 
     def go_on(self) -> None:
         """Pass the singular poses at ends, one after the other, where the motion passes them."""
@@ -100,7 +100,7 @@ class Followed:
     def _beyond(self, end: End) -> list[End] | None:
         """What ends the motion beyond an end; None where it does not go on."""
         slots = self.route.model.slots
-        if abs(end.lane[slots[FROM + "pivot"]]) > NEAR * end.lane[slots[FROM + LARGEST_PIVOT]]:
+        if abs(end.lane[slots[FROM + SIGMA]]) > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]:
             return None
         here, number = self._time(end.lane), self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0

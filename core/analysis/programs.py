@@ -2,8 +2,8 @@
 
     predict   from state, v, a and time; time    -> state        Taylor step of second order
     extrapolate   states and times of a group of lanes; time   -> state        through `NODES` of them, without v and a
-    newton    state, drives                      -> state, residual, pivot   one Newton-Raphson iteration; residual is that before,
-                                                    pivot the smallest, with the sign of the determinant
+    newton    state, drives                      -> state, residual, sigma   one Newton-Raphson iteration; what is said of residual
+                                                    and rows is that before it
     motion    state, drives' rates               -> v, a         one factorisation at the converged pose, solved for nu and gamma
     outputs   state, v, a                        -> wanted motions, closure, leftover, branch
     alone, joined   all that, and the tolerance  -> margin         positive where a lane may be accepted
@@ -38,13 +38,26 @@ from ..program import (
 )
 from .cartesian import Cartesian, Given
 from .components import Section, select_section
-from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, PIVOT, TURNED
+from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
 from .equations import Style, constraints, frames
 from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
 from .geometry import placed, places
 from .relative import Relative
-from .request import ACCEPT, EARLIER, FROM, GIVEN, LARGEST_PIVOT, RATE, RATE_T, STOOD, TIME, Layout, Request
+from .request import (
+    ACCEPT,
+    EARLIER,
+    FROM,
+    GIVEN,
+    LARGEST_SIGMA,
+    RATE,
+    RATE_T,
+    SIGMA,
+    STOOD,
+    TIME,
+    Layout,
+    Request,
+)
 
 EULER_PARAMETERS = 4
 ABOUT = 1.5
@@ -115,7 +128,7 @@ class Tracer:
         phi = self._kept(self.formulation.phi(self.at))
         out: dict[int, Scalar] = {
             self.layout.scalar("residual"): _largest(phi),
-            self.layout.scalar("pivot"): self._factor.signed_pivot,
+            self.layout.scalar(SIGMA): self._factor.sigma,
         }
         step = self._factor.solve(phi)
         self._store_state(out, self.formulation.retract(self.at, [-x for x in step]))
@@ -143,7 +156,7 @@ class Tracer:
         sizes |= {f"predicted {name}": count for name, count in sizes.items()}
         sizes |= {RATE: self.unknowns, RATE_T: self.unknowns}
         pairs = [(self.layout.scalar(FROM + TIME), self.layout.scalar(EARLIER + TIME))]
-        pairs += [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, "pivot", LARGEST_PIVOT)]
+        pairs += [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, SIGMA, LARGEST_SIGMA)]
         pairs += [(self.layout.scalar(name), self.layout.scalar(name)) for name in ACCEPT]
         for name, count in sizes.items():
             pairs += zip(self.layout.vector(name, count), self.layout.vector(FROM + name, count), strict=True)
@@ -206,11 +219,11 @@ class Tracer:
                 moved.append(x - x_before)
                 reach.append(x - start)
         tol, consistent, crossing = (self._in(label) for label in ACCEPT)
-        closure, pivot, pivot_before = self._in("closure"), self._in("pivot"), self._in(FROM + "pivot")
-        largest = maximum(absolute(pivot), self._in(FROM + LARGEST_PIVOT))
+        closure, sigma, sigma_before = (self._in(name) for name in ("closure", SIGMA, FROM + SIGMA))
+        largest = maximum(absolute(sigma), self._in(FROM + LARGEST_SIGMA))
         if neighbours:
-            pivot_before = before(pivot, pivot_before)
-        uncertain = (PIVOT * largest) * maximum(closure, EPSILON)
+            sigma_before = before(sigma, sigma_before)
+        uncertain = (WORSE * largest) * maximum(closure, EPSILON)
         margins = (
             self._in(DONE) - 0.5,
             tol - closure,
@@ -218,11 +231,11 @@ class Tracer:
             self._in("branch"),
             LARGEST_CORRECTION * _largest(moved) + NEGLIGIBLE - _largest(gap),
             LONGEST_STEP - _largest(reach),
-            (LARGEST_RATIO * pivot - pivot_before) * (LARGEST_RATIO * pivot_before - pivot) + crossing,
-            FOLLOWED * pivot * pivot - uncertain,
-            maximum(TURNED * pivot * pivot - uncertain, absolute(pivot_before) - absolute(pivot)),
+            (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
+            FOLLOWED * sigma * sigma - uncertain,
+            maximum(TURNED * sigma * sigma - uncertain, absolute(sigma_before) - absolute(sigma)),
         )
-        out = {self.layout.scalar(MARGIN): reduce(minimum, margins), self.layout.scalar(LARGEST_PIVOT): largest}
+        out = {self.layout.scalar(MARGIN): reduce(minimum, margins), self.layout.scalar(LARGEST_SIGMA): largest}
         if neighbours:
             out[self.layout.scalar(STOOD)] = self._in(TIME)
         return program(name, self.tape, out, self.prepared)

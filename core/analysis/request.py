@@ -45,8 +45,10 @@ GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 FROM, EARLIER = "from ", "earlier "
 """Before the names of what a lane is predicted from, and of what that was predicted from."""
 
-LARGEST_PIVOT = "largest pivot"
-"""The slot of the largest size that the smallest pivot has had so far: the scale on which it is small."""
+SIGMA = "sigma"
+"""The slot of an estimate of the smallest singular value of the rows, with the sign of their determinant (`Elimination.sigma`)."""
+LARGEST_SIGMA = "largest sigma"
+"""The slot of the largest that estimate has been so far: the scale on which it is small."""
 ACCEPT = ("tolerance", "consistent", "crossing")
 """The slots that a lane is accepted by."""
 # Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.

@@ -1,7 +1,7 @@
 """Samples of a march that are nearly singular, and singular poses that it crossed or ended at: none is passed in silence.
 
 A pose is wrong by up to its residual over the smallest singular value sigma of its rows. The march sees residuals, and of sigma
-only the smallest pivot. Where that leaves room for an error the sample is solved again by orthogonal factors, and sigma and the
+only an estimate. Where that leaves room for an error the sample is solved again by orthogonal factors, and sigma and the
 errors are computed; where they are too large the sample is interpolated, if the motion goes on beyond, or else refused.
 """
 
@@ -17,7 +17,7 @@ from ..motions import Path
 from ..trajectory import Array
 from .bridge import bridge
 from .continuation import limit_ahead
-from .continuity import AMPLIFIED, PIVOT
+from .continuity import AMPLIFIED, WORSE
 from .followed import Followed, Passage
 from .march import End, March, Route
 from .model import TESTS
@@ -91,7 +91,7 @@ class _Scrutiny:
         count = int(self.followed.doubtful.sum())
         if count:
             self.findings.notes.append(
-                f"{count} samples are nearly singular by their pivots, and were not examined: {self.system.unknowns} unknowns are "
+                f"{count} samples seem to be nearly singular, and were not examined: {self.system.unknowns} unknowns are "
                 f"more than {LARGEST}"
             )
         self.findings.messages += self.found.messages
@@ -117,7 +117,7 @@ class _Scrutiny:
         kept, rows = self.found.kept, self.model.rows
         # closely solved is nearly where it was; anything else is another solution
         moved = np.abs(solved.state - state).max(axis=0)
-        near = moved <= np.maximum(self.limit, PIVOT * kept[rows["closure"].start, indices] / solved.sigma)
+        near = moved <= np.maximum(self.limit, WORSE * kept[rows["closure"].start, indices] / solved.sigma)
         good = (solved.error[: self.model.orders].max(axis=0) <= self.limit) & near & (closure <= self.tol) & (branch > 0.0)
         for name, values in [*outputs.items(), ("closure", closure), ("leftover", leftover)]:
             kept[rows[name], indices[good]] = values[..., good]

@@ -20,7 +20,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Array
-from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, PIVOT, TURNED
+from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
 from .elements import Elements, Indices
 from .equations import constraints, measured
 from .factors import Factors, SingularError
@@ -259,7 +259,7 @@ class SparseModel:
         largest = max(abs(pivot), here.largest_pivot)
         # where SuperLU exchanges rows its pivots jump tenfold: only their sign is held to, not their change
         limit = FOLLOWED if abs(pivot) < abs(here.pivot) else TURNED
-        if not pivot * here.pivot > 0.0 or limit * pivot**2 <= PIVOT * largest * max(closure, EPSILON):
+        if not pivot * here.pivot > 0.0 or limit * pivot**2 <= WORSE_BY_PIVOTS * largest * max(closure, EPSILON):
             raise FailedError(f"there is a singular pose ahead, smallest pivot {abs(pivot):.3g}")
         return Stand(time, here.time, state, taylor, rates, accelerations, iterations, closure, leftover, branch, pivot, largest)
 

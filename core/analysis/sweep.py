@@ -13,6 +13,7 @@ from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .continuity import doubtful
 from .march import March, Route, march
 from .model import Model
+from .request import SIGMA
 
 
 def sweep(model: Model, path: Path, tol: float) -> Trajectory:
@@ -23,16 +24,16 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
     model, found = route.model, march(route, tol)
-    closure, leftover, pivot = _tests(route, found, whole=not found.ends)
-    details, message = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": pivot}, ""
+    closure, leftover, sigma = _tests(route, found, whole=not found.ends)
+    details, message = model.details | _shown(model, leftover, sigma), ""
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
-    elif found.ends or doubtful(pivot, closure, tol):
+    elif found.ends or doubtful(sigma, closure, tol):
         from .scrutiny import scrutinise  # rarely needed
 
         findings = scrutinise(route, found, tol)
-        closure, leftover, pivot = _tests(route, found, whole=False)
-        details |= {"redundant_residual": leftover * model.frame.unit, "smallest_pivot": pivot} | findings.details
+        closure, leftover, sigma = _tests(route, found, whole=False)
+        details |= _shown(model, leftover, sigma) | findings.details
         message = "; ".join(findings.messages)
     iterations, samples = found.kept[model.rows["iterations"].start], found.kept.T
     return Trajectory(
@@ -47,12 +48,16 @@ def follow(route: Route, tol: float) -> Trajectory:
 
 
 def _tests(route: Route, found: March, *, whole: bool) -> tuple[float, float, float]:
-    """Of all solved samples: the largest residuals of kept and redundant rows, and the smallest pivot."""
+    """Of all solved samples: the largest residuals of kept and redundant rows, and the smallest estimate of sigma."""
     rows = route.model.rows
-    tests = found.kept[rows["closure"].start : rows["pivot"].stop]
+    tests = found.kept[rows["closure"].start : rows[SIGMA].stop]
     solved = tests if whole else tests[:, found.solved]
     closure, leftover = solved[:2].max(axis=1, initial=0.0).tolist()
-    return closure, leftover, float(np.abs(solved[3]).min(initial=1.0))
+    return closure, leftover, float(np.abs(solved[-1]).min(initial=1.0))
+
+
+def _shown(model: Model, leftover: float, sigma: float) -> dict[str, float]:
+    return {"redundant_residual": leftover * model.frame.unit, "smallest_singular_value": sigma}
 
 
 def _motions(samples: Array, rows: Sequence[slice], count: int) -> list[Any]:

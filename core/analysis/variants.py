@@ -17,7 +17,7 @@ from ..program import Executor
 from ..trajectory import Array
 from .continuity import doubtful
 from .march import Route, march
-from .request import accept_by
+from .request import SIGMA, accept_by
 
 # Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
 # it is too long is solved again alone.
@@ -79,8 +79,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         kept[:, :, k], solved[:, k] = found.kept[:, route.order], found.solved[route.order]
         if found.messages:
             messages[k] = "; ".join(found.messages)
-    closure, pivot = (kept[model.rows[name].start] for name in ("closure", "pivot"))
-    doubted = solved & doubtful(pivot, closure, tol)
+    closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
+    doubted = solved & doubtful(sigma, closure, tol)
     kept[:, doubted], solved[doubted] = np.nan, False
     for k in np.flatnonzero(doubted.any(axis=0)).tolist():
         near = route.path.where(float(route.path.times[route.order][doubted[:, k].argmax()]))

@@ -48,9 +48,9 @@ TIPS: Sequence[Vector] = ((0.35, -0.05, 0.4), (0.1, 0.15, 0.15))
 TURN = np.linspace(-0.4, 0.4, 41)
 """Of the hinge [rad], at 1 rad/s."""
 
-# Residuals of 1e-12 of a metre-sized mechanism, times the condition of its rows (fifty at most, the pivots say), times twenty.
+# Residuals of 1e-12 of a metre-sized mechanism, times the condition of its rows (a hundred at most, by sigma), times ten.
 ATOL = 1e-9
-WHY = "residual tolerance 1e-12 over the smallest pivot of a built-in joint's probe (0.02), x20"
+WHY = "residual tolerance 1e-12 over the smallest singular value of a built-in joint's probe (0.01), x10"
 
 _Tested = TypeVar("_Tested", bound=Joint | Coupler)
 

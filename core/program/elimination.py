@@ -19,7 +19,7 @@ from operator import mul
 import numpy as np
 
 from ..algebra import Scalar
-from .trace import Traced, absolute, minimum, where_larger
+from .trace import Traced, absolute, maximum, minimum, where_larger
 
 SAFE_LITERAL = 0.5
 # Up to this order looking for blocks costs more than it can save.
@@ -68,9 +68,16 @@ class Elimination:
             self.pivots += core.pivots
 
     @property
-    def signed_pivot(self) -> Scalar:
-        """The pivot of the smallest size, at most one, with the sign of the determinant: in all lanes, or in all the opposite."""
-        smallest = reduce(minimum, (absolute(x) for x in self.pivots), 1.0)
+    def sigma(self) -> Scalar:
+        """An estimate of the smallest singular value, at most one, with the sign of the determinant: in all lanes, or in all the
+        opposite.
+
+        It is the least stretch of the cores' upper triangles, and no more than any pivot. The smallest pivot alone may stay where
+        it is while the matrix becomes singular: two rows of small pivots, tied by a large entry. Lower triangles hold no more than
+        ones, and add little.
+        """
+        pivots = (absolute(x) for x in self.pivots)
+        smallest = reduce(minimum, (core.least_stretch for core in self._cores), reduce(minimum, pivots, 1.0))
         signs = [where_larger(x, y, -1.0, 1.0) for core in self._cores for step in core.steps for _, x, y in step.exchanges]
         # few at a time: a product of many pivots could fall below the smallest number
         products = (reduce(mul, self.pivots[k : k + 8]) for k in range(0, len(self.pivots), 8))
@@ -164,6 +171,17 @@ class _Core:
                 multipliers.append((i, factor))
                 matrix[i] = [*matrix[i][: k + 1], *(matrix[i][c] - factor * matrix[k][c] for c in range(k + 1, size))]
         return _CoreStep(tuple(exchanges), tuple(multipliers))
+
+    @property
+    def least_stretch(self) -> Scalar:
+        """One over the largest row sum of the inverse of the comparison matrix of U': no less than that of the inverse of U' itself
+        (Higham, Accuracy and Stability of Numerical Algorithms, 8.3), which is the largest its entries allow whatever their signs.
+        """
+        reach = list[Scalar]()
+        for k, inverse in enumerate(self.inverses):
+            above = (absolute(self.matrix[i][k]) * reach[i] for i in range(k) if not _is_zero(self.matrix[i][k]))
+            reach.append(sum(above, 1.0) * absolute(inverse))
+        return 1.0 / reduce(maximum, reach)
 
     def solve(self, b: Sequence[Scalar], x: list[Scalar]) -> None:
         """Put the solution of this block into x."""
