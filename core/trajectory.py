@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,32 @@ class BodyMotion:
     p: Array
     v: Array | None
     a: Array | None
+
+
+_Motion = TypeVar("_Motion", PointMotion, BodyMotion)
+
+
+class Motions(Mapping[str, _Motion], Generic[_Motion]):
+    """Motions by name, as views of one table. Each is made when it is looked at: a sweep costs no more than what is wanted of it.
+
+    Args:
+        kind: makes a motion of its arrays.
+        table: shape (n, columns).
+        columns: by name, those of each array; None where there is none.
+    """
+
+    def __init__(self, kind: Callable[..., _Motion], table: Array, columns: Mapping[str, Sequence[slice | None]]) -> None:
+        self._kind, self._table, self._columns = kind, table, columns
+
+    def __getitem__(self, name: str) -> _Motion:
+        table = self._table
+        return self._kind(*(None if each is None else table[:, each] for each in self._columns[name]))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
 
 
 @dataclass(frozen=True, eq=False)

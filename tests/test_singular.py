@@ -7,6 +7,7 @@ import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
 from kincheck.core import Distance, JointDisplacement, Point, Translational
+from kincheck.core.analysis.march import longest
 from kincheck.core.analysis.solve import solve
 from kincheck.core.harness.run import run
 from kincheck.core.program import Elimination, Tape, program
@@ -204,3 +205,11 @@ def test_pivots_may_stay_where_a_matrix_becomes_singular():
     found, pivot = estimated(np.array([[[1e-3, 1.0], [0.0, 1e-3]]]))
     assert pivot[0] == 1e-3
     assert found[0] == pytest.approx(np.linalg.svd([[1e-3, 1.0], [0.0, 1e-3]])[1][-1], rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("margins", "part"),
+    [([1.0, 1.0, 1.0], 0), ([-1.0, 1.0, -1.0, 1.0, 1.0], 3), ([1.0, np.nan, 1.0], None), ([-1.0, -1.0], None), ([-1.0, 1.0], None)],
+)
+def test_a_part_of_a_step_is_gone_only_where_its_half_could_be(margins, part):
+    assert longest(np.array(margins)) == part

@@ -1,5 +1,6 @@
 """The McPherson strut against its 40-digit reference and against the paper's unsimplified equations; what is asked is computed."""
 
+import pickle
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -10,6 +11,7 @@ from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, Tra
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.solve import solve
 from kincheck.core.joints import Cylindrical, Screw
+from kincheck.core.trajectory import Motions, PointMotion
 
 from . import naive
 from .mechanisms import four_bar, mcpherson, slider_crank, swapped, without_fixed_bodies
@@ -226,3 +228,16 @@ def test_fixed_bodies_and_their_points_stay():
     assert (rack.r == (1.14, 0.0, 0.1455)).all()
     assert not rack.v.any()
     assert not rack.a.any()
+
+
+def test_motions_are_views_by_name_made_when_looked_at():
+    table = np.arange(12.0).reshape(2, 6)
+    motions = Motions(PointMotion, table, {"P": [slice(0, 3), slice(3, 6), None]})
+    assert (list(motions), len(motions), "Q" in motions) == (["P"], 1, False)
+    motion = pickle.loads(pickle.dumps(motions))["P"]
+    assert (motion.position == table[:, :3]).all()
+    assert (motion.velocity == table[:, 3:]).all()
+    assert motion.acceleration is None
+    assert np.shares_memory(motions["P"].velocity, table)
+    with pytest.raises(KeyError, match="Q"):
+        motions["Q"]

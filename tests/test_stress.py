@@ -203,7 +203,9 @@ def test_nothing_nearly_singular_is_silently_wrong_without_machine_code():
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
-@pytest.mark.parametrize("name", ["four_bar_in_one_step", "kite", "loop_of_four_bodies", "loop_of_eight_bodies"])
+@pytest.mark.parametrize(
+    "name", ["four_bar_in_one_step", "kite", "loop_of_four_bodies", "loop_of_eight_bodies", "platform_nearly_singular"]
+)
 def test_what_was_silently_wrong_is_so_no_longer(name):
     """The smallest mechanisms found so far, a sample each."""
     file = Path(__file__).parent / "data" / "stress" / f"{name}.toml"

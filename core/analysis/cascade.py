@@ -6,7 +6,7 @@ predicted from is one pose for all lanes: the last sample that every component a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,7 +152,7 @@ class Lanes:
             call = executors[id(kind)].part(self._fixed[k][member], self._samples[k], self._taken[-1], self.world, base)
             self._calls.append(call)
 
-    def accept_by(self, tolerances: dict[str, float]) -> None:
+    def accept_by(self, tolerances: Mapping[str, float]) -> None:
         """Set the tolerances."""
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             for name, value in tolerances.items():

@@ -11,6 +11,7 @@ from ..motions import Path
 from ..trajectory import Array
 from .bridge import COVERED, EIGHT, NODES, PLACES, SIX
 from .cascade import Lanes
+from .march import longest
 from .request import accept_by
 
 # Nothing is interpolated here: it is enough to see that there is one curve, and other assemblies are farther off.
@@ -62,13 +63,13 @@ def _reach(lanes: Lanes, path: Path, here: float, time: float) -> bool:
     """Solve at a time as lane 0, by parts of the step where it must be."""
     for _ in range(PARTS):
         parts: Array = here + (time - here) * 0.5 ** np.arange(0.0, PARTS)
-        good = np.flatnonzero(lanes.attempt(parts, path) > 0.0)
-        if not len(good):
+        part = longest(lanes.attempt(parts, path))
+        if part is None:
             return False
-        if good[0] == 0:
+        if part == 0:
             return True
-        lanes.carry(int(good[0]))
-        here = float(parts[good[0]])
+        lanes.carry(part)
+        here = float(parts[part])
     return False
 
 

@@ -13,7 +13,7 @@ from ..motions import Path
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .cascade import Cascade, Lanes
 from .cascade_bridge import cross
-from .march import HALVINGS, MAX_ROUNDS
+from .march import HALVINGS, MAX_ROUNDS, longest
 from .model import CLOSED
 from .request import SIGMA, accept_by
 from .singularity import CONTINUED, listed
@@ -112,10 +112,10 @@ class CascadeSweep:
                 sound, start = lanes.anchor, here
             rounds += 1
             parts: Array = here + (times[at] - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
-            good = np.flatnonzero(lanes.attempt(parts, path) > 0.0)
-            if len(good) and rounds <= MAX_ROUNDS:
-                lanes.carry(int(good[0]))
-                here = float(parts[good[0]])
+            part = longest(lanes.attempt(parts, path))
+            if part is not None and rounds <= MAX_ROUNDS:
+                lanes.carry(part)
+                here = float(parts[part])
                 continue
             message = self._end(here, float(times[at]), path)
             beyond = cross(lanes, path, sound, start, here, float(times[at]), tol)

@@ -40,7 +40,8 @@ def doubtful(sigma: float | Array, closure: float | Array, tol: float) -> bool |
 
     The error of rates is that of the pose over sigma once more.
     """
-    return WORSE * np.maximum(closure, EPSILON) > AMPLIFIED * tol * np.square(sigma)
+    limit = AMPLIFIED * tol * (sigma * sigma)
+    return (WORSE * closure > limit) | (limit < WORSE * EPSILON)
 
 
 def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float | Array, size: float) -> NDArray[np.bool_]:

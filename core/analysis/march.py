@@ -148,7 +148,7 @@ class Route:
                 found.append(Side(ahead, padded, int(columns[0]), step))
         return tuple(found)
 
-    @property
+    @cached_property
     def lanes(self) -> int:
         """How many samples are tried at once."""
         return min(LANES, max(1, len(self.path.times)))
@@ -185,6 +185,15 @@ def arrived(model: Model, lane: Array) -> Array:
     for name in (SIGMA, LARGEST_SIGMA):
         found[model.slots[name]] = lane[model.slots[FROM + name]]
     return found
+
+
+def longest(margins: Array) -> int | None:
+    """The longest part of a step to go, of parts each half of the one before: one that was accepted, and its half too.
+
+    Of so many parts one may be accepted by chance, at a pose of another assembly; two such are not halves of each other.
+    """
+    good = np.flatnonzero((margins[:-1] > 0.0) & (margins[1:] > 0.0))
+    return int(good[0]) if len(good) else None
 
 
 class _Marcher:
@@ -255,11 +264,13 @@ class _Marcher:
         parts.put(self.model.sampled, self.route.sampled(times))
         parts.attempt()
         lanes = parts.get(every)
-        good = np.flatnonzero(lanes[self.slots[MARGIN]] > 0.0)
-        if not len(good):
-            return False, why_refused(self.model, lanes[:, -1])
-        reason = why_refused(self.model, lanes[:, good[0] - 1]) if good[0] else ""
-        anchor[:] = self.model.moving(lanes[:, good[0]], lanes[self.model.sampled, good[0]])
+        margins = lanes[self.slots[MARGIN]]
+        part = longest(margins)
+        refused = np.flatnonzero(~(margins[:part] > 0.0))
+        reason = why_refused(self.model, lanes[:, refused[-1]]) if len(refused) else ""
+        if part is None:
+            return False, reason
+        anchor[:] = self.model.moving(lanes[:, part], lanes[self.model.sampled, part])
         return True, reason
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:

@@ -107,20 +107,20 @@ class Model:
         return rows
 
     @cached_property
-    def of_points(self) -> Mapping[str, list[slice]]:
-        """By point: rows of its position, velocity and acceleration, as far as they are wanted."""
-        labels = ("position", "velocity", "acceleration")[: self.orders]
-        return {name: [self.rows[f"{label} {name}"] for label in labels] for name in self.request.points}
+    def of_points(self) -> Mapping[str, list[slice | None]]:
+        """By point: rows of its position, velocity and acceleration; None where one is not wanted."""
+        labels = ("position", "velocity", "acceleration")
+        return {name: [self.rows.get(f"{label} {name}") for label in labels] for name in self.request.points}
 
     @cached_property
-    def of_bodies(self) -> Mapping[str, list[slice]]:
-        """By body: rows of its r, p, v and a, as far as they are wanted; rates of place and of rotation stand side by side."""
-        pairs = (("r", "r"), ("p", "p"), ("rdot", "omega"), ("rddot", "omega_t"))[: self.orders + 1]
-        rows = self.rows
-        return {
-            name: [slice(rows[f"{first} {name}"].start, rows[f"{last} {name}"].stop) for first, last in pairs]
-            for name in self.request.bodies
-        }
+    def of_bodies(self) -> Mapping[str, list[slice | None]]:
+        """By body: rows of its r, p, v and a, None where not wanted; rates of place and of rotation stand side by side."""
+        pairs = (("r", "r"), ("p", "p"), ("rdot", "omega"), ("rddot", "omega_t"))
+
+        def rows(first: str, last: str) -> slice | None:
+            return slice(self.rows[first].start, self.rows[last].stop) if first in self.rows else None
+
+        return {name: [rows(f"{first} {name}", f"{last} {name}") for first, last in pairs] for name in self.request.bodies}
 
     @property
     def orders(self) -> int:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 from .equations import Style
 
@@ -55,7 +57,8 @@ ACCEPT = ("tolerance", "consistent", "crossing")
 CONSISTENT = 1e-9
 
 
-def accept_by(tol: float, *, crossing: bool = False) -> dict[str, float]:
+@lru_cache
+def accept_by(tol: float, *, crossing: bool = False) -> Mapping[str, float]:
     """The numbers of `ACCEPT`: the largest residual of rows, that of redundant rows, and whether a singular pose may be crossed.
 
     The last is more than all that a product of two pivots can lack to be accepted: they are at most one.

@@ -155,14 +155,22 @@ class _Sweep:
             yield here
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
-        """Go a part of the way to a time that could not be reached. Raises FailedError where even the smallest part cannot."""
-        last = FailedError()
+        """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).
+
+        Raises:
+            FailedError: there is none.
+        """
+        last, longer = FailedError(), None
         for k in range(1, HALVINGS + 1):
             part = here.time + (time - here.time) * 0.5**k
             try:
-                return self.model.reach(here, part, self.model.drives(path, np.array([part]))[:, 0], self.tol)
+                found = self.model.reach(here, part, self.model.drives(path, np.array([part]))[:, 0], self.tol)
             except FailedError as error:
-                last = error
+                last, longer = error, None
+                continue
+            if longer is not None:
+                return longer
+            longer = found
         raise last
 
     def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
