@@ -66,7 +66,12 @@ class Factors:
 
     @property
     def signed_pivot(self) -> float:
-        """The pivot of the smallest size, with the sign of the determinant or always the opposite; costs half a factorisation."""
+        """The pivot of the smallest size, with the sign of the determinant or always the opposite; costs half a factorisation.
+
+        The smallest singular value, by a step of inverse iteration with these factors, says more of a small matrix, but nothing of
+        a large one: of a chain of 60 planar loops it is 1e-23 where all is well, for rows that repeat others are left out at one
+        end of it.
+        """
         diagonal = self._factors.U.diagonal()
         odd = np.count_nonzero(diagonal < 0.0) + len(diagonal) - _cycles(self._factors.perm_r)
         smallest = float(np.abs(diagonal).min())
