@@ -18,7 +18,7 @@ from ..trajectory import Array
 from .continuity import AMPLIFIED, EPSILON, WORSE
 from .march import Route, arrived, march
 from .model import TESTS, Model
-from .request import FROM, RATE, SIGMA, TIME
+from .request import FROM, ORIENTATION, RATE, SIGMA, TIME
 from .singularity import solve_closely
 from .system import System
 
@@ -71,7 +71,7 @@ def bridge(system: System, route: Route, lane: Array, time: float, tol: float, n
             continue
         whole, lanes = found
         closure, sigma = (whole[model.rows[name].start] for name in ("closure", SIGMA))
-        own = WORSE * float((np.maximum(closure, EPSILON) / np.abs(sigma)).max())
+        own = WORSE * float((np.maximum(closure, EPSILON) / sigma).max())
         differences = np.abs(whole @ (EIGHT - SIX))
         off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in _scales(model, whole, speed))])
         if off <= AMPLIFIED * tol and (near is None or _on_curve(system, route, lanes, near)):
@@ -88,8 +88,8 @@ def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, 
     if not before.solved.all():
         return None
     beyond = march(onward(route, before.visited[3], times[4:]), tol, visit=range(4), crossing=True)
-    signs = np.sign(beyond.kept[route.model.rows[SIGMA].start])
-    if not (beyond.solved.all() and (signs == signs[0]).all()):
+    turned = beyond.kept[route.model.rows[ORIENTATION].start]
+    if not (beyond.solved.all() and (turned == turned[0]).all()):
         return None
     lanes = [march.visited[k] for march in (before, beyond) for k in range(4)]
     return np.hstack([before.kept, beyond.kept]), np.stack(lanes, axis=1)

@@ -213,7 +213,7 @@ class Lanes:
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             slots = list(kind.model.plan.fixed)
             sigma, largest = (fixed[:, slots.index(kind.model.slots[FROM + name])] for name in (SIGMA, LARGEST_SIGMA))
-            if not (np.abs(sigma) >= SOUND * largest).all():
+            if not (sigma >= SOUND * largest).all():
                 return False
         return True
 

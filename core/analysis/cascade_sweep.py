@@ -73,7 +73,7 @@ class CascadeSweep:
                     found[name][at] = lanes.world[rows][:, lane].T
                 for name, into in tests.items():
                     each = lanes.each(name)[:, lane]
-                    into[at] = np.abs(each).min(axis=0) if name == SIGMA else each.max(axis=0)
+                    into[at] = each.min(axis=0) if name == SIGMA else each.max(axis=0)
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
@@ -135,7 +135,7 @@ class CascadeSweep:
 
     def _end(self, here: float, wanted: float, path: Path) -> str:
         lane = HALVINGS - 1
-        closure, sigma = (np.abs(self._lanes.each(name)[:, lane]) for name in ("closure", SIGMA))
+        closure, sigma = (self._lanes.each(name)[:, lane] for name in ("closure", SIGMA))
         worst = int(np.nan_to_num(closure, nan=np.inf).argmax())
         order = [part for kind in self.cascade.kinds for part in kind.members]
         bodies = ", ".join(self.cascade.parts[order[worst]].bodies)

@@ -18,7 +18,7 @@ NEGLIGIBLE = 1e-8
 # A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or
 # parts of the mechanism's size, says nothing of what is between: a whole turn ends where it began, on whatever assembly.
 LONGEST_STEP = 0.5
-# Nor does a step over which sigma changes by more than this factor, or the determinant its sign: beside a singular pose rates
+# Nor does a step over which sigma changes by more than this factor, or a determinant its sign: beside a singular pose rates
 # change as fast. Steps towards it get shorter and shorter, and nothing there is stepped over. Where rows are exchanged the estimate
 # of sigma jumps, over the case library by up to 3.6 times.
 LARGEST_RATIO = 16.0

@@ -100,7 +100,7 @@ class Followed:
     def _beyond(self, end: End) -> list[End] | None:
         """What ends the motion beyond an end; None where it does not go on."""
         slots = self.route.model.slots
-        if abs(end.lane[slots[FROM + SIGMA]]) > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]:
+        if end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]:
             return None
         here, number = self._time(end.lane), self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0

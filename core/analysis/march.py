@@ -18,7 +18,7 @@ from ..program import MARGIN
 from ..trajectory import Array
 from .model import Model
 from .refusal import why_refused
-from .request import FROM, LARGEST_SIGMA, SIGMA, TIME, accept_by
+from .request import FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, TIME, accept_by
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
@@ -182,7 +182,7 @@ def arrived(model: Model, lane: Array) -> Array:
     found = lane.copy()
     for name in model.state:
         found[model.vectors[name]] = lane[model.vectors[FROM + name]]
-    for name in (SIGMA, LARGEST_SIGMA):
+    for name in (SIGMA, ORIENTATION, LARGEST_SIGMA):
         found[model.slots[name]] = lane[model.slots[FROM + name]]
     return found
 
@@ -279,6 +279,6 @@ class _Marcher:
         last = f"last reachable sample at {where(float(side.times[at - 1]))}" if at else "no sample reached on this side"
         return (
             f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest singular value there about "
-            f"{abs(anchor[self.slots[FROM + SIGMA]]):.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "
+            f"{anchor[self.slots[FROM + SIGMA]]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "
             "another coordinate"
         )

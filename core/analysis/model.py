@@ -16,13 +16,13 @@ from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, Nump
 from ..program.compiled import available
 from ..trajectory import Array
 from .components import Section
-from .request import EARLIER, FROM, LARGEST_SIGMA, RATE, RATE_T, SIGMA, TIME, Request
+from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, RATE, RATE_T, SIGMA, TIME, Request
 from .tracing import Tracing, traced
 
 MAX_ITERATIONS = 12
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
-TESTS = ("closure", "leftover", "branch", SIGMA, LARGEST_SIGMA, ITERATIONS, MARGIN)
+TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
 TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
 """Of variants these: where there is a solution, how sure, and what it took; there are very many to be written."""

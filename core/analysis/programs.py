@@ -2,8 +2,8 @@
 
     predict   from state, v, a and time; time    -> state        Taylor step of second order
     extrapolate   states and times of a group of lanes; time   -> state        through `NODES` of them, without v and a
-    newton    state, drives                      -> state, residual, sigma   one Newton-Raphson iteration; what is said of residual
-                                                    and rows is that before it
+    newton    state, drives                      -> state, residual, sigma, orientation   one Newton-Raphson iteration; what is
+                                                    said of residual and rows is that before it
     motion    state, drives' rates               -> v, a         one factorisation at the converged pose, solved for nu and gamma
     outputs   state, v, a                        -> wanted motions, closure, leftover, branch
     alone, joined   all that, and the tolerance  -> margin         positive where a lane may be accepted
@@ -50,6 +50,7 @@ from .request import (
     FROM,
     GIVEN,
     LARGEST_SIGMA,
+    ORIENTATION,
     RATE,
     RATE_T,
     SIGMA,
@@ -129,6 +130,7 @@ class Tracer:
         out: dict[int, Scalar] = {
             self.layout.scalar("residual"): _largest(phi),
             self.layout.scalar(SIGMA): self._factor.sigma,
+            self.layout.scalar(ORIENTATION): self._factor.orientation,
         }
         step = self._factor.solve(phi)
         self._store_state(out, self.formulation.retract(self.at, [-x for x in step]))
@@ -156,7 +158,7 @@ class Tracer:
         sizes |= {f"predicted {name}": count for name, count in sizes.items()}
         sizes |= {RATE: self.unknowns, RATE_T: self.unknowns}
         pairs = [(self.layout.scalar(FROM + TIME), self.layout.scalar(EARLIER + TIME))]
-        pairs += [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, SIGMA, LARGEST_SIGMA)]
+        pairs += [(self.layout.scalar(name), self.layout.scalar(FROM + name)) for name in (TIME, SIGMA, ORIENTATION, LARGEST_SIGMA)]
         pairs += [(self.layout.scalar(name), self.layout.scalar(name)) for name in ACCEPT]
         for name, count in sizes.items():
             pairs += zip(self.layout.vector(name, count), self.layout.vector(FROM + name, count), strict=True)
@@ -219,10 +221,11 @@ class Tracer:
                 moved.append(x - x_before)
                 reach.append(x - start)
         tol, consistent, crossing = (self._in(label) for label in ACCEPT)
-        closure, sigma, sigma_before = (self._in(name) for name in ("closure", SIGMA, FROM + SIGMA))
-        largest = maximum(absolute(sigma), self._in(FROM + LARGEST_SIGMA))
+        closure, sigma, turned = (self._in(name) for name in ("closure", SIGMA, ORIENTATION))
+        sigma_before, turned_before, largest = (self._in(FROM + name) for name in (SIGMA, ORIENTATION, LARGEST_SIGMA))
+        largest = maximum(sigma, largest)
         if neighbours:
-            sigma_before = before(sigma, sigma_before)
+            sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
         uncertain = (WORSE * largest) * maximum(closure, EPSILON)
         margins = (
             self._in(DONE) - 0.5,
@@ -232,8 +235,9 @@ class Tracer:
             LARGEST_CORRECTION * _largest(moved) + NEGLIGIBLE - _largest(gap),
             LONGEST_STEP - _largest(reach),
             (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
+            0.5 - absolute(turned - turned_before) + crossing,
             FOLLOWED * sigma * sigma - uncertain,
-            maximum(TURNED * sigma * sigma - uncertain, absolute(sigma_before) - absolute(sigma)),
+            maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
         )
         out = {self.layout.scalar(MARGIN): reduce(minimum, margins), self.layout.scalar(LARGEST_SIGMA): largest}
         if neighbours:

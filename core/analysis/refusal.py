@@ -7,7 +7,7 @@ import numpy as np
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_RATIO, TURNED, WORSE
 from .model import Model
-from .request import FROM, LARGEST_SIGMA, SIGMA
+from .request import FROM, LARGEST_SIGMA, ORIENTATION, SIGMA
 
 # Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
 ROUNDING = 64.0 * EPSILON
@@ -33,9 +33,11 @@ def why_refused(model: Model, lane: Array) -> str:
         return f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance {tol:.3g} is less; allow more"
     if closure > tol:
         return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
-    sigma, before, largest = (float(lane[model.slots[name]]) for name in (SIGMA, FROM + SIGMA, LARGEST_SIGMA))
+    sigma, before, largest, *turned = (
+        float(lane[model.slots[name]]) for name in (SIGMA, FROM + SIGMA, LARGEST_SIGMA, ORIENTATION, FROM + ORIENTATION)
+    )
     uncertain = WORSE * largest * max(closure, EPSILON) / sigma**2 if sigma else np.inf
-    lost = uncertain >= FOLLOWED or (uncertain >= TURNED and abs(sigma) >= abs(before))
-    if lost or not 1.0 / LARGEST_RATIO < sigma / before < LARGEST_RATIO:
+    lost = uncertain >= FOLLOWED or (uncertain >= TURNED and sigma >= before)
+    if lost or not 1.0 / LARGEST_RATIO < sigma / before < LARGEST_RATIO or turned[0] != turned[1]:
         return "there is a singular pose ahead"
     return "Newton jumps to another assembly"

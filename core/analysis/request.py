@@ -47,23 +47,24 @@ GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 FROM, EARLIER = "from ", "earlier "
 """Before the names of what a lane is predicted from, and of what that was predicted from."""
 
-SIGMA = "sigma"
-"""The slot of an estimate of the smallest singular value of the rows, with the sign of their determinant (`Elimination.sigma`)."""
+SIGMA, ORIENTATION = "sigma", "orientation"
+"""The slots of an estimate of the smallest singular value of the rows, and of the signs of their determinants (`Elimination`)."""
 LARGEST_SIGMA = "largest sigma"
 """The slot of the largest that estimate has been so far: the scale on which it is small."""
 ACCEPT = ("tolerance", "consistent", "crossing")
 """The slots that a lane is accepted by."""
 # Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.
 CONSISTENT = 1e-9
+CROSSING = 1e18
 
 
 @lru_cache
 def accept_by(tol: float, *, crossing: bool = False) -> Mapping[str, float]:
     """The numbers of `ACCEPT`: the largest residual of rows, that of redundant rows, and whether a singular pose may be crossed.
 
-    The last is more than all that a product of two pivots can lack to be accepted: they are at most one.
+    The last is more than all that the tests of sigma and of orientation can lack to be accepted.
     """
-    return dict(zip(ACCEPT, (tol, max(CONSISTENT, tol), 32.0 if crossing else 0.0), strict=True))
+    return dict(zip(ACCEPT, (tol, max(CONSISTENT, tol), CROSSING if crossing else 0.0), strict=True))
 
 
 class Layout:

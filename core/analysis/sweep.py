@@ -50,4 +50,4 @@ def follow(route: Route, tol: float) -> Trajectory:
 def _worst(tests: Array) -> tuple[float, float, float]:
     """The largest residuals of kept and redundant rows, and the smallest estimate of sigma; rows from "closure" to `SIGMA`."""
     closure, leftover = np.maximum.reduce(tests[:2], axis=1, initial=0.0).tolist()
-    return closure, leftover, float(np.minimum.reduce(np.abs(tests[-1]), initial=1.0))
+    return closure, leftover, float(np.minimum.reduce(tests[-1], initial=1.0))

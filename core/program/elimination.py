@@ -9,11 +9,9 @@ met an exact zero pivot within one crank turn of a four-bar.
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from graphlib import TopologicalSorter
 from operator import mul
 
 import numpy as np
@@ -22,8 +20,8 @@ from ..algebra import Scalar
 from .trace import Traced, absolute, maximum, minimum, where_larger
 
 SAFE_LITERAL = 0.5
-# Up to this order looking for blocks costs more than it can save.
-ONE_CORE = 12
+# Signs of more blocks than this are put together: as digits of a number in double precision they are exact.
+DIGITS = 50
 
 
 @dataclass(frozen=True)
@@ -41,6 +39,10 @@ class _CoreStep:
 
     exchanges: tuple[tuple[int, Scalar, Scalar], ...]
     multipliers: tuple[tuple[int, Scalar], ...]
+
+
+def _sign(x: Scalar) -> Scalar:
+    return where_larger(x + absolute(x), 0.0, 1.0, -1.0)
 
 
 def _is_zero(a: Scalar) -> bool:
@@ -69,20 +71,31 @@ class Elimination:
 
     @property
     def sigma(self) -> Scalar:
-        """An estimate of the smallest singular value, at most one, with the sign of the determinant: in all lanes, or in all the
-        opposite.
+        """An estimate of the smallest singular value, at most one.
 
         It is the least stretch of the cores' upper triangles, and no more than any pivot. The smallest pivot alone may stay where
         it is while the matrix becomes singular: two rows of small pivots, tied by a large entry. Lower triangles hold no more than
         ones, and add little.
         """
         pivots = (absolute(x) for x in self.pivots)
-        smallest = reduce(minimum, (core.least_stretch for core in self._cores), reduce(minimum, pivots, 1.0))
-        signs = [where_larger(x, y, -1.0, 1.0) for core in self._cores for step in core.steps for _, x, y in step.exchanges]
-        # few at a time: a product of many pivots could fall below the smallest number
-        products = (reduce(mul, self.pivots[k : k + 8]) for k in range(0, len(self.pivots), 8))
-        signs += [where_larger(x + absolute(x), 0.0, 1.0, -1.0) for x in products]
-        return reduce(mul, signs, smallest)
+        return reduce(minimum, (core.least_stretch for core in self._cores), reduce(minimum, pivots, 1.0))
+
+    @property
+    def orientation(self) -> Scalar:
+        """The signs of the blocks' determinants as digits of one number; each is right in all lanes, or in none.
+
+        The sign of the whole determinant would not do: two loops alike, each singular at the same pose, change it twice.
+        """
+        signs = list(self._signs())
+        digits = [reduce(mul, signs[k::DIGITS]) for k in range(min(DIGITS, len(signs)))]
+        return sum((2.0**k * digit for k, digit in enumerate(digits)), 0.0)
+
+    def _signs(self) -> Iterator[Scalar]:
+        for x in self.pivots[: len(self.pivots) - sum(len(core.rows) for core in self._cores)]:
+            yield _sign(x)
+        for core in self._cores:
+            exchanged = (where_larger(x, y, -1.0, 1.0) for step in core.steps for _, x, y in step.exchanges)
+            yield reduce(mul, exchanged, reduce(mul, (_sign(x) for x in core.pivots)))
 
     @property
     def core_size(self) -> int:
@@ -206,30 +219,38 @@ def _blocks(
     entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]
 ) -> list[tuple[list[int], list[int]]]:
     """Rows and columns of the blocks, in an order in which each needs only those before it."""
-    if len(rows) <= ONE_CORE:
-        return [(list(rows), list(columns))] if rows else []
-    # slow to import, and small mechanisms do not need it
-    sparse, graphs = (importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph"))
-    place = {j: k for k, j in enumerate(columns)}
-    at = [(k, place[j]) for k, i in enumerate(rows) for j in entries[i]]
-    shape = (len(rows), len(rows))
-    pattern = sparse.coo_array((np.ones(len(at)), tuple(np.array(at).T)), shape=shape).tocsr()
-    column_of: list[int] = graphs.maximum_bipartite_matching(pattern, perm_type="column").tolist()
-    if min(column_of) < 0:
-        raise ZeroDivisionError("the matrix is singular whatever the pose: its rows cannot be matched with its columns")
-    row_of = {column: k for k, column in enumerate(column_of)}
-    needs = [(k, row_of[c]) for k, c in at]
-    graph = sparse.coo_array((np.ones(len(needs)), tuple(np.array(needs).T)), shape=shape)
-    count, block_of = graphs.connected_components(graph, directed=True, connection="strong")
-    before: dict[int, set[int]] = {block: set() for block in range(count)}
-    for k, other in needs:
-        if block_of[k] != block_of[other]:
-            before[int(block_of[k])].add(int(block_of[other]))
-    members: dict[int, list[int]] = {block: [] for block in range(count)}
-    for k, block in enumerate(block_of.tolist()):
-        members[block].append(k)
-    order = TopologicalSorter(before).static_order()
-    return [([rows[k] for k in members[each]], [columns[column_of[k]] for k in members[each]]) for each in order]
+    row_of = _matched({i: list(entries[i]) for i in rows})
+    column_of = {i: j for j, i in row_of.items()}
+    place = {i: k for k, i in enumerate(rows)}
+    needs = np.eye(len(rows))
+    for i in rows:
+        needs[place[i], [place[row_of[j]] for j in entries[i]]] = 1.0
+    for _ in range(len(rows).bit_length()):  # paths of twice the length
+        needs = np.minimum(needs @ needs, 1.0)
+    found: dict[bytes, list[int]] = {}
+    order: list[int] = np.argsort(needs.sum(axis=1), kind="stable").tolist()  # what a block needs, needs less
+    for k in order:
+        found.setdefault((needs[k] * needs[:, k]).tobytes(), []).append(rows[k])
+    return [(block, [column_of[i] for i in block]) for block in found.values()]
+
+
+def _matched(columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
+    """The rows by column, one of its own columns for each (Kuhn's augmenting paths)."""
+    row_of: dict[int, int] = {}
+
+    def place(i: int, seen: set[int]) -> bool:
+        for j in columns[i]:
+            if j not in seen:
+                seen.add(j)
+                if j not in row_of or place(row_of[j], seen):
+                    row_of[j] = i
+                    return True
+        return False
+
+    for i in columns:
+        if not place(i, set()):
+            raise ZeroDivisionError("the matrix is singular whatever the pose: its rows cannot be matched with its columns")
+    return row_of
 
 
 def _safe_pivot(entries: Sequence[Mapping[int, Scalar]], rows: set[int], columns: Mapping[int, set[int]]) -> tuple[int, int] | None:
