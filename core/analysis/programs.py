@@ -44,21 +44,7 @@ from .formulation import Acceleration, Formulation, State
 from .freedom import select_rows
 from .geometry import placed, places
 from .relative import Relative
-from .request import (
-    ACCEPT,
-    EARLIER,
-    FROM,
-    GIVEN,
-    LARGEST_SIGMA,
-    ORIENTATION,
-    RATE,
-    RATE_T,
-    SIGMA,
-    STOOD,
-    TIME,
-    Layout,
-    Request,
-)
+from .request import ACCEPT, EARLIER, FROM, GIVEN, LARGEST_SIGMA, ORIENTATION, RATE, RATE_T, SIGMA, STOOD, TIME, Layout, Request
 
 EULER_PARAMETERS = 4
 ABOUT = 1.5
@@ -240,8 +226,7 @@ class Tracer:
             maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
         )
         out = {self.layout.scalar(MARGIN): reduce(minimum, margins), self.layout.scalar(LARGEST_SIGMA): largest}
-        if neighbours:
-            out[self.layout.scalar(STOOD)] = self._in(TIME)
+        out |= {self.layout.scalar(STOOD): self._in(TIME)} if neighbours else {}
         return program(name, self.tape, out, self.prepared)
 
     def outputs(self) -> Program:
