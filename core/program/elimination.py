@@ -231,7 +231,7 @@ def _blocks(
     order: list[int] = np.argsort(needs.sum(axis=1), kind="stable").tolist()  # what a block needs, needs less
     for k in order:
         found.setdefault((needs[k] * needs[:, k]).tobytes(), []).append(rows[k])
-    return [(block, [column_of[i] for i in block]) for block in found.values()]
+    return [(block, sorted(column_of[i] for i in block)) for block in found.values()]
 
 
 def _matched(columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
