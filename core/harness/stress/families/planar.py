@@ -13,7 +13,7 @@ from ....mechanism import Body, Mechanism, Point
 from ....trajectory import Array
 from ..extended import Real, extended, unit
 from ..truth import Motion
-from .base import Rng, direction, triple
+from .base import Rng, direction, power, triple
 
 Plan = tuple[float, float]
 """A point in the plane."""
@@ -92,7 +92,9 @@ JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
 """How the coupler of a loop hangs on its neighbours: with three redundant rows, or none."""
 
 
-def coupled(way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan, Plan]) -> tuple[list[Body], list[Joint]]:
+def coupled(
+    way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan, Plan], label: str = ""
+) -> tuple[list[Body], list[Joint]]:
     """The coupler, or the rod in its place, between two bodies at their points: bodies and joints of it."""
     first, second, coupler = names
     start, end = map(plane.point, at)
@@ -100,11 +102,12 @@ def coupled(way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan,
     along = plane.along((at[1][0] - at[0][0], at[1][1] - at[0][1]))
     across = triple(np.cross(n, along))
     if way == "rod":
-        return [], [Distance("rod", first, second, (start, end))]
+        return [], [Distance(f"{label}rod", first, second, (start, end))]
+    pin_1, pin_2 = f"{label}pin_1", f"{label}pin_2"
     joints: Mapping[str, Sequence[Joint]] = {
-        "revolutes": (Revolute("pin_1", first, coupler, start, n), Revolute("pin_2", coupler, second, end, n)),
-        "balls": (Universal("pin_1", first, coupler, start, (n, across)), Spherical("pin_2", coupler, second, end)),
-        "cylinders": (Cylindrical("pin_1", first, coupler, start, n), Spherical("pin_2", coupler, second, end)),
+        "revolutes": (Revolute(pin_1, first, coupler, start, n), Revolute(pin_2, coupler, second, end, n)),
+        "balls": (Universal(pin_1, first, coupler, start, (n, across)), Spherical(pin_2, coupler, second, end)),
+        "cylinders": (Cylindrical(pin_1, first, coupler, start, n), Spherical(pin_2, coupler, second, end)),
     }
     return [Body(coupler)], list(joints[way])
 
@@ -125,8 +128,54 @@ def four_bar(plane: Plane, b: Plan, d: Plan, c: Plan, way: str = "revolutes", tu
     )
 
 
+TWIN = "twin "
+
+
+def twins(plane: Plane, b: Plan, d: Plan, c: Plan, ways: tuple[str, str]) -> Mechanism:
+    """A four-bar that has its coupler and its rocker twice: two loops on one crank."""
+    single = four_bar(plane, b, d, c, ways[0])
+    rocker = f"{TWIN}rocker"
+    bodies, joints = coupled(ways[1], plane, ("crank", rocker, f"{TWIN}coupler"), (b, c), TWIN)
+    rest = Revolute(f"{TWIN}rest", "ground", rocker, plane.point(d), plane.normal)
+    points = [*single.points, Point(f"{TWIN}C", rocker, plane.point(c))]
+    return Mechanism("twins", [*single.bodies, Body(rocker), *bodies], [*single.joints, rest, *joints], points, single.drivers)
+
+
+def nearly_parallel(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
+    """B, D and C of a parallelogram, exact or off by the last: it folds flat twice a turn."""
+    off = 0.0 if rng.random() < 0.25 else power(rng, -12.0, -2.0) * float(rng.choice([-1.0, 1.0]))
+    crank, up = float(rng.uniform(0.2, 0.5)), float(rng.uniform(0.8, 2.2))
+    b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
+    # the crank is the shortest, and by Grashof turns if the rocker is longer, the coupler being as long as the ground
+    c: Plan = (b[0] + 1.0, b[1])
+    if off:
+        met = meet(extended(b)[:, None], extended([1.0]), extended([[1.0], [0.0]]), extended([(crank + off) ** 2]), 1.0)
+        c = (float(met[0, 0]), float(met[1, 0]))
+    return b, (1.0, 0.0), c, off
+
+
+def nearly_kite(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
+    """B, D and C of a kite: the crank is as long as the ground, but for the last, and passes the rocker's pivot."""
+    off, up = power(rng, -9.0, -2.0), float(rng.uniform(0.8, 2.2))
+    crank, long = 0.4 * (1.0 - off), float(rng.uniform(0.8, 1.2))
+    b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
+    d: Plan = (0.4, 0.0)
+    middle, half = (np.add(b, d)) / 2.0, np.subtract(d, b) / 2.0
+    away = np.array([-half[1], half[0]]) / np.hypot(*half) * np.sqrt(long**2 - half @ half)
+    return b, d, (float(middle[0] + away[0]), float(middle[1] + away[1])), off
+
+
+def rockers(rng: Rng) -> tuple[Plan, Plan, Plan]:
+    """B, D and C of a four-bar whose longest bar is between the pivots: neither the crank nor the rocker turns round."""
+    b = (float(rng.uniform(-0.2, 0.2)), float(rng.uniform(0.4, 0.6)))
+    d: Plan = (float(rng.uniform(1.0, 1.1)), 0.0)
+    return b, d, (float(rng.uniform(0.5, 0.8)), float(rng.uniform(0.5, 0.7)))
+
+
 def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = False) -> Motion:
-    """Its closed form, on the side of the design up to where the crank must turn back; or of the parallelogram, which goes on."""
+    """Its closed form, twice, on the side of the design up to where the crank must turn back; or of the parallelogram, which goes
+    on.
+    """
     B, C, D = (extended(each)[:, None] for each in (b, c, d))
     p, q = ((C - B) ** 2).sum(axis=0), ((C - D) ** 2).sum(axis=0)
     side = float(np.sign((D - B)[0, 0] * (C - B)[1, 0] - (D - B)[1, 0] * (C - B)[0, 0]))
@@ -138,11 +187,11 @@ def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = Fa
         now_b = spin(turn, b)
         now_c = now_b + (C - B) if parallel else meet(now_b, p, D + 0.0 * now_b, q, side)
         still = np.zeros((3, len(turn)), dtype=np.longdouble)
-        return {
-            "crank": (plane.turned(turn), pivot, still),
+        loop = {
             "rocker": (plane.turned(heading(now_c - D) - heading(C - D)), rest, still),
             "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.lift(now_b - B)),
         }
+        return {"crank": (plane.turned(turn), pivot, still)} | loop | {f"{TWIN}{name}": moved for name, moved in loop.items()}
 
     return motion
 

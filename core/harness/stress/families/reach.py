@@ -8,7 +8,7 @@ import numpy as np
 
 from ..truth import closed
 from .base import Family, Rng, Specimen, as_case, power
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion, slider_crank, slider_crank_motion
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion, rockers, slider_crank, slider_crank_motion
 
 
 class Reach(Family):
@@ -39,10 +39,7 @@ class Reach(Family):
                 partial(closed, motion=motion),
                 facts=(("bend", bend),),
             )
-        # the longest bar between the pivots: neither the crank nor the rocker turns round
-        b = (float(rng.uniform(-0.2, 0.2)), float(rng.uniform(0.4, 0.6)))
-        d: Plan = (float(rng.uniform(1.0, 1.1)), 0.0)
-        c = (float(rng.uniform(0.5, 0.8)), float(rng.uniform(0.5, 0.7)))
+        b, d, c = rockers(rng)
         turn = np.linspace(-TURN, TURN, samples)
         return Specimen(
             f"four_bar with {way}, driven past its dead centres",

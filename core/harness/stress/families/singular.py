@@ -11,10 +11,9 @@ from ....drivers import JointAngle, JointDisplacement
 from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
 from ....mechanism import GROUND, Body, Mechanism, Point
 from ....trajectory import Array
-from ..extended import extended
 from ..truth import closed, followed
 from .base import Family, Rng, Specimen, as_case, direction, power, triple
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion, meet
+from .planar import JOINTS_OF_A_LOOP, any_plane, four_bar, four_bar_motion, nearly_kite, nearly_parallel
 
 TURN = 0.97 * np.pi
 
@@ -40,19 +39,12 @@ def _parallelogram(rng: Rng, samples: int) -> Specimen:
     it turns into the antiparallel linkage within the root of that, off the other way it cannot pass.
     """
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
-    off = 0.0 if rng.random() < 0.25 else power(rng, -12.0, -2.0) * float(rng.choice([-1.0, 1.0]))
-    crank, up = float(rng.uniform(0.2, 0.5)), float(rng.uniform(0.8, 2.2))
-    b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
-    # the crank is the shortest, and by Grashof turns if the rocker is longer, the coupler being as long as the ground
-    c: Plan = (b[0] + 1.0, b[1])
-    if off:
-        met = meet(extended(b)[:, None], extended([1.0]), extended([[1.0], [0.0]]), extended([(crank + off) ** 2]), 1.0)
-        c = (float(met[0, 0]), float(met[1, 0]))
-    motion = four_bar_motion(plane, b, (1.0, 0.0), c, parallel=off == 0.0)
+    b, d, c, off = nearly_parallel(rng)
+    motion = four_bar_motion(plane, b, d, c, parallel=off == 0.0)
     values = np.linspace(-TURN, TURN, samples)
     return Specimen(
         f"parallelogram with {way}, off by {off:.2g}",
-        partial(as_case, four_bar(plane, b, (1.0, 0.0), c, way), "turn", values),
+        partial(as_case, four_bar(plane, b, d, c, way), "turn", values),
         partial(closed, motion=motion),
         facts=(("off", off),),
     )
@@ -61,13 +53,7 @@ def _parallelogram(rng: Rng, samples: int) -> Specimen:
 def _kite(rng: Rng, samples: int) -> Specimen:
     """The crank is as long as the ground, but for a little, and passes the rocker's pivot."""
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
-    off, up = power(rng, -9.0, -2.0), float(rng.uniform(0.8, 2.2))
-    crank, long = 0.4 * (1.0 - off), float(rng.uniform(0.8, 1.2))
-    b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
-    d: Plan = (0.4, 0.0)
-    middle, half = (np.add(b, d)) / 2.0, np.subtract(d, b) / 2.0
-    away = np.array([-half[1], half[0]]) / np.hypot(*half) * np.sqrt(long**2 - half @ half)
-    c: Plan = (float(middle[0] + away[0]), float(middle[1] + away[1]))
+    b, d, c, off = nearly_kite(rng)
     return Specimen(
         f"kite with {way}, off by {off:.2g}",
         partial(as_case, four_bar(plane, b, d, c, way), "turn", np.linspace(-TURN, TURN, samples)),
