@@ -26,6 +26,7 @@ from .equations import constraints, measured
 from .factors import Factors, SingularError
 from .freedom import RANK_TOLERANCE
 from .model import CLOSED, MAX_ITERATIONS
+from .orientation import Blocks
 from .programs import ABOUT
 from .request import CONSISTENT
 from .sparse_rows import Jacobian
@@ -50,7 +51,7 @@ class Stand:
         state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
         rates, accelerations: of the unknowns.
         closure, leftover, branch: largest residual of the rows solved and of the redundant ones, smallest branch test.
-        pivot: the smallest, with the determinant's sign; largest_pivot: the largest size it has had so far.
+        pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see `Blocks`.
     """
 
     time: float
@@ -65,6 +66,7 @@ class Stand:
     branch: float = 1.0
     pivot: float = 0.0
     largest_pivot: float = 0.0
+    orientation: bytes = b""
 
 
 class FailedError(ArithmeticError):
@@ -120,7 +122,8 @@ class SparseModel:
         among = jacobian.among(self.kept)
         self._solved = np.flatnonzero(among >= 0)
         try:
-            self.factors = Factors(among[self._solved], jacobian.columns[self._solved], jacobian.values[self._solved], unknowns)
+            pattern = among[self._solved], jacobian.columns[self._solved]
+            self.factors, self._blocks = Factors(*pattern, jacobian.values[self._solved], unknowns), Blocks(*pattern, unknowns)
             pivot = abs(self.factors.signed_pivot)
         except SingularError:
             pivot = 0.0
@@ -193,8 +196,13 @@ class SparseModel:
         self._evaluate(at.state, drives)
         rates, accelerations = self._motion()
         now = replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
+        pivot, orientation = self._pivots()
+        return replace(now, pivot=pivot, largest_pivot=max(at.largest_pivot, pivot), orientation=orientation)
+
+    def _pivots(self) -> tuple[float, bytes]:
+        """The smallest in size, and the orientation, where all was last factored."""
         pivot = self.factors.signed_pivot
-        return replace(now, pivot=pivot, largest_pivot=max(at.largest_pivot, abs(pivot)))
+        return abs(pivot), self._blocks.orientation(self.elements.entries[self._solved], pivot)
 
     def _factor(self) -> None:
         try:
@@ -255,13 +263,14 @@ class SparseModel:
             if not gap <= LARGEST_CORRECTION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
                 raise FailedError("Newton jumps to another assembly")
             rates, accelerations = self._motion()
-        pivot = self.factors.signed_pivot
-        largest = max(abs(pivot), here.largest_pivot)
-        # where SuperLU exchanges rows its pivots jump tenfold: only their sign is held to, not their change
-        limit = FOLLOWED if abs(pivot) < abs(here.pivot) else TURNED
-        if not pivot * here.pivot > 0.0 or limit * pivot**2 <= WORSE_BY_PIVOTS * largest * max(closure, EPSILON):
-            raise FailedError(f"there is a singular pose ahead, smallest pivot {abs(pivot):.3g}")
-        return Stand(time, here.time, state, taylor, rates, accelerations, iterations, closure, leftover, branch, pivot, largest)
+        pivot, orientation = self._pivots()
+        largest = max(pivot, here.largest_pivot)
+        # where SuperLU exchanges rows its pivots jump tenfold: their change is not held to
+        limit = FOLLOWED if pivot < here.pivot else TURNED
+        if orientation != here.orientation or limit * pivot**2 <= WORSE_BY_PIVOTS * largest * max(closure, EPSILON):
+            raise FailedError(f"there is a singular pose ahead, smallest pivot {pivot:.3g}")
+        tests = closure, leftover, branch, pivot, largest, orientation
+        return Stand(time, here.time, state, taylor, rates, accelerations, iterations, *tests)
 
     def _tested(self, closure: float, tol: float, *, done: bool) -> tuple[float, float, float]:
         """Closure, leftover and branch where all was last evaluated. Raises FailedError."""

@@ -151,7 +151,7 @@ class _Sweep:
             else:
                 self._end(here, path, times, k, "the parts of the step get smaller and smaller")
                 return
-            self.smallest_pivot = min(self.smallest_pivot, abs(here.pivot))
+            self.smallest_pivot = min(self.smallest_pivot, here.pivot)
             yield here
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
@@ -175,11 +175,11 @@ class _Sweep:
 
     def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
         where = path.where
-        self.smallest_pivot = min(self.smallest_pivot, abs(here.pivot))
+        self.smallest_pivot = min(self.smallest_pivot, here.pivot)
         last = f"last reachable sample at {where(float(times[k - 1]))}" if k else "no sample reached on this side"
         self.messages.append(
             f"cannot be followed beyond {where(here.time)} (wanted {where(float(times[k]))}): {reason}; smallest pivot there "
-            f"{abs(here.pivot):.3g} (zero at a lock-up or dead centre); {last}; "
+            f"{here.pivot:.3g} (zero at a lock-up or dead centre); {last}; "
             "shorten the sweep or drive another coordinate"
         )
 
