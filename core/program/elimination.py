@@ -1,15 +1,15 @@
 """Gaussian elimination written into a program: the zeros and ones of the rows are used up before anything is computed.
 
-First the pivots that cost nothing in safety: literal constants of size one half and more (the +-I blocks of the simplified rows)
-and entries that are alone in their row or column (there is no other choice). What is left falls into blocks that can be solved one
-after the other (block-triangular form: a chain of loops costs its number of loops). Each block is a small dense core, eliminated
-with partial pivoting by compare-and-select, so that every lane pivots for itself without a branch. A fixed pivot order without this
-met an exact zero pivot within one crank turn of a four-bar.
+Rows and columns fall into blocks that can be solved one after the other (block-triangular form: a chain of loops costs its number
+of loops), and no pivot ties two of them. First the pivots that cost nothing in safety: literal constants of size one half and more
+(the +-I blocks of the simplified rows) and entries that are alone in their row or column (there is no other choice). What is left
+of each block is a small dense core, eliminated with partial pivoting by compare-and-select, so that every lane pivots for itself
+without a branch. A fixed pivot order without this met an exact zero pivot within one crank turn of a four-bar.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import mul
@@ -104,11 +104,15 @@ class Elimination:
 
     def _eliminate_sparse(self, entries: list[dict[int, Scalar]]) -> list[_Pivot]:
         rows, steps = set(range(self.n)), list[_Pivot]()
+        block_of_row, block_of_column = dict[int, int](), dict[int, int]()
+        for k, (block_rows, block_columns) in enumerate(_blocks(entries, range(self.n), range(self.n))):
+            block_of_row |= dict.fromkeys(block_rows, k)
+            block_of_column |= dict.fromkeys(block_columns, k)
         columns: dict[int, set[int]] = {j: set() for j in range(self.n)}
         for i, row in enumerate(entries):
             for j in row:
                 columns[j].add(i)
-        while (found := _safe_pivot(entries, rows, columns)) is not None:
+        while (found := _safe_pivot(entries, rows, columns, lambda i, j: block_of_row[i] == block_of_column[j])) is not None:
             i, j = found
             if isinstance(entries[i][j], Traced):
                 self.pivots.append(entries[i][j])
@@ -253,15 +257,20 @@ def _matched(columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
     return row_of
 
 
-def _safe_pivot(entries: Sequence[Mapping[int, Scalar]], rows: set[int], columns: Mapping[int, set[int]]) -> tuple[int, int] | None:
-    """The safe pivot that fills in least (Markowitz), or None."""
+def _safe_pivot(
+    entries: Sequence[Mapping[int, Scalar]],
+    rows: set[int],
+    columns: Mapping[int, set[int]],
+    inside: Callable[[int, int], bool],
+) -> tuple[int, int] | None:
+    """The safe pivot inside a block that fills in least (Markowitz), or None."""
     best: tuple[int, int, int] | None = None
     for i in sorted(rows):
         in_row = len(entries[i])
         for j, value in entries[i].items():
             in_column = len(columns[j])
             alone = in_row == 1 or in_column == 1
-            if alone or (not isinstance(value, Traced) and abs(value) >= SAFE_LITERAL):
+            if (alone or (not isinstance(value, Traced) and abs(value) >= SAFE_LITERAL)) and inside(i, j):
                 cost = (in_row - 1) * (in_column - 1)
                 if best is None or cost < best[0]:
                     best = (cost, i, j)
