@@ -20,8 +20,6 @@ from .formulation import Formulation
 # Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
 # sound linkages is near 1e-2. In between lies nearly singular geometry, which is to be solved, not reduced.
 RANK_TOLERANCE = 1e-9
-APART = 0.5
-"""Rows of which this part of the most is left are nearly as independent."""
 SHARE = 1e-6
 """A row takes part in a sum that vanishes with at least this weight, the weights' squares adding up to one: round-off is 1e-15."""
 EULER_PARAMETERS = 7
@@ -85,8 +83,9 @@ def independent_rows(matrix: Array, first: int) -> list[int]:
     Gram-Schmidt with row pivoting and reorthogonalisation; what is left of a row after the ones taken decides.
     """
     left = np.array(matrix)
-    body = np.arange(left.shape[1]) // COLUMNS
-    grounded = np.array([len(np.unique(body[row != 0.0])) == 1 for row in left])
+    # those of one body count twice: what is redundant then does not tie loops to each other by a body that they share
+    weight = np.ones(len(matrix))
+    weight[[k for k, row in enumerate(matrix) if len(set((row.nonzero()[0] // COLUMNS).tolist())) == 1]] = 2.0
     count, size = left.shape
     taken: list[int] = []
     scale = float(np.abs(left).max(initial=0.0)) or 1.0
@@ -95,9 +94,7 @@ def independent_rows(matrix: Array, first: int) -> list[int]:
     while waiting and len(taken) < size:
         norms = np.linalg.norm(left[waiting], axis=1)
         drivers = [k for k, row in enumerate(waiting) if row >= count - first]
-        # those of one body first: then what is redundant does not tie loops to each other by a body that they share
-        preferred = np.where(grounded[waiting] & (norms >= APART * norms.max(initial=0.0)), 1.0 + norms, norms)
-        pick = drivers[0] if drivers else int(preferred.argmax())
+        pick = drivers[0] if drivers else int((weight[waiting] * norms).argmax())
         if norms[pick] <= RANK_TOLERANCE * scale:
             if not drivers:
                 break
