@@ -25,6 +25,7 @@ from kincheck.core.analysis.equations import frames
 from kincheck.core.analysis.factors import Factors
 from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.orientation import Blocks
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.sparse import FailedError, SparseModel
 from kincheck.core.analysis.sparse_sweep import solve_sparse
@@ -36,6 +37,7 @@ from kincheck.core.motions import Path, Ramp, Sine
 from .mechanisms import four_bar, mcpherson, slider_crank
 from .test_cascade import assert_alike
 from .test_chain import chain
+from .test_corners import loop
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -258,3 +260,36 @@ def test_a_singular_pose_is_not_stepped_over():
     assert found.solved.tolist() == [True] * 5 + [False] * 2
     assert "cannot be followed beyond turn = 1.8707" in found.message
     assert "there is a singular pose ahead" in found.message
+
+
+@pytest.mark.parametrize("loops", [1, 2])
+@pytest.mark.parametrize("count", [2, 9, 50])
+@pytest.mark.parametrize("short", [1e-3, 1e-8])
+def test_a_gap_is_the_end_also_of_two_loops_at_once(short, count, loops):
+    """Their determinants change their signs together, and that of the whole keeps it."""
+    turn = np.linspace(0.0, 2.0, count)
+    found = solve_sparse(
+        SparseModel(loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops), compiled=False), turning(*turn)
+    )
+    assert (found.solved == (turn < 1.0 - np.pi + 2.0 * np.arcsin(1.0 - 0.5 * short))).all()
+
+
+def test_orientation_tells_the_sign_of_every_block():
+    """Of blocks solved one after the other, rows and columns mixed: of each that of its determinant, or always the other."""
+    sizes = [1, 2, 5, 1, 2, 3]
+    rng, n = np.random.default_rng(4), sum(sizes)
+    block = np.repeat(np.arange(len(sizes)), sizes)
+    i, j = np.nonzero(block[:, None] >= block)
+    rows, columns = rng.permutation(n), rng.permutation(n)
+    blocks = Blocks(rows[i], columns[j], n)
+    known: list[tuple[float, ...]] = []
+    found: list[bytes] = []
+    for _ in range(64):
+        matrix, mixed = rng.normal(size=(n, n)), np.zeros((n, n))
+        mixed[rows[i], columns[j]] = matrix[i, j]
+        known.append(
+            tuple(float(np.linalg.slogdet(matrix[np.ix_(at, at)])[0]) for at in (np.flatnonzero(block == k) for k in range(6)))
+        )
+        found.append(blocks.orientation(matrix[i, j], float(np.linalg.slogdet(mixed)[0])))
+    # one answer for each combination of signs
+    assert len(set(known)) == len(set(found)) == len(set(zip(known, found, strict=True))) > 20
