@@ -83,9 +83,6 @@ def independent_rows(matrix: Array, first: int) -> list[int]:
     Gram-Schmidt with row pivoting and reorthogonalisation; what is left of a row after the ones taken decides.
     """
     left = np.array(matrix)
-    # those of one body count twice: what is redundant then does not tie loops to each other by a body that they share
-    weight = np.ones(len(matrix))
-    weight[[k for k, row in enumerate(matrix) if len(set((row.nonzero()[0] // COLUMNS).tolist())) == 1]] = 2.0
     count, size = left.shape
     taken: list[int] = []
     scale = float(np.abs(left).max(initial=0.0)) or 1.0
@@ -94,7 +91,7 @@ def independent_rows(matrix: Array, first: int) -> list[int]:
     while waiting and len(taken) < size:
         norms = np.linalg.norm(left[waiting], axis=1)
         drivers = [k for k, row in enumerate(waiting) if row >= count - first]
-        pick = drivers[0] if drivers else int((weight[waiting] * norms).argmax())
+        pick = drivers[0] if drivers else int(norms.argmax())
         if norms[pick] <= RANK_TOLERANCE * scale:
             if not drivers:
                 break
