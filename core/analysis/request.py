@@ -55,6 +55,7 @@ ACCEPT = ("tolerance", "consistent", "crossing")
 """The slots that a lane is accepted by."""
 # Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.
 CONSISTENT = 1e-9
+# More than any difference of orientations, which have `elimination.DIGITS` binary digits.
 CROSSING = 1e18
 
 

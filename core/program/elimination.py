@@ -223,6 +223,7 @@ def _blocks(
     entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]
 ) -> list[tuple[list[int], list[int]]]:
     """Rows and columns of the blocks, in an order in which each needs only those before it."""
+    # by hand: scipy.sparse.csgraph would do, but takes longer to import than all else here together
     row_of = _matched({i: list(entries[i]) for i in rows})
     column_of = {i: j for j, i in row_of.items()}
     place = {i: k for k, i in enumerate(rows)}
