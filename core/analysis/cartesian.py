@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 from ..algebra import ZERO, Quat, Scalar, Vec3, turned_by, vec
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose, Primitive, Row
 from ..program import cos, sin, sqrt
 from .equations import Constraint, Relation
-from .formulation import Acceleration, Configuration, Rows, State
+from .formulation import Acceleration, Condition, Configuration, Rows, State
 
 COLUMNS = 6
 """Unknowns of a moving body: dr and dpi."""
@@ -67,10 +68,28 @@ class Cartesian:
 
     @property
     def owners(self) -> Sequence[tuple[str, str]]:
-        found: list[tuple[str, str]] = []
-        for c in self.constraints:
-            found += [(c.owner, "Relation")] if isinstance(c, Relation) else [(c.owner, type(c.primitive).__name__)] * c.primitive.n
+        return [name for c in self.constraints for name in [_named(c)] * _count(c)]
+
+    @property
+    def conditions(self) -> Sequence[Condition]:
+        far, found, first = self._from_ground, list[Condition](), 0
+        for _, group in groupby(self.constraints, key=_named):
+            members = [*group]
+            rows = range(first, first := first + sum(map(_count, members)))
+            pairs = [c for c in members if isinstance(c, Constraint)]
+            remote = max((far.get(c.i, 0) + far.get(c.j, 0) for c in pairs), default=0)
+            steady = all(c.primitive.steady or not (c.i in self.columns or c.i in self.given) for c in pairs)
+            found.append(Condition(rows, remote, steady))
         return found
+
+    @property
+    def _from_ground(self) -> Mapping[str, int]:
+        """Joints between every body and the ground, or what is given; bodies that no joint leads to are missing."""
+        pairs = [(c.i, c.j) for c in self.constraints if isinstance(c, Constraint)]
+        far = {name: 0 for pair in pairs for name in pair if name not in self.columns}
+        while reached := {b: far[a] + 1 for i, j in pairs for a, b in ((i, j), (j, i)) if a in far and b not in far}:
+            far |= reached
+        return far
 
     @property
     def _body_axes(self) -> bool:
@@ -184,6 +203,15 @@ class Cartesian:
                 values = [value for block in blocks for value in block]
                 entries |= {first + k: x for k, x in enumerate(values) if not _is_zero(x)}
         return entries
+
+
+def _named(c: Constraint | Relation) -> tuple[str, str]:
+    """Joint or driver, and primitive."""
+    return c.owner, "Relation" if isinstance(c, Relation) else type(c.primitive).__name__
+
+
+def _count(c: Constraint | Relation) -> int:
+    return 1 if isinstance(c, Relation) else c.primitive.n
 
 
 def _is_zero(x: Scalar) -> bool:

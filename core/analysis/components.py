@@ -23,8 +23,9 @@ from ..mechanism import GROUND, Body, Mechanism, Point, Vector
 from .cartesian import COLUMNS, Cartesian
 from .equations import Frames, constraints, joint_points
 from .formulation import Formulation
-from .freedom import EULER_PARAMETERS, FreedomAccount, Selection, design_jacobian, independent_rows
+from .freedom import EULER_PARAMETERS, FreedomAccount, Selection, design_jacobian
 from .geometry import places
+from .redundancy import independent_rows
 
 ORIGIN = "origin "
 """Before the name of a body: the point of a section that is its internal origin and nothing else."""
@@ -213,7 +214,7 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
         SolveError: they are too few.
     """
     matrix, drivers = design_jacobian(formulation), len(mechanism.drivers)
-    kept = independent_rows(matrix, drivers)
+    kept = independent_rows(matrix, drivers, formulation.conditions)
     names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
     if len(kept) < formulation.unknowns:
         raise SolveError(

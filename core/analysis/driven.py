@@ -25,7 +25,8 @@ from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
 from .equations import constraints, frames, measured
 from .factors import NARROW
-from .freedom import RANK_TOLERANCE, account, driven_account, mismatch
+from .freedom import account, driven_account, mismatch
+from .redundancy import RANK_TOLERANCE
 
 # Up to as many bodies the dense count takes some 20 ms.
 DENSE = 25

@@ -29,6 +29,20 @@ class Configuration:
 
 
 @dataclass(frozen=True, slots=True)
+class Condition:
+    """Rows that say something together, such as that two axes stay parallel.
+
+    Attributes:
+        remote: joints between its bodies and the ground, those of both bodies summed.
+        steady: the rows do not turn with a body.
+    """
+
+    rows: Sequence[int]
+    remote: int = 0
+    steady: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Acceleration:
     """vdot of a body's origin and wdot, global axes."""
 
@@ -43,6 +57,7 @@ class Formulation(Protocol):
         unknowns: number of unknowns (columns).
         design: the state at the design position.
         owners: for every row the joint or driver, and the primitive, it belongs to.
+        conditions: the rows that say something together, in order.
     """
 
     @property
@@ -51,6 +66,8 @@ class Formulation(Protocol):
     def design(self) -> Mapping[str, Sequence[float]]: ...
     @property
     def owners(self) -> Sequence[tuple[str, str]]: ...
+    @property
+    def conditions(self) -> Sequence[Condition]: ...
 
     def configuration(self, state: State) -> Configuration:
         """The poses that a state means."""

@@ -16,12 +16,8 @@ from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
 from .equations import Frames, constraints
 from .formulation import Formulation
+from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independent_rows
 
-# Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the smallest independent remainder in
-# sound linkages is near 1e-2. In between lies nearly singular geometry, which is to be solved, not reduced.
-RANK_TOLERANCE = 1e-9
-SHARE = 1e-6
-"""A row takes part in a sum that vanishes with at least this weight, the weights' squares adding up to one: round-off is 1e-15."""
 EULER_PARAMETERS = 7
 """Coordinates of a body in the paper's count: r and p."""
 
@@ -77,41 +73,11 @@ def design_jacobian(formulation: Formulation) -> Array:
     return matrix
 
 
-def independent_rows(matrix: Array, first: int) -> list[int]:
-    """Indices of a largest independent set of rows, the given number of last rows taken first.
-
-    Gram-Schmidt with row pivoting and reorthogonalisation; what is left of a row after the ones taken decides.
-    """
-    left = np.array(matrix)
-    count, size = left.shape
-    taken: list[int] = []
-    scale = float(np.abs(left).max(initial=0.0)) or 1.0
-    basis = np.zeros((0, size))
-    waiting = list(range(count))
-    while waiting and len(taken) < size:
-        norms = np.linalg.norm(left[waiting], axis=1)
-        drivers = [k for k, row in enumerate(waiting) if row >= count - first]
-        pick = drivers[0] if drivers else int(norms.argmax())
-        if norms[pick] <= RANK_TOLERANCE * scale:
-            if not drivers:
-                break
-            waiting.pop(pick)
-            continue
-        row = waiting.pop(pick)
-        taken.append(row)
-        q = left[row] / norms[pick]
-        q -= basis.T @ (basis @ q)
-        basis = np.vstack([basis, q / np.linalg.norm(q)])
-        for _ in range(2):
-            left[waiting] -= np.outer(left[waiting] @ basis[-1], basis[-1])
-    return sorted(taken)
-
-
 def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     """Count and measure the degrees of freedom at the design pose."""
     formulation, matrix = _matrix(mechanism, frame)
     joint_rows = len(matrix) - len(mechanism.drivers)
-    kept = set(independent_rows(matrix[:joint_rows], 0))
+    kept = set(independent_joint_rows(formulation, matrix[:joint_rows]))
     fixed = len(mechanism.bodies) - len(mechanism.moving)
     names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners[:joint_rows]]
     return FreedomAccount(
@@ -147,7 +113,7 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -
     """
     found, drivers = driven_account(mechanism, frame), len(mechanism.drivers)
     matrix = design_jacobian(formulation)
-    kept = independent_rows(matrix, drivers)
+    kept = independent_rows(matrix, drivers, formulation.conditions)
     if len(kept) < formulation.unknowns:
         raise SolveError(_locked(mechanism, formulation, matrix))
     dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))

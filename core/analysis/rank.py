@@ -18,8 +18,9 @@ from ..mechanism import Mechanism
 from ..trajectory import Array
 from .cartesian import COLUMNS, Cartesian
 from .equations import Constraint, Style, constraints, frames
-from .freedom import RANK_TOLERANCE, FreedomAccount, account, independent_rows
+from .freedom import FreedomAccount, account
 from .poses import jacobian
+from .redundancy import RANK_TOLERANCE, independent_joint_rows, independent_rows
 from .request import CONSISTENT
 from .screws import Screw, free_motions, screws
 
@@ -131,7 +132,7 @@ class Ranks:
     def dependencies(self) -> list[Dependency]:
         """The joint rows that are redundant, each in terms of rows that are kept."""
         joints = self.matrix[: self.joint_rows]
-        kept = independent_rows(joints, 0)
+        kept = independent_joint_rows(self.formulation, joints)
         found: list[Dependency] = []
         for k in sorted(set(range(self.joint_rows)) - set(kept)):
             weights: Array = joints[k] @ np.linalg.pinv(joints[kept])

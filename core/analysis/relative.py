@@ -14,7 +14,7 @@ sparse.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ..algebra import Scalar, Vec3, cross
@@ -23,7 +23,7 @@ from ..primitives.base import Motion
 from . import tree
 from .cartesian import COLUMNS, Cartesian
 from .equations import Constraint, Frames, Relation
-from .formulation import Acceleration, Configuration, Rows, State
+from .formulation import Acceleration, Condition, Configuration, Rows, State
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +78,11 @@ class Relative:
     @property
     def owners(self) -> Sequence[tuple[str, str]]:
         return self.closed.owners
+
+    @property
+    def conditions(self) -> Sequence[Condition]:
+        # rows of joints that other loops hang on are none of these
+        return [replace(each, remote=0) for each in self.closed.conditions]
 
     def configuration(self, state: State) -> Configuration:
         found = tree.posed(self.chains, state)

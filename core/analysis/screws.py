@@ -67,7 +67,7 @@ def free_motions(matrix: Array) -> Array:
     The orthonormal basis mixes motions that have nothing to do with each other; reduced to echelon form, each has a column of its
     own, and a rod that spins is seen to spin alone.
     """
-    from .freedom import RANK_TOLERANCE
+    from .redundancy import RANK_TOLERANCE
 
     values, basis = np.linalg.svd(matrix, full_matrices=True)[1:]
     rank = int((values > RANK_TOLERANCE * max(1.0, values.max(initial=0.0))).sum())

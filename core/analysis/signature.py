@@ -19,8 +19,8 @@ from ..mechanism import Mechanism
 from ..primitives.base import GROUND_POSE, Pose
 from .cartesian import Cartesian
 from .equations import Frames, constraints, joint_points
-from .freedom import independent_rows
 from .poses import jacobian, state_of
+from .redundancy import independent_rows
 
 # A normalised triple product below this at design (half a degree) has no sign that rounding of a table would not change.
 FLAT = 1e-2
@@ -79,7 +79,7 @@ class Branches:
         """The branches of a mechanism whose drivers have these values, from design."""
         formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
         matrix = jacobian(formulation, formulation.configuration(formulation.design))
-        kept = independent_rows(matrix, len(mechanism.drivers))
+        kept = independent_rows(matrix, len(mechanism.drivers), formulation.conditions)
         triples = {joint.name: triple for joint in mechanism.joints if (triple := _triple(mechanism, frame, joint)) is not None}
         return Branches(mechanism, frame, formulation, values, kept, _orientation(matrix[kept]), triples)
 

@@ -24,10 +24,10 @@ from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEG
 from .elements import Elements, Indices
 from .equations import constraints, measured
 from .factors import Factors, SingularError
-from .freedom import RANK_TOLERANCE
 from .model import CLOSED, MAX_ITERATIONS
 from .orientation import Blocks
 from .programs import ABOUT
+from .redundancy import RANK_TOLERANCE
 from .request import CONSISTENT
 from .sparse_rows import Jacobian
 

@@ -99,6 +99,8 @@ class Primitive(ABC):
 
     n: ClassVar[int]
     """Number of equations."""
+    steady: ClassVar[bool] = False
+    """Whether the rows keep their directions as body i turns."""
     body_axes: ClassVar[bool] = False
     """Whether dpi, w and wdot of rows, gamma and motions are in body axes (the paper's) rather than global ones."""
 

@@ -26,6 +26,7 @@ class Dot12(Primitive):
     """No geometry: both bodies turn alike from design on."""
 
     n = 3
+    steady = True
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return tuple(2.0 * (i.q * j.q.conjugate()).e)

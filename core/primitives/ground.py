@@ -19,6 +19,7 @@ class Ground(Primitive):
     """No geometry; body i is the ground."""
 
     n = 6
+    steady = True
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return *j.u, *(2.0 * j.q.e)

@@ -20,6 +20,7 @@ class Spherical(Primitive):
     """s_i, s_j: arms from the body origins to P_i and P_j [m]; d0: from P_i to P_j at design."""
 
     n = 3
+    steady = True
     s_i: Vec3
     s_j: Vec3
     d0: Vec3 = ZERO
