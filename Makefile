@@ -19,13 +19,15 @@ test: .venv/ready
 .venv/ready: pyproject.toml requirements.lock
 ifdef UV
 	uv venv --quiet --allow-existing --python $(PYTHON) .venv
-	uv pip install --quiet --python $(BIN)/python --requirement requirements.lock
+	uv pip install --quiet --compile-bytecode --python $(BIN)/python --requirement requirements.lock
 	uv pip install --quiet --python $(BIN)/python --no-deps --editable .
 else
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --no-deps --editable .
 endif
+	# what is installed as editable is not compiled, and where Python may not write bytecode every process would do it again
+	$(BIN)/python -m compileall -q core adapters cases
 	touch $@
 
 # Pin the newest versions that pyproject.toml allows.

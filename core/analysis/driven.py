@@ -56,6 +56,11 @@ def degrees_of_freedom(mechanism: Mechanism) -> int:
     return account(mechanism, frames(mechanism)).dof if len(mechanism.moving) <= DENSE else _balance(mechanism).dof
 
 
+def locked_drivers(mechanism: Mechanism) -> str:
+    """Drivers that do not move it at the design position, as other rows prescribe the same; empty if there are none. Of any size."""
+    return _balance(mechanism).dependent
+
+
 @dataclass(frozen=True, eq=False)
 class _Balance:
     """What the drivers of a mechanism leave over and ask too much.
@@ -76,12 +81,16 @@ class _Balance:
         return len(self.mechanism.drivers) + self.free.shape[1] - self.excess.shape[1]
 
     @property
+    def dependent(self) -> str:
+        """The drivers that contradict other rows."""
+        return _largest(np.linalg.norm(self.excess, axis=1), [driver.name for driver in self.mechanism.drivers])
+
+    @property
     def remedy(self) -> str:
         """What is free and to be driven, or which drivers are too many."""
-        drivers = [driver.name for driver in self.mechanism.drivers]
-        if self.dof < len(drivers):
-            among = _largest(np.linalg.norm(self.excess, axis=1), drivers)
-            return f"not independent are {among}; remove {len(drivers) - self.dof} or free the mechanism"
+        if self.dof < len(self.mechanism.drivers):
+            many = len(self.mechanism.drivers) - self.dof
+            return f"not independent are {self.dependent}; remove {many} or free the mechanism"
         bodies = self.formulation.bodies
         blocks = self.free[: COLUMNS * len(bodies)].reshape(len(bodies), -1)
         free = _largest(np.linalg.norm(blocks, axis=1), bodies) or "a joint coordinate"

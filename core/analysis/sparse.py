@@ -21,6 +21,7 @@ from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
+from .driven import locked_drivers
 from .elements import Elements, Indices
 from .equations import constraints, measured
 from .factors import Factors, SingularError
@@ -128,7 +129,9 @@ class SparseModel:
         except SingularError:
             pivot = 0.0
         if not pivot > RANK_TOLERANCE:
-            self._refuse("a driver does not move it at the design position (lock-up or dead centre), or it has too few", jacobian)
+            locked = locked_drivers(self.mechanism)
+            how = f"driven by {locked} it does not move at the design position (lock-up or dead centre)"
+            self._refuse(how if locked else "it has too few drivers", jacobian)
 
     @property
     def redundant(self) -> list[str]:
