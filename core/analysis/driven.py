@@ -57,7 +57,7 @@ def degrees_of_freedom(mechanism: Mechanism) -> int:
 
 
 def locked_drivers(mechanism: Mechanism) -> str:
-    """Drivers that do not move it at the design position, as other rows prescribe the same; empty if there are none. Of any size."""
+    """Drivers that do not move it at design, as other rows prescribe the same; empty if there are none. Of any size."""
     return _balance(mechanism).dependent
 
 
