@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import SolveError
 from ..mechanism import Mechanism, Vector
 from ..motions import Path
-from ..program import MARGIN
+from ..program import MARGIN, Plan
 from ..trajectory import Array
 from .components import Component, Section, components, section
 from .equations import frames
@@ -129,7 +130,7 @@ class Cascade:
 
 
 class Lanes:
-    """A cascade bound to lanes: the world, and a call for every component in order.
+    """A cascade bound to lanes: the world, and calls for its components in order, one for those alike that follow each other.
 
     Attributes:
         world: all that is solved, shape (rows, room); see `Cascade`.
@@ -138,19 +139,22 @@ class Lanes:
     def __init__(self, cascade: Cascade, lanes: int) -> None:
         self.cascade, self.lanes = cascade, lanes
         executors = {id(kind): kind.model.executor(lanes) for kind in cascade.kinds}
-        room = max(each.room for each in executors.values())
+        room, self._groups = max(each.room for each in executors.values()), next(iter(executors.values())).groups
         self.world = np.zeros((cascade.rows, room))
         self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
         self._samples = [np.zeros((len(kind.model.sampled), room)) for kind in cascade.kinds]
+        self._carried = [_carried(kind.model.plan) for kind in cascade.kinds]
+        self._calls: list[Callable[[int], object]] = []
+        self._known: list[NDArray[np.int64]] = []  # calls know addresses, not arrays
         number = {id(kind): k for k, kind in enumerate(cascade.kinds)}
-        self._taken: list[NDArray[np.int64]] = []  # calls know addresses, not arrays: these must live as long
-        self._calls: list[Callable[[], object]] = []
-        for index, part in enumerate(cascade.parts):
-            kind, member = cascade.place[index]
-            k, base = number[id(kind)], kind.base + member * kind.model.kept
-            self._taken.append(np.array([row for body in part.given for row in cascade.body_rows(body)], dtype=np.int64))
-            call = executors[id(kind)].part(self._fixed[k][member], self._samples[k], self._taken[-1], self.world, base)
-            self._calls.append(call)
+        for k, run in groupby(range(len(cascade.parts)), key=lambda part: number[id(cascade.place[part][0])]):
+            kind, parts = cascade.kinds[k], [*run]
+            members = np.array([cascade.place[part][1] for part in parts], dtype=np.int64)
+            rows = [[row for body in cascade.parts[part].given for row in cascade.body_rows(body)] for part in parts]
+            taken = np.array(rows, dtype=np.int64).reshape(len(parts), -1)
+            self._known += [members, taken]
+            tables = members, self._fixed[k], self._samples[k], taken, self.world, kind.base
+            self._calls.append(executors[id(kind)].parts(*tables))
 
     def accept_by(self, tolerances: Mapping[str, float]) -> None:
         """Set the tolerances."""
@@ -176,8 +180,9 @@ class Lanes:
             drive = path.drive(names, times) if names else np.zeros((3, 0, count))
             samples[:, :count] = kind.model.samples(times, drive)
             samples[:, count:] = samples[:, count - 1 : count]
+        groups = self._groups(count)
         for call in self._calls:
-            call()
+            call(groups)
         return self.each(MARGIN)[:, :count].min(axis=0)
 
     def each(self, name: str) -> Array:
@@ -219,10 +224,21 @@ class Lanes:
 
     def carry(self, lane: int) -> None:
         """Predict from a solved lane from now on."""
-        for kind, fixed, samples in zip(self.cascade.kinds, self._fixed, self._samples, strict=True):
-            size, plan, before = kind.model.kept, kind.model.plan, fixed.copy()
-            solved = self.world[kind.base : kind.base + size * len(kind.members), lane].reshape(len(kind.members), size)
-            tables = [(list(plan.kept), solved), (list(plan.sampled), samples[None, :, lane]), (list(plan.fixed), before)]
-            for source, target in plan.carried:
-                slots, values = next(each for each in tables if source in each[0])
-                fixed[:, tables[-1][0].index(target)] = values[:, slots.index(source)]
+        for kind, fixed, samples, carried in zip(self.cascade.kinds, self._fixed, self._samples, self._carried, strict=True):
+            size, count = kind.model.kept, len(kind.members)
+            solved = self.world[kind.base : kind.base + size * count, lane].reshape(count, size)
+            tables = solved, samples[None, :, lane], fixed
+            values = [table[:, sources] for table, (sources, _) in zip(tables, carried, strict=True)]
+            for (_, targets), each in zip(carried, values, strict=True):
+                fixed[:, targets] = each
+
+
+def _carried(plan: Plan) -> list[tuple[list[int], list[int]]]:
+    """Columns of what is kept, sampled and fixed that are carried, and the columns of what is fixed that they are carried to."""
+    column = [{slot: k for k, slot in enumerate(slots)} for slots in (plan.kept, plan.sampled, plan.fixed)]
+    found: list[tuple[list[int], list[int]]] = [([], []) for _ in column]
+    for source, target in plan.carried:
+        k = next(k for k, each in enumerate(column) if source in each)
+        found[k][0].append(column[k][source])
+        found[k][1].append(column[-1][target])
+    return found

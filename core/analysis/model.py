@@ -76,7 +76,7 @@ class Model:
             kept=[*kept, *(self.slots[name] for name in self._tests)],
             fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
             taken=[slot for name in self.given for slot in self.vectors[name]],
-            loops=("part",) if self.request.state else ("follow", "fan") if self.request.varied else ("follow",),
+            loops=("parts",) if self.request.state else ("follow", "fan") if self.request.varied else ("follow",),
             tolerance=self.request.last_iteration,
             most=MAX_ITERATIONS,
         )

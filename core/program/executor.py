@@ -38,7 +38,7 @@ class Plan:
         kept: slots that are stored of every sample.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
         taken: slots that a part takes from what was solved before it.
-        loops: methods of the executor that are used besides `run` and `attempt`: "follow", "fan" or "part".
+        loops: methods of the executor that are used besides `run` and `attempt`: "follow", "fan" or "parts".
         tolerance: of the residual before an iteration; that iteration is the last.
         most: iterations at most.
     """
@@ -134,13 +134,28 @@ class Executor(Protocol):
         """
         ...
 
-    def part(self, fixed: Array, samples: Array, taken: NDArray[np.int64], world: Array, base: int) -> Callable[[], object]:
-        """A call that attempts one part of a large mechanism: all lanes alone, by what stands in these arrays when it is called.
+    def groups(self, lanes: int) -> int:
+        """How many groups of vectors hold so many lanes."""
+        ...
+
+    def parts(
+        self,
+        members: NDArray[np.int64],
+        fixed: Array,
+        samples: Array,
+        taken: NDArray[np.int64],
+        world: Array,
+        base: int,
+    ) -> Callable[[int], object]:
+        """A call that attempts parts of a large mechanism, one after the other, by what stands in these arrays when it is called.
+
+        What is called is told in how many groups; each lane is attempted alone. The arrays must be contiguous, and live as long.
 
         Args:
-            fixed: values of `Plan.fixed`, shape (fixed,).
+            members: which rows of `fixed` they are, in order.
+            fixed: values of `Plan.fixed`, shape (all members, fixed).
             samples: values of `Plan.sampled`, shape (sampled, room).
-            taken: rows of the world that `Plan.taken` come from.
-            world: all that has been solved, shape (rows, room); takes `Plan.kept` from the row `base` on.
+            taken: rows of the world that `Plan.taken` come from, shape (parts, taken).
+            world: all that has been solved, shape (rows, room); takes `Plan.kept` of a member from row `base + member * kept` on.
         """
         ...

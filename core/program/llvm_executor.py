@@ -19,7 +19,7 @@ LINE = 8
 LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], str]] = {
     "follow": (llvm_loops.follow, "pppiiipiii"),
     "fan": (llvm_loops.fan, "pipiipiiii"),
-    "part": (llvm_loops.part, "pippippi"),
+    "parts": (llvm_loops.parts, "pipppippii"),
 }
 """Loop -> what writes it, and the kinds of its arguments (see `compiled.load`)."""
 
@@ -54,8 +54,8 @@ class LlvmExecutor:
     """
 
     def __init__(self, code: LlvmCode, lanes: int) -> None:
-        self.lanes, self.margin = lanes, code.width
-        self._code, self._groups = code, -(-lanes // code.width)
+        self.lanes, self.margin, self._code = lanes, code.width, code
+        self._groups = self.groups(lanes)
         self._memory = _aligned(self._groups * code.slots, code.width).reshape(self._groups, code.slots, code.width)
         self.anchor: Array = np.zeros(code.slots)
         self.clear()
@@ -108,10 +108,22 @@ class LlvmExecutor:
         given = self._address, self._groups, samples.ctypes.data, stride, wanted
         self._code.functions["fan"](*given, out.ctypes.data, *out.shape[1:], first, step)
 
-    def part(self, fixed: Array, samples: Array, taken: NDArray[np.int64], world: Array, base: int) -> Callable[[], object]:
+    def groups(self, lanes: int) -> int:
         """See `Executor`."""
-        given = fixed.ctypes.data, samples.ctypes.data, samples.shape[1], taken.ctypes.data, world.ctypes.data, base
-        return partial(self._code.functions["part"], self._address, self._groups, *given)
+        return -(-lanes // self._code.width)
+
+    def parts(
+        self,
+        members: NDArray[np.int64],
+        fixed: Array,
+        samples: Array,
+        taken: NDArray[np.int64],
+        world: Array,
+        base: int,
+    ) -> Callable[[int], object]:
+        """See `Executor`."""
+        tables = members.ctypes.data, fixed.ctypes.data, samples.ctypes.data, samples.shape[1], taken.ctypes.data, world.ctypes.data
+        return partial(self._code.functions["parts"], self._address, len(members), *tables, base)
 
 
 def _aligned(rows: int, columns: int) -> Array:

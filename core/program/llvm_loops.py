@@ -253,27 +253,38 @@ end:
 """
 
 
-def part(plan: Plan, width: int) -> str:
-    """See `Executor.part`."""
+def parts(plan: Plan, width: int) -> str:
+    """See `Executor.parts`."""
     vector, begin, keep = f"<{width} x double>", Lines(width, "b"), Lines(width, "k")
     for k, slot in enumerate(plan.fixed):
-        begin.write(slot, begin.spread(begin.let(f"load double, ptr {begin.number('%fixed', k)}, align 8")))
+        begin.write(slot, begin.spread(begin.let(f"load double, ptr {begin.number('%own', k)}, align 8")))
     for row, slot in enumerate(plan.sampled):
         place = begin.number("%samples", begin.sum(begin.product("%room", row), "%first"))
         begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
     for k, slot in enumerate(plan.taken):
-        row = begin.let(f"load i64, ptr {begin.let(f'getelementptr i64, ptr %taken, i64 {k}')}, align 8")
+        row = begin.let(f"load i64, ptr {begin.let(f'getelementptr i64, ptr %sources, i64 {k}')}, align 8")
         place = begin.number("%world", begin.sum(begin.product("%room", row), "%first"))
         begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
     for row, slot in enumerate(plan.kept):
-        place = keep.number("%world", keep.sum(keep.product("%room", keep.sum("%base", row)), "%first"))
+        place = keep.number("%world", keep.sum(keep.product("%room", keep.sum("%row", row)), "%first"))
         keep.lines.append(f"store {vector} {keep.read(slot)}, ptr {place}, align 8")
-    inputs = "ptr %memory, i64 %groups, ptr %fixed, ptr %samples, i64 %room"
-    return f"""define void @part({inputs}, ptr %taken, ptr %world, i64 %base) {{
+    tables = "ptr %members, ptr %fixed, ptr %samples, i64 %room, ptr %taken, ptr %world"
+    return f"""define void @parts(ptr %memory, i64 %count, {tables}, i64 %base, i64 %groups) {{
 entry:
+  br label %part
+part:
+  %k = phi i64 [0, %entry], [%next_part, %end_part]
+  %place = getelementptr i64, ptr %members, i64 %k
+  %member = load i64, ptr %place, align 8
+  %own_at = mul i64 %member, {len(plan.fixed)}
+  %own = getelementptr double, ptr %fixed, i64 %own_at
+  %sources_at = mul i64 %k, {len(plan.taken)}
+  %sources = getelementptr i64, ptr %taken, i64 %sources_at
+  %rows_before = mul i64 %member, {len(plan.kept)}
+  %row = add i64 %base, %rows_before
   br label %group
 group:
-  %g = phi i64 [0, %entry], [%next, %group]
+  %g = phi i64 [0, %part], [%next, %group]
   %offset = mul i64 %g, {len(plan.slots) * width}
   %lane = getelementptr double, ptr %memory, i64 %offset
   %first = mul i64 %g, {width}
@@ -284,7 +295,11 @@ group:
   {keep.text}
   %next = add i64 %g, 1
   %more = icmp slt i64 %next, %groups
-  br i1 %more, label %group, label %end
+  br i1 %more, label %group, label %end_part
+end_part:
+  %next_part = add i64 %k, 1
+  %more_parts = icmp slt i64 %next_part, %count
+  br i1 %more_parts, label %part, label %end
 end:
   ret void
 }}

@@ -157,16 +157,30 @@ class NumpyExecutor:
                 self.run(name)
             block[target] = block[source]
 
-    def part(self, fixed: Array, samples: Array, taken: NDArray[np.int64], world: Array, base: int) -> Callable[[], object]:
+    def groups(self, lanes: int) -> int:
+        """See `Executor`: its programs are bound to all lanes."""
+        return 1
+
+    def parts(
+        self,
+        members: NDArray[np.int64],
+        fixed: Array,
+        samples: Array,
+        taken: NDArray[np.int64],
+        world: Array,
+        base: int,
+    ) -> Callable[[int], object]:
         """See `Executor`."""
         plan, block = self._plan, self._block
 
-        def call() -> None:
-            block[list(plan.fixed)] = fixed[:, None]
-            block[list(plan.sampled)] = samples
-            block[list(plan.taken)] = world[taken]
-            self.attempt()
-            world[base : base + len(plan.kept)] = block[list(plan.kept)]
+        def call(groups: int) -> None:
+            for member, sources in zip(members.tolist(), taken, strict=True):
+                block[list(plan.fixed)] = fixed[member, :, None]
+                block[list(plan.sampled)] = samples
+                block[list(plan.taken)] = world[sources]
+                self.attempt()
+                row = base + member * len(plan.kept)
+                world[row : row + len(plan.kept)] = block[list(plan.kept)]
 
         return call
 
