@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SolveError
 from ..mechanism import Mechanism, Vector
 from ..motions import Path
-from ..program import MARGIN, Plan
+from ..program import MARGIN, Parts, Plan
 from ..trajectory import Array
 from .components import Component, Section, components, section
 from .equations import frames
@@ -145,16 +144,15 @@ class Lanes:
         self._samples = [np.zeros((len(kind.model.sampled), room)) for kind in cascade.kinds]
         self._carried = [_carried(kind.model.plan) for kind in cascade.kinds]
         self._calls: list[Callable[[int], object]] = []
-        self._known: list[NDArray[np.int64]] = []  # calls know addresses, not arrays
+        self._parts: list[Parts] = []  # calls know addresses, not arrays
         number = {id(kind): k for k, kind in enumerate(cascade.kinds)}
         for k, run in groupby(range(len(cascade.parts)), key=lambda part: number[id(cascade.place[part][0])]):
             kind, parts = cascade.kinds[k], [*run]
             members = np.array([cascade.place[part][1] for part in parts], dtype=np.int64)
             rows = [[row for body in cascade.parts[part].given for row in cascade.body_rows(body)] for part in parts]
             taken = np.array(rows, dtype=np.int64).reshape(len(parts), -1)
-            self._known += [members, taken]
-            tables = members, self._fixed[k], self._samples[k], taken, self.world, kind.base
-            self._calls.append(executors[id(kind)].parts(*tables))
+            self._parts.append(Parts(members, self._fixed[k], self._samples[k], taken, self.world, kind.base))
+            self._calls.append(executors[id(kind)].parts(self._parts[-1]))
 
     def accept_by(self, tolerances: Mapping[str, float]) -> None:
         """Set the tolerances."""

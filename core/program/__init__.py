@@ -1,7 +1,7 @@
 """Programs: equations traced to lists of operations, and what runs them."""
 
 from .elimination import Elimination
-from .executor import DONE, ITERATIONS, MARGIN, Executor, Plan
+from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan
 from .llvm_executor import LlvmCode, LlvmExecutor
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
@@ -17,6 +17,7 @@ __all__ = [
     "LlvmCode",
     "LlvmExecutor",
     "NumpyExecutor",
+    "Parts",
     "Plan",
     "Prepared",
     "Program",

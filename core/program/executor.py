@@ -61,6 +61,26 @@ class Plan:
         return "extrapolate" in self.programs and lanes >= NODES
 
 
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Parts of a large mechanism that share a plan. All arrays are contiguous, and live as long as what is called with them.
+
+    Attributes:
+        members: which rows of `fixed` they are, in order.
+        fixed: values of `Plan.fixed`, shape (all members, fixed).
+        samples: values of `Plan.sampled`, shape (sampled, room).
+        taken: rows of the world that `Plan.taken` come from, shape (parts, taken).
+        world: all that has been solved, shape (rows, room); takes `Plan.kept` of a member from row `base + member * kept` on.
+    """
+
+    members: NDArray[np.int64]
+    fixed: Array
+    samples: Array
+    taken: NDArray[np.int64]
+    world: Array
+    base: int
+
+
 class Executor(Protocol):
     """A plan bound to a number of lanes. Lanes that divide by zero hold inf or nan afterwards; nothing is raised."""
 
@@ -138,24 +158,9 @@ class Executor(Protocol):
         """How many groups of vectors hold so many lanes."""
         ...
 
-    def parts(
-        self,
-        members: NDArray[np.int64],
-        fixed: Array,
-        samples: Array,
-        taken: NDArray[np.int64],
-        world: Array,
-        base: int,
-    ) -> Callable[[int], object]:
-        """A call that attempts parts of a large mechanism, one after the other, by what stands in these arrays when it is called.
+    def parts(self, parts: Parts) -> Callable[[int], object]:
+        """A call that attempts parts of a large mechanism, one after the other, by what stands in their arrays when it is called.
 
-        What is called is told in how many groups; each lane is attempted alone. The arrays must be contiguous, and live as long.
-
-        Args:
-            members: which rows of `fixed` they are, in order.
-            fixed: values of `Plan.fixed`, shape (all members, fixed).
-            samples: values of `Plan.sampled`, shape (sampled, room).
-            taken: rows of the world that `Plan.taken` come from, shape (parts, taken).
-            world: all that has been solved, shape (rows, room); takes `Plan.kept` of a member from row `base + member * kept` on.
+        What is called is told in how many groups; each lane is attempted alone.
         """
         ...

@@ -8,11 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..trajectory import Array
 from . import compiled, llvm_code, llvm_loops
-from .executor import Plan
+from .executor import Parts, Plan
 
 LINE = 8
 """Numbers in a cache line."""
@@ -112,18 +111,11 @@ class LlvmExecutor:
         """See `Executor`."""
         return -(-lanes // self._code.width)
 
-    def parts(
-        self,
-        members: NDArray[np.int64],
-        fixed: Array,
-        samples: Array,
-        taken: NDArray[np.int64],
-        world: Array,
-        base: int,
-    ) -> Callable[[int], object]:
+    def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
-        tables = members.ctypes.data, fixed.ctypes.data, samples.ctypes.data, samples.shape[1], taken.ctypes.data, world.ctypes.data
-        return partial(self._code.functions["parts"], self._address, len(members), *tables, base)
+        samples, addresses = parts.samples, [each.ctypes.data for each in (parts.taken, parts.world)]
+        tables = parts.members.ctypes.data, parts.fixed.ctypes.data, samples.ctypes.data, samples.shape[1], *addresses
+        return partial(self._code.functions["parts"], self._address, len(parts.members), *tables, parts.base)
 
 
 def _aligned(rows: int, columns: int) -> Array:

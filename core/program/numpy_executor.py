@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..trajectory import Array
-from .executor import DONE, ITERATIONS, MARGIN, Plan
+from .executor import DONE, ITERATIONS, MARGIN, Parts, Plan
 from .straight_line import Program
 from .trace import LEAVES, operands, place_of
 
@@ -161,26 +160,18 @@ class NumpyExecutor:
         """See `Executor`: its programs are bound to all lanes."""
         return 1
 
-    def parts(
-        self,
-        members: NDArray[np.int64],
-        fixed: Array,
-        samples: Array,
-        taken: NDArray[np.int64],
-        world: Array,
-        base: int,
-    ) -> Callable[[int], object]:
+    def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
         plan, block = self._plan, self._block
 
         def call(groups: int) -> None:
-            for member, sources in zip(members.tolist(), taken, strict=True):
-                block[list(plan.fixed)] = fixed[member, :, None]
-                block[list(plan.sampled)] = samples
-                block[list(plan.taken)] = world[sources]
+            for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
+                block[list(plan.fixed)] = parts.fixed[member, :, None]
+                block[list(plan.sampled)] = parts.samples
+                block[list(plan.taken)] = parts.world[sources]
                 self.attempt()
-                row = base + member * len(plan.kept)
-                world[row : row + len(plan.kept)] = block[list(plan.kept)]
+                row = parts.base + member * len(plan.kept)
+                parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
 
         return call
 
