@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import cases
 from kincheck.core import PointCoordinate
 from kincheck.core.analysis.solve import solve
+from kincheck.core.joints import AxialJoint, Joint
 
 from .mechanisms import mcpherson, placed, slider_crank, swapped, without_fixed_bodies
 
@@ -55,6 +57,27 @@ def test_order_of_bodies_and_joints_does_not_matter(seed):
     rng, m = np.random.default_rng(seed), mcpherson()
     bodies, joints = ([m.bodies[k] for k in rng.permutation(5)], [m.joints[k] for k in rng.permutation(5)])
     assert_same(wheel(replace(m, bodies=bodies, joints=joints)), wheel(), acceleration=5e-14)
+
+
+@pytest.mark.parametrize("name", ["andrews_squeezer", "bricard", "four_bar", "mcpherson_strut", "planar_slider_crank", "rssr"])
+def test_joints_twice_are_the_same_joints(name):
+    """Some again, hinges and slides elsewhere on their axes, all in another order: which rows are left out does not matter."""
+    case, rng = cases.load(name), np.random.default_rng(0)
+    m, found = case.mechanism, list[Joint](case.mechanism.joints)
+    for k in rng.permutation(len(found))[:3]:
+        joint = m.joints[k].changed(name=f"{m.joints[k].name} again")
+        if isinstance(joint, AxialJoint):
+            along = rng.uniform(-0.2, 0.2) * np.array(joint.axis) / np.linalg.norm(joint.axis)
+            joint = joint.changed(point=tuple(np.add(joint.point, along).tolist()))
+        found.append(joint.reversed() if joint.symmetric and rng.random() < 0.5 else joint)
+    doubled = replace(m, joints=[found[k] for k in rng.permutation(len(found))])
+    once, twice = (solve(each, case.sweep.driver, case.sweep.change[::9], points=case.points) for each in (m, doubled))
+    assert twice.solved.all()
+    for point in case.points:
+        # some round-offs of numbers near one, amplified by conditions of up to 40
+        assert np.abs(twice.points[point].position - once.points[point].position).max() <= 5e-15
+        scale = 1.0 + np.abs(once.points[point].acceleration).max()
+        assert np.abs(twice.points[point].acceleration - once.points[point].acceleration).max() <= 5e-14 * scale
 
 
 def test_fixed_bodies_or_ground():
