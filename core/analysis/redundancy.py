@@ -15,7 +15,7 @@ from .formulation import Condition, Formulation
 RANK_TOLERANCE = 1e-9
 SHARE = 1e-6
 """A row takes part in a sum that vanishes with at least this weight, the weights' squares adding up to one: round-off is 1e-15."""
-# Between a tenth and a half it makes no difference to four-bars, alone or two on a crank; above, hinges on the ground are split.
+# Anything from 0.1 to 0.3 leaves out the same rows of 113 pairs of four-bars; 0.5 takes one of the ground's hinges apart, 1 most.
 LARGE = 0.3
 """Rows with this part of the largest weight can be left out as well as those that have it."""
 # Work and memory grow with the square of what is looked at together. Mechanisms have less, senseless files have thousands.
