@@ -21,6 +21,9 @@ TIME = "time"
 MARKER = "~"
 """Begins the names of points that the reading of a case adds to a body, to see how it turns; they are no hardpoints."""
 
+PER_TRAVEL = ".per_travel"
+"""Ends the names of derivatives by wheel travel, which the reading of a case adds to its outputs."""
+
 
 class Truth(StrEnum):
     """Where the reference of a case comes from. Only the first two validate anything."""

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ..trajectory import Array
-from . import compiled, llvm_code, llvm_loops
+from . import compiled, llvm_code, llvm_loops, llvm_tables
 from .executor import Parts, Plan
 
 LINE = 8
@@ -32,7 +32,7 @@ class LlvmCode:
         if plan.after:
             signatures["attempt"] = "pi"
         # what determines the text; writing that takes longer than loading the code it means
-        content = [plan, self.width, *(inspect.getsource(each) for each in (llvm_code, llvm_loops))]
+        content = [plan, self.width, *(inspect.getsource(each) for each in (llvm_code, llvm_loops, llvm_tables))]
         self._owner, self.functions = compiled.load(repr(content), lambda: self._text(plan), signatures)
 
     def _text(self, plan: Plan) -> str:

@@ -6,13 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...joints import Coupler, Joint, Kind
 from ...mechanism import Body, Mechanism, Point, Vector
-from ..case import Case, Output, Quantity, Truth
+from ..case import PER_TRAVEL, Case, Output, Quantity, Truth
 from ..compare import size
-from ..suspension import PER_TRAVEL, SuspensionOutput
 from .document import as_table, class_of, explained, fault, join, parse, read_text, remedy, shown, typed
 from .driving import read_drivers, read_sweep
 from .reference import Convert, ReferenceKeys, is_derivative, read_reference
@@ -28,8 +27,10 @@ from .schema import (
     kind_of,
     own_fields,
 )
-from .suspension import SuspensionTable, read_output, read_suspension, with_markers, with_slopes
 from .tolerance import DEFAULT_ATOL, DEFAULT_WHY, tolerance
+
+if TYPE_CHECKING:
+    from .suspension import SuspensionTable
 
 LARGEST_FILE = 4_000_000
 # Twice as many bodies as the largest mechanism that was measured, and joints and points beside them.
@@ -69,7 +70,8 @@ def load_case(path: str | Path) -> Case:
         kinds = ", ".join(kind for kind in Truth if kind is not Truth.CONSENSUS_ONLY)
         raise fault(file, "truth", f"found {found} beside a [reference], expected where that comes from; give one of {kinds}")
     columns = typed(file, "reference", keys.reference, ReferenceKeys)
-    series = read_reference(file, columns, driver_unit, by_unit, sweep.values, case.outputs)
+    convention = "" if keys.suspension is None else str(as_table(file, "suspension", keys.suspension)["convention"])
+    series = read_reference(file, columns, driver_unit, by_unit, sweep.values, case.outputs, convention)
     return replace(case, truth=keys.truth, reference=series)
 
 
@@ -125,7 +127,11 @@ def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Co
     mechanism = case.mechanism
     if not keys.points:
         raise fault(file, "points", "found no point, expected one whose motion is compared; add [points.NAME]")
-    table = None if keys.suspension is None else read_suspension(file, keys.suspension, mechanism, units["m"], units["rad"])
+    table: SuspensionTable | None = None
+    if keys.suspension is not None:
+        from . import suspension  # many classes, and few cases have a wheel
+
+        table = suspension.read_suspension(file, keys.suspension, mechanism, units["m"], units["rad"])
     outputs: tuple[Quantity, ...] = tuple(
         Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
         for point in mechanism.points
@@ -133,8 +139,13 @@ def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Co
     )
     if keys.outputs:
         outputs = tuple(_output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items())
-    case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
-    return replace(case, outputs=with_slopes(outputs, size(case))) if table is not None and table.per_travel else case
+    case = replace(case, outputs=outputs)
+    if table is None:
+        return case
+    from . import suspension
+
+    case = replace(case, mechanism=suspension.with_markers(mechanism, outputs))
+    return replace(case, outputs=suspension.with_slopes(outputs, size(case))) if table.per_travel else case
 
 
 def _output(
@@ -143,7 +154,9 @@ def _output(
     key = join("outputs", name)
     if is_derivative(name) or name.endswith(PER_TRAVEL):
         raise fault(file, key, "a name with this ending is a derivative in reference tables; give the output another name")
-    if "type" in as_table(file, key, value):
+    if as_table(file, key, value).get("type", COORDINATE) != COORDINATE:
+        from .suspension import SuspensionOutput, read_output
+
         cls = class_of(file, key, "output", value, {COORDINATE: Output, **SuspensionOutput.registry})
         if issubclass(cls, SuspensionOutput):
             return read_output(file, key, cls, name, value, table, case, units)

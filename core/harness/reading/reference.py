@@ -25,9 +25,8 @@ import numpy as np
 from msgspec import Meta
 
 from ...trajectory import Array
-from ..case import Quantity, Series
+from ..case import PER_TRAVEL, Quantity, Series
 from ..references import read, series
-from ..suspension import PerTravel, SuspensionOutput
 from .document import decimal, fault, read_text, remedy, shown
 
 LARGEST_FILE = 64_000_000
@@ -67,7 +66,13 @@ def is_derivative(name: str) -> bool:
 
 
 def read_reference(
-    case_file: Path, keys: ReferenceKeys, driver: Convert, units: Mapping[str, Convert], values: Array, outputs: Sequence[Quantity]
+    case_file: Path,
+    keys: ReferenceKeys,
+    driver: Convert,
+    units: Mapping[str, Convert],
+    values: Array,
+    outputs: Sequence[Quantity],
+    convention: str,
 ) -> dict[str, Series]:
     """True values by output name, SI.
 
@@ -76,6 +81,7 @@ def read_reference(
         units: from the file's units to SI, by the unit there: m, rad and 1.
         values: the grid of the sweep [m or rad], shape (n,).
         outputs: those of the case.
+        convention: of the signs of those outputs that have one.
 
     Raises:
         CaseError: the file cannot be read or lies elsewhere, a column is unknown, the grid is not that of the sweep, or signs are
@@ -90,7 +96,7 @@ def read_reference(
     _check_columns(samples, names, [*by_name])
     _check_grid(samples, [driver(row[0]) for _, row in samples.rows], values)
     if keys.file is not None:
-        _check_signs(samples, [by_name[name] for name in names if name in by_name])
+        _check_signs(samples, convention if any(by_name[name].signs for name in names if name in by_name) else "")
     column = {name: [row[k] for _, row in samples.rows] for k, name in enumerate(names, start=1)}
     return {
         output.name: Series(
@@ -111,10 +117,9 @@ def _in_si(column: Sequence[float], unit: str, units: Mapping[str, Convert]) -> 
     return np.array([units[above](value) / scale for value in column])
 
 
-def _check_signs(samples: _Samples, outputs: Sequence[Quantity]) -> None:
-    """A table of suspension outputs says whose signs it has, and they are the case's."""
-    wanted = {output.vehicle.convention.value for output in outputs if isinstance(output, SuspensionOutput | PerTravel)}
-    for convention in wanted - {samples.signs}:
+def _check_signs(samples: _Samples, convention: str) -> None:
+    """A table of outputs that have a convention says whose signs it has, and they are the case's."""
+    if convention not in ("", samples.signs):
         found = f"found {shown(samples.signs)}" if samples.signs else "found no convention"
         problem = f'{found} of signs, expected {convention!r} as in [suspension]; write "# signs: {convention}" if its signs are so'
         raise fault(samples.file, "signs", problem)
@@ -123,7 +128,7 @@ def _check_signs(samples: _Samples, outputs: Sequence[Quantity]) -> None:
 def _inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> _Samples:
     if keys.rows is None:
         raise fault(file, "reference", "found neither file nor rows, expected one of them; name a CSV file or give the rows")
-    columns = keys.columns or ["driver", *(output.name for output in outputs if not isinstance(output, PerTravel))]
+    columns = keys.columns or ["driver", *(output.name for output in outputs if not output.name.endswith(PER_TRAVEL))]
     rows = [(f"reference.rows[{k}]", row) for k, row in enumerate(keys.rows)]
     samples = _Samples(file, "reference.columns", columns, rows)
     for where, row in rows:

@@ -3,11 +3,10 @@
 from . import instant_axis as instant_axis
 from . import steering_axis as steering_axis
 from . import wheel as wheel
-from .base import PER_TRAVEL, PerTravel, Rate, SuspensionOutput, own_keys
+from .base import PerTravel, Rate, SuspensionOutput, own_keys
 from .vehicle import Axle, Convention, Reaction, Side, Vehicle
 
 __all__ = [
-    "PER_TRAVEL",
     "Axle",
     "Convention",
     "PerTravel",

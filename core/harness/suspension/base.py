@@ -16,15 +16,13 @@ import numpy as np
 from ...algebra import Vec3
 from ...jet import Jet
 from ...trajectory import Array
+from ..case import PER_TRAVEL
 from .corner import Corner
 from .vehicle import Vehicle
 
 # Samples at which the wheel travels slower than this part of the fastest point are left out: there a quotient by the speed of
 # travel has lost three digits of the rates it is made of, and more the slower it gets.
 STILL = 1e-3
-
-PER_TRAVEL = ".per_travel"
-"""Ends the name of an output's derivative by wheel travel."""
 
 
 @dataclass(frozen=True)
