@@ -1,0 +1,85 @@
+"""Which rows are left out where some repeat others: as many as must be, and such that the others are good for the whole sweep."""
+
+import numpy as np
+import pytest
+from kincheck.core.algebra import ZERO, Quat, vec
+from kincheck.core.analysis.cartesian import Cartesian
+from kincheck.core.analysis.equations import constraints, frames
+from kincheck.core.analysis.formulation import Condition
+from kincheck.core.analysis.freedom import select_rows
+from kincheck.core.analysis.poses import jacobian
+from kincheck.core.analysis.programs import Tracer
+from kincheck.core.analysis.redundancy import independent_rows
+from kincheck.core.analysis.request import Request
+from kincheck.core.harness.stress.families import planar
+from kincheck.core.harness.stress.families.planar import any_plane, crank_rocker
+from kincheck.core.primitives.base import Pose
+from kincheck.core.program import Elimination
+
+
+def test_independent_rows_of_a_known_matrix():
+    rows = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
+    kept = independent_rows(rows, 0)
+    assert len(kept) == np.linalg.matrix_rank(rows) == np.linalg.matrix_rank(rows[kept])
+    assert independent_rows(rows, 1)[-1] == 3  # the last row first
+    assert independent_rows(np.zeros((2, 3)), 0) == []
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_independent_rows_of_random_matrices(seed):
+    """As many as the rank by singular values, and independent, with the last rows among them."""
+    rng = np.random.default_rng(seed)
+    rank = int(rng.integers(1, 8))
+    matrix = rng.normal(size=(12, rank)) @ rng.normal(size=(rank, 9))
+    kept = independent_rows(matrix, 1)
+    assert len(kept) == rank == np.linalg.matrix_rank(matrix[kept])
+    assert 11 in kept
+
+
+def test_a_senseless_number_of_rows_is_looked_at_in_portions():
+    """What is left out of the first is not taken up again, and what is kept is judged with the rest."""
+    rng = np.random.default_rng(0)
+    matrix = rng.normal(size=(3000, 4)) @ rng.normal(size=(4, 6))
+    conditions = [Condition(range(k, k + 3), remote=k % 7) for k in range(0, 3000, 3)]
+    kept = independent_rows(matrix, 0, conditions)
+    assert len(kept) == 4 == np.linalg.matrix_rank(matrix[kept])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
+    """Each loop keeps a system of its own: of hinges alone three of its rows are left out, and they are none of the crank's."""
+    rng = np.random.default_rng(seed)
+    mechanism = planar.twins(any_plane(rng), *crank_rocker(rng), ("revolutes", "revolutes"))
+    frame = frames(mechanism)
+    formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    selection = select_rows(mechanism, frame, formulation)
+    assert {formulation.owners[k][0].removeprefix("twin ") for k in selection.dropped} <= {"pin_1", "pin_2"}
+    traced = Tracer(mechanism, Request(("turn",), mechanism.points))
+    assert traced.selection.kept == selection.kept
+    rows = traced.formulation.rows(traced.at)
+    assert Elimination([rows[k] for k in selection.kept]).core_size == 4
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
+    """Against the best there is, all rows. Where one row each of two hinges kept an axis parallel there were poses without rank."""
+    rng = np.random.default_rng(seed)
+    plane, bars = any_plane(rng), crank_rocker(rng)
+    mechanism = planar.four_bar(plane, *bars)
+    frame = frames(mechanism)
+    formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    kept = select_rows(mechanism, frame, formulation).kept
+    turns = np.linspace(-np.pi, np.pi, 37)
+    moved = planar.four_bar_motion(plane, *bars)(turns[None])
+    for sample in range(37):
+        state = dict(formulation.design)
+        for name in frame.moving:
+            turn, pivot, shift = moved[name]
+            q, away = turn[:, sample].astype(float), np.array([*frame.origins[name]]) - pivot.astype(float) / frame.unit
+            swung = Pose.of(ZERO, Quat(q[0], vec(q[1:]))).swing(vec(away))
+            state |= {f"q {name}": [*q], f"u {name}": [*(vec(shift[:, sample].astype(float) / frame.unit) + swung)]}
+        at = formulation.configuration(state)
+        assert np.abs(formulation.phi(at)[:-1]).max() < 1e-14  # all but the driver's, at rest
+        matrix = jacobian(formulation, at)
+        least, best = (np.linalg.svd(rows, compute_uv=False)[-1] for rows in (matrix[[*kept]], matrix))
+        assert least > 0.4 * best
