@@ -82,6 +82,19 @@ def test_number_of_equations(kind, rng):
     assert [len(part) for part in parts] == [kind.n] * 4
 
 
+@pytest.mark.parametrize("kind", [kind for kind in TYPES if kind.n > 1])
+def test_rows_are_steady_that_say_so(kind, rng):
+    """Global directions, of shifts or else of turns of body i, that are the same in all poses; and no other rows are."""
+    specimen = make(kind, rng)
+    i, j = admissible(specimen, rng)
+    steady = True
+    for row in specimen.primitive.rows(i.pose, j.pose):
+        shift, turn = lanes(row.ri), lanes(i.pose.turn(row.pi) if kind.body_axes else row.pi)
+        along = shift if np.abs(shift).max() > 0.0 else turn
+        steady = steady and float(np.ptp(along, axis=1).max()) <= 1e-14  # round-off of turning there and back
+    assert steady == kind.steady
+
+
 @pytest.mark.parametrize("kind", TYPES)
 def test_satisfied_on_the_manifold(kind, rng):
     """The makers' manifold is where phi = 0, and its motions are those with rows . velocity = nu."""

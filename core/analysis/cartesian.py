@@ -84,7 +84,7 @@ class Cartesian:
 
     @property
     def _from_ground(self) -> Mapping[str, int]:
-        """Joints between every body and the ground, or what is given; bodies that no joint leads to are missing."""
+        """Joints and drivers between every body and the ground, or what is given; bodies that none leads to are missing."""
         pairs = [(c.i, c.j) for c in self.constraints if isinstance(c, Constraint)]
         far = {name: 0 for pair in pairs for name in pair if name not in self.columns}
         while reached := {b: far[a] + 1 for i, j in pairs for a, b in ((i, j), (j, i)) if a in far and b not in far}:

@@ -19,7 +19,7 @@ from .request import SIGMA, accept_by
 from .singularity import CONTINUED, listed
 
 # Samples at once: all are predicted from one pose, and the farther they are from it the more iterations they take, and the more are
-# tried in vain. A chain of 1,000 loops takes a third longer with 32, in 64 samples as in 640, and half as long again with 8.
+# tried in vain. A chain of 1,000 loops takes a third longer with 32 in 640 samples, and more in 64; half as long again with 8.
 LANES = 16
 POINT = ("position", "velocity", "acceleration")
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")

@@ -93,6 +93,7 @@ class PaperDot11(Dot11):
 class PaperDot12(Dot12):
     """Eqs (17)-(21): rows [ 0 | I | 0 | -A_ij ]. The residual has seven spurious rotations; the branch test is trace A_ij = 3."""
 
+    steady = False
     body_axes = True
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

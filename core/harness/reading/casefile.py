@@ -127,25 +127,26 @@ def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Co
     mechanism = case.mechanism
     if not keys.points:
         raise fault(file, "points", "found no point, expected one whose motion is compared; add [points.NAME]")
-    table: SuspensionTable | None = None
-    if keys.suspension is not None:
-        from . import suspension  # many classes, and few cases have a wheel
-
-        table = suspension.read_suspension(file, keys.suspension, mechanism, units["m"], units["rad"])
     outputs: tuple[Quantity, ...] = tuple(
         Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
         for point in mechanism.points
         for axis, along in AXES.items()
     )
-    if keys.outputs:
-        outputs = tuple(_output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items())
-    case = replace(case, outputs=outputs)
-    if table is None:
-        return case
-    from . import suspension
+    if keys.suspension is None:
+        return replace(case, outputs=_outputs(file, keys, None, case, units) or outputs)
+    from . import suspension  # many classes, and few cases have a wheel
 
-    case = replace(case, mechanism=suspension.with_markers(mechanism, outputs))
+    table = suspension.read_suspension(file, keys.suspension, mechanism, units["m"], units["rad"])
+    outputs = _outputs(file, keys, table, case, units) or outputs
+    case = replace(case, mechanism=suspension.with_markers(mechanism, outputs), outputs=outputs)
     return replace(case, outputs=suspension.with_slopes(outputs, size(case))) if table.per_travel else case
+
+
+def _outputs(
+    file: Path, keys: CaseKeys, table: SuspensionTable | None, case: Case, units: Mapping[str, Convert]
+) -> tuple[Quantity, ...]:
+    """Those that the file names."""
+    return tuple(_output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items())
 
 
 def _output(
