@@ -39,8 +39,10 @@ def test_independent_rows_of_random_matrices(seed):
 def test_a_senseless_number_of_rows_is_looked_at_in_portions():
     """What is left out of the first is not taken up again, and what is kept is judged with the rest."""
     rng = np.random.default_rng(0)
-    matrix = rng.normal(size=(3000, 4)) @ rng.normal(size=(4, 6))
-    conditions = [Condition(range(k, k + 3), remote=k % 7) for k in range(0, 3000, 3)]
+    weights = rng.normal(size=(3000, 4))
+    weights[:1500, :2] = weights[1500:, 2:] = 0.0  # neither half has what the other has
+    matrix = weights @ rng.normal(size=(4, 6))
+    conditions = [Condition(range(k, k + 3), remote=k // 600) for k in range(0, 3000, 3)]
     kept = independent_rows(matrix, 0, conditions)
     assert len(kept) == 4 == np.linalg.matrix_rank(matrix[kept])
 
