@@ -121,10 +121,11 @@ class Followed:
 
     def _arrive(self, way: Route) -> list[End]:
         """Go on to the first sample, and from there."""
-        found = march(way, self.tol)
+        last = len(way.path.times) - 1
+        found = march(way, self.tol, {last})
         if not found.solved.all():
             return list(found.ends)
-        lane = arrived(self.route.model, found.last)
+        lane = arrived(self.route.model, found.visited[last])
         return self._follow(Route(self.route.model, self.route.path, lane, float(self.times[0])), np.arange(len(self.times)))
 
     def _follow(self, route: Route, samples: NDArray[np.intp]) -> list[End]:

@@ -6,15 +6,18 @@ costs steps; where no part of a step succeeds the motion ends, and a message say
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+import threading
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..motions import Path
-from ..program import MARGIN
+from ..program import MARGIN, Side
 from ..trajectory import Array
 from .model import Model
 from .refusal import why_refused
@@ -29,23 +32,22 @@ HALVINGS = 40
 MAX_ROUNDS = 200
 
 
-@dataclass(frozen=True, eq=False)
-class March:
+class March(NamedTuple):
     """What a march found, sample by sample in the order given.
 
     Attributes:
         kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not reached.
-        last: all slots of where the last side ended.
+        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest estimate of sigma.
         solved: shape (n,).
         ends: one for each side that ended before its last sample.
         visited: by sample, all slots of a lane that stands there and goes on from it; those asked for.
     """
 
     kept: Array
-    last: Array
+    worst: Sequence[float]
     solved: NDArray[np.bool_]
     ends: tuple[End, ...]
-    visited: Mapping[int, Array] = field(default_factory=dict[int, Array])
+    visited: Mapping[int, Array] = MappingProxyType({})
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -68,16 +70,6 @@ class End:
     route: Route
     lane: Array
     wanted: float
-
-
-@dataclass(frozen=True, eq=False)
-class Side:
-    """The samples on one side of where a march starts, outwards. first, step: their columns among all samples by time."""
-
-    times: Array
-    samples: Array
-    first: int
-    step: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,16 +134,26 @@ class Route:
         found: list[Side] = []
         for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
             if len(columns):
-                ahead = times[columns]
-                samples = self.sampled(ahead)
+                samples = self.sampled(times[columns])
                 padded = np.concatenate([samples, np.repeat(samples[:, -1:], pad, axis=1)], axis=1)
-                found.append(Side(ahead, padded, int(columns[0]), step))
+                found.append(Side(padded, len(columns), int(columns[0]), step))
         return tuple(found)
 
     @cached_property
     def lanes(self) -> int:
         """How many samples are tried at once."""
         return min(LANES, max(1, len(self.path.times)))
+
+    def marcher(self, tol: float, *, crossing: bool) -> _Marcher:
+        """What goes along it from its departure; kept, because binding takes as long as going."""
+        key = threading.get_ident(), tol, crossing
+        if key not in self._marchers:
+            self._marchers[key] = _Marcher(self, self.departure, accept_by(tol, crossing=crossing))
+        return self._marchers[key]
+
+    @cached_property
+    def _marchers(self) -> dict[tuple[int, float, bool], _Marcher]:
+        return {}
 
     def sampled(self, times: Array) -> Array:
         """What is given at the times, shape (sampled, n)."""
@@ -165,16 +167,18 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
         visit: samples at which the lane that stands there is wanted, and beyond which nothing is.
         crossing: accept steps across singular poses, whatever is there.
     """
-    model, path, tolerances = route.model, route.path, accept_by(tol, crossing=crossing)
+    model = route.model
     if route.from_design:
-        return _Marcher(route, route.departure, tolerances, visit).run()
-    way = Route(model, path.lead_in(), route.design)
-    found = _Marcher(way, way.departure, tolerances).run()
+        return route.marcher(tol, crossing=crossing).run(visit)
+    way = Route(model, route.path.lead_in(), route.design)
+    last = len(way.path.times) - 1
+    found = way.marcher(tol, crossing=crossing).run({last})
     if not found.solved.all():
-        n = len(path.times)
+        n = len(route.path.times)
         end = replace(found.ends[0], message=f"on the way to the first sample: {found.messages[0]}")
-        return March(np.full((len(found.kept), n), np.nan), found.last, np.zeros(n, np.bool_), (end,))
-    return _Marcher(route, model.moving(arrived(model, found.last), route.origin), tolerances, visit).run()
+        return March(np.full((len(found.kept), n), np.nan), found.worst, np.zeros(n, np.bool_), (end,))
+    start = model.moving(arrived(model, found.visited[last]), route.origin)
+    return _Marcher(route, start, accept_by(tol, crossing=crossing)).run(visit)
 
 
 def arrived(model: Model, lane: Array) -> Array:
@@ -197,65 +201,69 @@ def longest(margins: Array) -> int | None:
 
 
 class _Marcher:
-    def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float], visit: Collection[int] = ()) -> None:
+    """A route bound to lanes of this thread, to be gone along again and again."""
+
+    def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float]) -> None:
         self.route, self.model, self.slots = route, route.model, route.model.slots
         self.start = start.copy()
         for name, value in tolerances.items():
             self.start[self.slots[name]] = value
         self.executor = self.model.executor(route.lanes)
+        self.every = np.ones(len(route.path.times), dtype=np.bool_)
+        self.track = self.executor.track(route.sides, self.start[self.model.ahead], len(self.every))
+
+    def run(self, visit: Collection[int] = ()) -> March:
+        """See `march`."""
         if self.model.geometry:  # the lanes know their variant
             self.executor.put(range(len(self.start)), self.start[:, None])
-        self.n = len(route.path.times)
-        self.whole, self.first = self.executor.table(self.model.kept, self.n, route.below)
-        self.kept = self.whole[:, self.first : self.first + self.n]
-        self.solved = np.ones(self.n, dtype=np.bool_)
+        self.kept, self.solved = self.track.begin(), self.every.copy()
         self.visit, self.visited = visit, dict[int, Array]()
-
-    def run(self) -> March:
-        ends: list[End] = []
-        for side in self.route.sides:
-            self.executor.anchor[:] = self.start
-            end = self._side(side)
-            if end:
-                ends.append(end)
+        ends = [end for side in range(len(self.route.sides)) if (end := self._side(side)) is not None]
         back = self.route.back
-        return March(self.kept[:, back], self.executor.anchor.copy(), self.solved[back], tuple(ends), self.visited)
+        return March(self.kept[:, back], self.track.worst.tolist(), self.solved[back], tuple(ends), self.visited)
 
-    def _side(self, side: Side) -> End | None:
+    def _side(self, number: int) -> End | None:
         """Follow one side to its last sample; None, or where and why it ends before."""
-        n, at, rounds, anchor = len(side.times), 0, 0, self.executor.anchor
-        stops = self._stops(side)
+        side = self.route.sides[number]
+        at, rounds, anew, stops = 0, 0, True, self._stops(side) if self.visit else [side.count]
         while stops:
-            came, at = at, self.executor.follow(side.samples, at, stops[0], self.whole, self.first + side.first, side.step)
+            came, at = at, self.track.follow(number, at, stops[0], anew=anew)
+            anew = False
             if at == stops[0]:
-                self._stand(side, stops.pop(0), anchor)
+                stops.pop(0)
+                if self.visit:
+                    self._stand(side, at)
                 continue
             rounds = 0 if at > came else rounds + 1
-            further, reason = self._divide(anchor, float(side.times[at]))
-            if not further or rounds > MAX_ROUNDS:
-                columns = side.first + side.step * np.arange(at, n)
+            anchor, wanted = self._anchor(), float(side.samples[0, at])
+            further, reason = self._divide(anchor, wanted)
+            if further is None or rounds > MAX_ROUNDS:
+                columns = side.first + side.step * np.arange(at, side.count)
                 self.kept[:, columns], self.solved[columns] = np.nan, False
                 message = self._end(side, at, anchor, reason or "the parts of the step get smaller and smaller")
-                return End(message, self.route, anchor.copy(), float(side.times[at]))
+                return End(message, self.route, anchor, wanted)
+            self.track.anchor[:] = further[self.model.ahead]
         return None
 
+    def _anchor(self) -> Array:
+        """All slots of a lane where the motion stands."""
+        found = self.start.copy()
+        found[self.model.ahead] = self.track.anchor
+        return found
+
     def _stops(self, side: Side) -> list[int]:
-        """How many samples of a side have passed where one to visit has; without any, at its end."""
-        n = len(side.times)
-        if not self.visit:
-            return [n]
+        """How many samples of a side have passed where one to visit has."""
         place = np.argsort(self.route.order)
         passed = {int((place[k] - side.first) * side.step) + 1 for k in self.visit}
-        return sorted(count for count in passed if 1 <= count <= n)
+        return sorted(count for count in passed if 1 <= count <= side.count)
 
-    def _stand(self, side: Side, passed: int, anchor: Array) -> None:
-        if self.visit:
-            sample = int(self.route.order[side.first + side.step * (passed - 1)])
-            if sample in self.visit:
-                self.visited[sample] = anchor.copy()
+    def _stand(self, side: Side, passed: int) -> None:
+        sample = int(self.route.order[side.first + side.step * (passed - 1)])
+        if sample in self.visit:
+            self.visited[sample] = self._anchor()
 
-    def _divide(self, anchor: Array, aim: float) -> tuple[bool, str]:
-        """Go a part of the step to a sample that could not be reached; whether there is one, and why the shortest refused is."""
+    def _divide(self, anchor: Array, aim: float) -> tuple[Array | None, str]:
+        """Go a part of the step to a sample that could not be reached: the lane there, and why the shortest refused is."""
         here = float(anchor[self.slots[FROM + TIME]])
         times: Array = here + (aim - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
         parts = self.model.executor(HALVINGS)
@@ -269,14 +277,13 @@ class _Marcher:
         refused = np.flatnonzero(~(margins[:part] > 0.0))
         reason = why_refused(self.model, lanes[:, refused[-1]]) if len(refused) else ""
         if part is None:
-            return False, reason
-        anchor[:] = self.model.moving(lanes[:, part], lanes[self.model.sampled, part])
-        return True, reason
+            return None, reason
+        return self.model.moving(lanes[:, part], lanes[self.model.sampled, part]), reason
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
         where = self.route.path.where
-        here, wanted = float(anchor[self.slots[FROM + TIME]]), float(side.times[at])
-        last = f"last reachable sample at {where(float(side.times[at - 1]))}" if at else "no sample reached on this side"
+        here, wanted = float(anchor[self.slots[FROM + TIME]]), float(side.samples[0, at])
+        last = f"last reachable sample at {where(float(side.samples[0, at - 1]))}" if at else "no sample reached on this side"
         return (
             f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest singular value there about "
             f"{anchor[self.slots[FROM + SIGMA]]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "

@@ -74,6 +74,8 @@ class Model:
             sampled=self.sampled,
             carried=tracing.carried,
             kept=[*kept, *(self.slots[name] for name in self._tests)],
+            largest=[self.slots["closure"], self.slots["leftover"]],
+            smallest=[self.slots[SIGMA]],
             fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
             taken=[slot for name in self.given for slot in self.vectors[name]],
             loops=("parts",) if self.request.state else ("follow", "fan") if self.request.varied else ("follow",),
@@ -188,6 +190,11 @@ class Model:
         """The programs and how they are looped."""
         return self._plan
 
+    @cached_property
+    def ahead(self) -> list[int]:
+        """The places of what lanes are predicted from."""
+        return [target for _, target in self._plan.carried]
+
     def start(self, executor: Executor, sample: Array) -> None:
         """Make solved lanes those that go on from where they stand, with the rates that a sample of the drives gives them."""
         executor.put(self.sampled, sample[:, None])
@@ -228,11 +235,6 @@ class Model:
         executor.run("outputs")
         closure, branch = executor.get([self.slots["closure"], self.slots["branch"]])
         return (closure <= CLOSED) & (branch > 0.0)
-
-    @property
-    def ahead(self) -> list[int]:
-        """The places of what lanes are predicted from."""
-        return [target for _, target in self._plan.carried]
 
     def _solve_design(self) -> Array:
         geometry = np.array([number for value in self._geometry.values() for number in value])

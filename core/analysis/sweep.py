@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,28 +24,27 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 
 def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
-    model, rows, found = route.model, route.model.rows, march(route, tol)
-    tests, message = slice(rows["closure"].start, rows[SIGMA].stop), ""
-    closure, leftover, sigma = _worst(found.kept[tests] if not found.ends else found.kept[tests, found.solved])
-    details = model.details | {"redundant_residual": leftover * model.frame.unit, "smallest_singular_value": sigma}
+    model, rows, found, message = route.model, route.model.rows, march(route, tol), ""
+    closure, leftover, sigma = found.worst
+    findings: Mapping[str, Any] = {}
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
     elif found.ends or doubtful(sigma, closure, tol):
         from .scrutiny import scrutinise  # rarely needed
 
-        findings = scrutinise(route, found, tol)
-        closure, leftover, sigma = _worst(found.kept[tests, found.solved])
-        details |= {"redundant_residual": leftover * model.frame.unit, "smallest_singular_value": sigma} | findings.details
-        message = "; ".join(findings.messages)
-    iterations = found.kept[rows[ITERATIONS].start]
+        scrutiny = scrutinise(route, found, tol)
+        closure, leftover, sigma = _worst(found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved])
+        message, findings = "; ".join(scrutiny.messages), scrutiny.details
+    iterations, table, unit = found.kept[rows[ITERATIONS].start], found.kept.T, model.frame.unit
+    tests = {"redundant_residual": leftover * unit, "smallest_singular_value": min(1.0, sigma)}
     return Trajectory(
-        points=Motions(PointMotion, found.kept.T, model.of_points),
+        points=Motions(PointMotion, table, model.of_points),
         solved=found.solved,
         iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
-        residual=closure * model.frame.unit,
+        residual=closure * unit,
         message=message,
-        details=details,
-        bodies=Motions(BodyMotion, found.kept.T, model.of_bodies),
+        details={**model.details, **tests, **findings},
+        bodies=Motions(BodyMotion, table, model.of_bodies),
     )
 
 

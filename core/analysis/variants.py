@@ -64,7 +64,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     for k, side in enumerate(route.sides):
         if k:
             executor.put(ahead, start)
-        samples = np.ascontiguousarray(side.samples[:, : len(side.times)])
+        samples = np.ascontiguousarray(side.samples[:, : side.count])
         executor.fan(samples, whole, side.first, side.step)
     kept = whole[:, :, :count]
     kept[:, :, ~(arrived & closes)] = np.nan

@@ -1,7 +1,7 @@
 """Programs: equations traced to lists of operations, and what runs them."""
 
 from .elimination import Elimination
-from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan
+from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
 from .llvm_executor import LlvmCode, LlvmExecutor
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
@@ -21,8 +21,10 @@ __all__ = [
     "Plan",
     "Prepared",
     "Program",
+    "Side",
     "Tape",
     "Traced",
+    "Track",
     "absolute",
     "before",
     "cos",

@@ -36,6 +36,7 @@ class Plan:
         sampled: slots that are given anew at every sample.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
         kept: slots that are stored of every sample.
+        largest, smallest: slots of which `follow` finds the largest and the smallest over the samples it keeps.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
         taken: slots that a part takes from what was solved before it.
         loops: methods of the executor that are used besides `run` and `attempt`: "follow", "fan" or "parts".
@@ -50,6 +51,8 @@ class Plan:
     sampled: Sequence[int] = ()
     carried: Sequence[tuple[int, int]] = ()
     kept: Sequence[int] = ()
+    largest: Sequence[int] = ()
+    smallest: Sequence[int] = ()
     fixed: Sequence[int] = ()
     taken: Sequence[int] = ()
     loops: Sequence[str] = ()
@@ -59,6 +62,22 @@ class Plan:
     def extrapolates(self, lanes: int) -> bool:
         """Whether a group of that many lanes is followed by extrapolation."""
         return "extrapolate" in self.programs and lanes >= NODES
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """The samples on one side of where a motion starts, outwards.
+
+    Attributes:
+        samples: `Plan.sampled` of each, shape (sampled, count + margin), contiguous; the last column repeated at the end.
+        count: how many there are.
+        first, step: column of the first among all samples, and from each to the next: 1 or -1.
+    """
+
+    samples: Array
+    count: int
+    first: int
+    step: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,32 +130,8 @@ class Executor(Protocol):
         """Make an attempt at all lanes, each alone."""
         ...
 
-    def table(self, rows: int, n: int, at: int) -> tuple[Array, int]:
-        """Room for what `follow` keeps of n samples, shape (rows, columns), and the column of the first; both ways from the sample
-        `at` its vectors are cache lines.
-        """
-        ...
-
-    @property
-    def anchor(self) -> Array:
-        """Slots of where the motion stands that `follow` follows, shape (slots,)."""
-        ...
-
-    def follow(self, samples: Array, at: int, stop: int, out: Array, first: int, step: int) -> int:
-        """Follow one motion: attempt its next samples as neighbouring lanes, go on from the last one accepted, until none is.
-
-        The anchor goes along.
-
-        Args:
-            samples: `Plan.sampled` of the samples of the motion, shape (sampled, n + margin), contiguous; the last column repeated
-                at the end.
-            at, stop: the sample that comes next, and the one before which to end.
-            out: takes `Plan.kept` of the samples; a `table`.
-            first, step: column of the first of the samples, and from each to the next: 1 or -1.
-
-        Returns:
-            The first sample that was not accepted, or stop.
-        """
+    def track(self, sides: Sequence[Side], start: Array, n: int) -> Track:
+        """Bind the samples of one motion, n in all, and where it starts: what `Plan.carried` takes over, in that order."""
         ...
 
     @property
@@ -162,5 +157,33 @@ class Executor(Protocol):
         """A call that attempts parts of a large mechanism, one after the other, by what stands in their arrays when it is called.
 
         What is called is told in how many groups; each lane is attempted alone.
+        """
+        ...
+
+
+class Track(Protocol):
+    """A motion that an executor follows along both sides of where it starts, through samples it knows.
+
+    Attributes:
+        anchor: where the motion stands: what `Plan.carried` takes over.
+        worst: the largest of `Plan.largest`, or zero, and the smallest of `Plan.smallest`, over all samples kept since `begin`.
+    """
+
+    anchor: Array
+    worst: Array
+
+    def begin(self) -> Array:
+        """Room for `Plan.kept` of all samples, shape (kept, n), which is filled from now on."""
+        ...
+
+    def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
+        """Attempt the next samples of a side as neighbouring lanes, go on from the last one accepted, until none is.
+
+        Args:
+            at, stop: the sample that comes next, and the one before which to end.
+            anew: from the start, and not from the anchor. That goes along.
+
+        Returns:
+            The first sample that was not accepted, or stop.
         """
         ...

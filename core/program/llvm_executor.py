@@ -6,42 +6,45 @@ import ctypes
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..trajectory import Array
-from . import compiled, llvm_code, llvm_loops, llvm_tables
-from .executor import Parts, Plan
+from . import compiled, llvm_code, llvm_follow, llvm_loops, llvm_tables
+from .executor import Parts, Plan, Side
 
-LINE = 8
-"""Numbers in a cache line."""
-LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], str]] = {
-    "follow": (llvm_loops.follow, "pppiiipiii"),
-    "fan": (llvm_loops.fan, "pipiipiiii"),
-    "parts": (llvm_loops.parts, "pipppippii"),
+LINE, BYTES = 8, 8
+"""Numbers in a cache line, and bytes of a number."""
+OUT = llvm_follow.MOTION.index("ptr out")
+LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], int]] = {
+    "follow": (llvm_follow.follow, 5),
+    "fan": (llvm_loops.fan, 10),
+    "parts": (llvm_loops.parts, 10),
 }
-"""Loop -> what writes it, and the kinds of its arguments (see `compiled.load`)."""
+"""Loop -> what writes it, and how many arguments it takes."""
 
 
 class LlvmCode:
     """A plan compiled for this processor. Raises ImportError where llvmlite is missing."""
 
     def __init__(self, plan: Plan) -> None:
-        self.width, self.slots = compiled.vector_width(), len(plan.slots)
-        signatures = {f"run_{name}": "pi" for name in plan.programs} | {loop: LOOPS[loop][1] for loop in plan.loops}
+        self.width, self.plan = compiled.vector_width(), plan
+        signatures = {f"run_{name}": 2 for name in plan.programs} | {loop: LOOPS[loop][1] for loop in plan.loops}
         if plan.after:
-            signatures["attempt"] = "pi"
+            signatures["attempt"] = 2
         # what determines the text; writing that takes longer than loading the code it means
-        content = [plan, self.width, *(inspect.getsource(each) for each in (llvm_code, llvm_loops, llvm_tables))]
-        self._owner, self.functions = compiled.load(repr(content), lambda: self._text(plan), signatures)
+        content = [plan, self.width, *(inspect.getsource(each) for each in (llvm_code, llvm_follow, llvm_loops, llvm_tables))]
+        self._owner, self.functions = compiled.load(repr(content), self._text, signatures)
 
-    def _text(self, plan: Plan) -> str:
-        width = self.width
+    def _text(self) -> str:
+        plan, width, slots = self.plan, self.width, len(self.plan.slots)
         text = [llvm_code.function(program, width) for program in plan.programs.values()]
-        text += [llvm_loops.over_groups(f"run_{name}", [name], self.slots, width) for name in plan.programs]
+        text += [llvm_loops.over_groups(f"run_{name}", [name], slots, width) for name in plan.programs]
         if plan.after:  # a plan that is only run makes no attempt
             text.append(llvm_loops.settle(plan, width))
-            text.append(llvm_loops.over_groups("attempt", ["predict", "settle", "alone"], self.slots, width))
+            text.append(llvm_loops.over_groups("attempt", ["predict", "settle", "alone"], slots, width))
         text += [LOOPS[loop][0](plan, width) for loop in plan.loops]
         return "\n".join([*text, llvm_code.declarations(width)])
 
@@ -55,10 +58,10 @@ class LlvmExecutor:
     def __init__(self, code: LlvmCode, lanes: int) -> None:
         self.lanes, self.margin, self._code = lanes, code.width, code
         self._groups = self.groups(lanes)
-        self._memory = _aligned(self._groups * code.slots, code.width).reshape(self._groups, code.slots, code.width)
-        self.anchor: Array = np.zeros(code.slots)
+        slots = len(code.plan.slots)
+        self._memory = _aligned(self._groups * slots, code.width).reshape(self._groups, slots, code.width)
         self.clear()
-        self._address, self._place = _address(self._memory), _address(self.anchor)
+        self._address = _address(self._memory)
 
     def clear(self) -> None:
         """See `Executor`."""
@@ -86,15 +89,9 @@ class LlvmExecutor:
         """See `Executor`."""
         self._code.functions["attempt"](self._address, self._groups)
 
-    def table(self, rows: int, n: int, at: int) -> tuple[Array, int]:
+    def track(self, sides: Sequence[Side], start: Array, n: int) -> LlvmTrack:
         """See `Executor`."""
-        first = self.margin + -at % self.margin  # `follow` may write a vector beyond either end
-        return _aligned(rows, first + n + self.margin), first
-
-    def follow(self, samples: Array, at: int, stop: int, out: Array, first: int, step: int) -> int:
-        """See `Executor`."""
-        given = self._address, self._place, _address(samples), samples.shape[1], at, stop
-        return self._code.functions["follow"](*given, _address(out), out.shape[1], first, step)
+        return LlvmTrack(self._code, self._memory, sides, start, n)
 
     @property
     def room(self) -> int:
@@ -118,14 +115,49 @@ class LlvmExecutor:
         return partial(self._code.functions["parts"], self._address, len(parts.members), *tables, parts.base)
 
 
+class LlvmTrack:
+    """See `Track`. Its tables are such that both ways from the start the vectors of samples are cache lines."""
+
+    def __init__(self, code: LlvmCode, memory: Array, sides: Sequence[Side], start: Array, n: int) -> None:
+        plan, width = code.plan, code.width
+        self._follow, self._alive = code.functions["follow"], (code, memory, sides)
+        self._start, self.anchor = start.copy(), start.copy()
+        self._nothing = np.repeat([0.0, np.inf], [len(plan.largest), len(plan.smallest)])
+        self.worst = self._nothing.copy()
+        below = min((side.first for side in sides if side.step > 0), default=n)
+        margin = width + -below % width  # a vector may be written beyond either end
+        row = margin + n + width
+        row += -row % LINE
+        self._shape, self._strides, self._margin = (len(plan.kept), n), (row * BYTES, BYTES), margin * BYTES
+        self._room = len(plan.kept) * row + LINE
+        self._places = {True: _address(self._start), False: _address(self.anchor)}
+        # in the order of llvm_follow.MOTION and SIDE
+        self._motion = np.array([_address(memory), _address(self.anchor), _address(self.worst), 0, row], np.int64)
+        self._sides = [np.array([_address(s.samples), s.samples.shape[1], margin + s.first, s.step], np.int64) for s in sides]
+        self._given = [(_address(self._motion), _address(each)) for each in self._sides]
+
+    def begin(self) -> Array:
+        """See `Track`."""
+        room = np.empty(self._room)
+        address = _address(room)
+        skip = -address % (LINE * BYTES)
+        self._motion[OUT] = address + skip
+        self.worst[:] = self._nothing
+        return np.ndarray(self._shape, np.float64, room, skip + self._margin, self._strides)
+
+    def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
+        """See `Track`."""
+        return self._follow(*self._given[side], self._places[anew], at, stop)
+
+
 def _aligned(rows: int, columns: int) -> Array:
     """Room for numbers, at least as many columns: every row begins with a cache line, so that no vector is in two of them."""
     columns += -columns % LINE
     room = np.empty(rows * columns + LINE)
-    start = -(_address(room) // room.itemsize) % LINE
+    start = -(_address(room) // BYTES) % LINE
     return room[start : start + rows * columns].reshape(rows, columns)
 
 
-def _address(array: Array) -> int:
+def _address(array: NDArray[Any]) -> int:
     """Of a contiguous array; four times as quick as its own `ctypes`."""
     return ctypes.addressof(ctypes.c_char.from_buffer(array.data))

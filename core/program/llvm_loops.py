@@ -1,4 +1,4 @@
-"""The loops of a plan as LLVM code: Newton's iteration, and following one motion, lanes as samples, or many, lanes as motions."""
+"""The loops of a plan as LLVM code: Newton's iteration, and following many motions, lanes as motions; for one, see llvm_follow."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Iterable
 
 from .executor import DONE, ITERATIONS, MARGIN, Plan
 from .llvm_code import Lines
-from .llvm_tables import Rows
 
 
 def settle(plan: Plan, width: int) -> str:
@@ -39,7 +38,7 @@ iterate:
   %stop = or i1 %all, %spent
   br i1 %stop, label %finish, label %iterate
 finish:
-  {_calls(plan.after)}
+  {calls(plan.after)}
   store {vector} %now_count, ptr {at[ITERATIONS]}, align 8
   %done_number = select {mask} %now_done, {vector} {lines.constant(1.0)}, {vector} zeroinitializer
   store {vector} %done_number, ptr {at[DONE]}, align 8
@@ -48,7 +47,7 @@ finish:
 """
 
 
-def over_groups(name: str, calls: Iterable[str], slots: int, width: int) -> str:
+def over_groups(name: str, functions: Iterable[str], slots: int, width: int) -> str:
     """A function that calls others on every group of W lanes."""
     return f"""define void @{name}(ptr %memory, i64 %groups) {{
 entry:
@@ -57,117 +56,12 @@ group:
   %g = phi i64 [0, %entry], [%next, %group]
   %offset = mul i64 %g, {slots * width}
   %lane = getelementptr double, ptr %memory, i64 %offset
-  {_calls(calls)}
+  {calls(functions)}
   %next = add i64 %g, 1
   %more = icmp slt i64 %next, %groups
   br i1 %more, label %group, label %end
 end:
   ret void
-}}
-"""
-
-
-def follow(plan: Plan, width: int) -> str:
-    """See `Executor.follow`: W samples at a time, and on from the last one accepted."""
-    vector, begin, test, given = f"<{width} x double>", *(Lines(width, prefix) for prefix in "btg")
-    # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and no faster
-    enter, up, down, back, move, leave = (Rows(width, name) for name in ("enter", "up", "down", "back", "move", "leave"))
-    sources, targets = zip(*plan.carried, strict=True)
-    for each in (enter, leave):
-        (slot,) = each.table([slot for _, slot in plan.carried])
-        place = each.number("%anchor", slot)
-        if each is enter:
-            each.write(slot, each.spread(each.let(f"load double, ptr {place}, align 8")))
-        else:
-            x = each.let(f"load double, ptr {each.slot(slot)}, align 8")
-            each.lines.append(f"store double {x}, ptr {place}, align 8")
-    for row, slot in enumerate(plan.sampled):
-        place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%at"))
-        begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
-        place = given.number("%samples", given.sum(given.sum(given.product("%stride", row), "%at"), -1))
-        given.write(slot, given.spread(given.let(f"load double, ptr {place}, align 8")))
-    accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
-    for keep in (up, down):
-        (slot,) = keep.table(plan.kept)
-        value = keep.turned(keep.read(slot)) if keep is down else keep.read(slot)
-        place = keep.number("%out", keep.sum(keep.product("%row", keep.row), f"%{keep.prefix}_column"))
-        keep.lines.append(f"store {vector} {value}, ptr {place}, align 8")
-    source, target = move.table(sources, targets)
-    move.write(target, move.spread(move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")))
-    source, target = back.table(sources[::-1], targets[::-1])
-    back.write(source, back.read(target))
-    tables = "\n".join(each.constants for each in (enter, up, down, back, move, leave))
-    extrapolates = plan.extrapolates(width)
-    inputs = "ptr %samples, i64 %stride, i64 %from, i64 %stop, ptr %out"
-    return f"""{tables}
-declare i64 @llvm.cttz.i64(i64, i1)
-declare i64 @llvm.smin.i64(i64, i64)
-declare i64 @llvm.smax.i64(i64, i64)
-define i64 @follow(ptr %lane, ptr %anchor, {inputs}, i64 %row, i64 %first, i64 %step) {{
-entry:
-  %descending = icmp slt i64 %step, 0
-  {enter.loop("entry")}
-  br label %head
-head:
-  %at = phi i64 [%from, %enter_end], [%next, %move_end]
-  %smooth = phi i1 [false, %enter_end], [%whole, %move_end]
-  %more = icmp slt i64 %at, %stop
-  br i1 %more, label %begin, label %end
-begin:
-  {begin.text}
-  br i1 %smooth, label %extrapolate, label %predict
-extrapolate:
-  call void @{"extrapolate" if extrapolates else "predict"}(ptr %lane)
-  br label %attempt
-predict:
-  call void @predict(ptr %lane)
-  br label %attempt
-attempt:
-  call void @settle(ptr %lane)
-  call void @joined(ptr %lane)
-  {test.text}
-  %bits = bitcast <{width} x i1> {accepted} to i{width}
-  %wide = zext i{width} %bits to i64
-  %rejected = xor i64 %wide, {2 ** (width + 1) - 1}
-  %leading = call i64 @llvm.cttz.i64(i64 %rejected, i1 true)
-  %left = sub i64 %stop, %at
-  %accepted = call i64 @llvm.smin.i64(i64 %leading, i64 %left)
-  %next = add i64 %at, %accepted
-  %full = icmp eq i64 %accepted, {width if extrapolates else -1}
-  %further = icmp slt i64 %next, %stop
-  %whole = and i1 %full, %further
-  %none = icmp eq i64 %accepted, 0
-  br i1 %none, label %missed, label %keep
-missed:
-  br i1 %smooth, label %return, label %end
-return:
-  {back.loop("return")}
-  {given.text}
-  br label %onward
-keep:
-  %up_column = add i64 %first, %at
-  %down_first = sub i64 %first, %at
-  %down_column = sub i64 %down_first, {width - 1}
-  br i1 %descending, label %backward, label %forward
-forward:
-  {up.loop("forward")}
-  br label %kept
-backward:
-  {down.loop("backward")}
-  br label %kept
-kept:
-  br i1 %whole, label %carry, label %onward
-onward:
-  {_calls(plan.onward)}
-  br label %carry
-carry:
-  %before = sub i64 %accepted, 1
-  %last = call i64 @llvm.smax.i64(i64 %before, i64 0)
-  {move.loop("carry")}
-  br label %head
-end:
-  {leave.loop("end")}
-  ret i64 %at
 }}
 """
 
@@ -208,7 +102,7 @@ sample:
   {test.text}
   %still = and {mask} %alive, {accepted}
   {keep.text}
-  {_calls(plan.onward)}
+  {calls(plan.onward)}
   {move.text}
   %next = add i64 %k, 1
   %more = icmp slt i64 %next, %wanted
@@ -276,5 +170,6 @@ end:
 """
 
 
-def _calls(names: Iterable[str]) -> str:
+def calls(names: Iterable[str]) -> str:
+    """Calls of functions of a lane, one after the other."""
     return "\n  ".join(f"call void @{name}(ptr %lane)" for name in names)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..trajectory import Array
-from .executor import DONE, ITERATIONS, MARGIN, Parts, Plan
+from .executor import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
 from .straight_line import Program
 from .trace import LEAVES, operands, place_of
 
@@ -59,83 +59,56 @@ class NumpyExecutor:
 
     def __init__(self, plan: Plan, lanes: int) -> None:
         self.lanes = lanes
-        self._block: Array = np.zeros((len(plan.slots), lanes))
-        self.anchor: Array = np.zeros(len(plan.slots))
-        self._plan = plan
+        self.block: Array = np.zeros((len(plan.slots), lanes))
+        self.plan = plan
         self._scratch = np.empty((2, lanes))
         self._calls: dict[str, list[Call]] = {}
 
     def clear(self) -> None:
         """See `Executor`."""
-        self._block[:] = 0.0
+        self.block[:] = 0.0
 
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
-        self._block[slots] = values
+        self.block[slots] = values
 
     def get(self, slots: Sequence[int]) -> Array:
         """See `Executor`."""
-        return self._block[slots]
+        return self.block[slots]
 
     def run(self, name: str) -> None:
         """See `Executor`."""
         if name not in self._calls:
-            self._calls[name] = self._bind(self._plan.programs[name])
+            self._calls[name] = self._bind(self.plan.programs[name])
         with np.errstate(all="ignore"):
             for call, arguments in self._calls[name]:
                 call(*arguments)
 
     def attempt(self) -> None:
         """See `Executor`."""
-        self._settle("predict", "alone")
+        self.settle("predict", "alone")
 
-    def _settle(self, start: str, test: str) -> None:
-        slots = self._plan.slots
-        residual, iterations = (self._block[slots[name]] for name in ("residual", ITERATIONS))
+    def settle(self, start: str, test: str) -> None:
+        """Attempt all lanes: predict, iterate and test by the programs of these names."""
+        slots = self.plan.slots
+        residual, iterations = (self.block[slots[name]] for name in ("residual", ITERATIONS))
         done = np.zeros(self.lanes, dtype=np.bool_)
         iterations[:] = 0.0
         self.run(start)
-        for _ in range(self._plan.most):
+        for _ in range(self.plan.most):
             self.run("newton")
             iterations += ~done
-            done |= residual < self._plan.tolerance
+            done |= residual < self.plan.tolerance
             if (done | ~np.isfinite(residual)).all():
                 break
-        for name in self._plan.after:
+        for name in self.plan.after:
             self.run(name)
-        self._block[slots[DONE]] = done
+        self.block[slots[DONE]] = done
         self.run(test)
 
-    def table(self, rows: int, n: int, at: int) -> tuple[Array, int]:
+    def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:
         """See `Executor`."""
-        return np.empty((rows, n)), 0
-
-    def follow(self, samples: Array, at: int, stop: int, out: Array, first: int, step: int) -> int:
-        """See `Executor`."""
-        plan, block, anchor = self._plan, self._block, self.anchor
-        source, target = np.array(plan.carried).T
-        kept, sampled, smooth = list(plan.kept), list(plan.sampled), False
-        block[target] = anchor[target, None]
-        while at < stop:
-            count = min(self.lanes, stop - at)
-            block[sampled, :count] = samples[:, at : at + count]
-            block[sampled, count:] = samples[:, stop - 1 : stop]
-            self._settle("extrapolate" if smooth else "predict", "joined")
-            good = block[plan.slots[MARGIN], :count] > 0.0
-            accepted = count if good.all() else int(good.argmin())
-            if accepted:
-                out[:, first + step * np.arange(at, at + accepted)] = block[kept, :accepted]
-            elif smooth:  # back to where the motion stands, and on from there by its rates
-                block[source], block[sampled] = block[target], samples[:, at - 1 : at]
-            else:
-                break
-            smooth = plan.extrapolates(self.lanes) and accepted == self.lanes and at + accepted < stop
-            for name in () if smooth else plan.onward:
-                self.run(name)
-            block[target] = block[source, max(accepted - 1, 0), None]
-            at += accepted
-        anchor[target] = block[target, 0]
-        return at
+        return NumpyTrack(self, sides, start, n)
 
     @property
     def room(self) -> int:
@@ -144,7 +117,7 @@ class NumpyExecutor:
 
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
-        plan, block = self._plan, self._block
+        plan, block = self.plan, self.block
         source, target = np.array(plan.carried).T
         alive = np.ones(self.lanes, dtype=np.bool_)
         for k, sample in enumerate(samples.T):
@@ -162,7 +135,7 @@ class NumpyExecutor:
 
     def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
-        plan, block = self._plan, self._block
+        plan, block = self.plan, self.block
 
         def call(groups: int) -> None:
             for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
@@ -184,11 +157,11 @@ class NumpyExecutor:
         calls: list[Call] = []
         for k, (op, *rest) in enumerate(program.nodes):
             if op == "input":
-                place.append(self._block[int(rest[0])])
+                place.append(self.block[int(rest[0])])
                 continue
             if op == "node":
                 lane = place_of(int(rest[1]), self.lanes)
-                place.append(self._block[int(rest[0]), lane : lane + 1])
+                place.append(self.block[int(rest[0]), lane : lane + 1])
                 continue
             if op == "const":
                 place.append(np.float64(rest[0]))
@@ -210,5 +183,55 @@ class NumpyExecutor:
                 copy = np.empty(self.lanes)
                 calls.append((np.copyto, (copy, place[node])))
                 place[node] = copy
-        calls += [(np.copyto, (self._block[slot], place[node])) for slot, node in program.outputs.items()]
+        calls += [(np.copyto, (self.block[slot], place[node])) for slot, node in program.outputs.items()]
         return calls
+
+
+class NumpyTrack:
+    """See `Track`."""
+
+    def __init__(self, executor: NumpyExecutor, sides: Sequence[Side], start: Array, n: int) -> None:
+        self._executor, self._sides, self._start, self._n = executor, sides, start, n
+        self.anchor = start.copy()
+
+    def begin(self) -> Array:
+        """See `Track`."""
+        plan = self._executor.plan
+        self.worst = np.repeat([0.0, np.inf], [len(plan.largest), len(plan.smallest)])
+        self._kept = np.empty((len(plan.kept), self._n))
+        return self._kept
+
+    def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
+        """See `Track`."""
+        executor, samples = self._executor, self._sides[side].samples
+        plan, block, lanes = executor.plan, executor.block, executor.lanes
+        source, target = np.array(plan.carried).T
+        sampled, smooth = list(plan.sampled), False
+        block[target] = (self._start if anew else self.anchor)[:, None]
+        while at < stop:
+            count = min(lanes, stop - at)
+            block[sampled, :count] = samples[:, at : at + count]
+            block[sampled, count:] = samples[:, stop - 1 : stop]
+            executor.settle("extrapolate" if smooth else "predict", "joined")
+            good = block[plan.slots[MARGIN], :count] > 0.0
+            accepted = count if good.all() else int(good.argmin())
+            if accepted:
+                self._keep(self._sides[side], at, block[:, :accepted])
+            elif smooth:  # back to where the motion stands, and on from there by its rates
+                block[source], block[sampled] = block[target], samples[:, at - 1 : at]
+            else:
+                break
+            smooth = plan.extrapolates(lanes) and accepted == lanes and at + accepted < stop
+            for name in () if smooth else plan.onward:
+                executor.run(name)
+            block[target] = block[source, max(accepted - 1, 0), None]
+            at += accepted
+        self.anchor[:] = block[target, 0]
+        return at
+
+    def _keep(self, side: Side, at: int, found: Array) -> None:
+        plan = self._executor.plan
+        self._kept[:, side.first + side.step * np.arange(at, at + found.shape[1])] = found[list(plan.kept)]
+        largest, smallest = np.split(self.worst, [len(plan.largest)])
+        np.maximum(largest, found[list(plan.largest)].max(axis=1), out=largest)
+        np.minimum(smallest, found[list(plan.smallest)].min(axis=1), out=smallest)

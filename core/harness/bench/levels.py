@@ -9,7 +9,7 @@ from typing import Any
 
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
-from ...analysis.request import Request, accept_by
+from ...analysis.request import Request
 from ...analysis.sweep import follow
 from ...errors import SolveError
 from ...program.compiled import available
@@ -88,19 +88,14 @@ def loops_alone(case: Case, tol: float) -> Callable[[], None]:
         SolveError: a step has to be divided, which needs Python.
     """
     route = Level().build(case)
-    model, n = route.model, len(route.path.times)
-    executor = model.executor(route.lanes)
-    start = route.departure.copy()
-    for name, value in accept_by(tol).items():
-        start[model.slots[name]] = value
-    out, begin = executor.table(model.kept, n, route.below)
+    track = route.marcher(tol, crossing=False).track
 
     def work() -> None:
-        for side in route.sides:
-            executor.anchor[:] = start
-            went = executor.follow(side.samples, 0, len(side.times), out, begin + side.first, side.step)
-            if went < len(side.times):
-                raise SolveError(f"case {case.name!r}: the loops alone end after {went} of {len(side.times)} samples on one side")
+        track.begin()
+        for k, side in enumerate(route.sides):
+            went = track.follow(k, 0, side.count, anew=True)
+            if went < side.count:
+                raise SolveError(f"case {case.name!r}: the loops alone end after {went} of {side.count} samples on one side")
 
     return work
 
