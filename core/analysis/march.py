@@ -28,6 +28,8 @@ LANES = 256
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
 # passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
 HALVINGS = 40
+# Samples that are in the order of their times.
+AS_THEY_ARE = slice(None)
 # A side that needs more rounds than this without reaching a sample makes no headway.
 MAX_ROUNDS = 200
 
@@ -105,7 +107,7 @@ class Route:
     def back(self) -> NDArray[np.intp] | slice:
         """From the samples by time to the order wanted."""
         n = len(self.path.times)
-        for simple in (slice(None), slice(None, None, -1)):
+        for simple in (AS_THEY_ARE, slice(None, None, -1)):
             if (self.order == np.arange(n)[simple]).all():
                 return simple
         return np.argsort(self.order, kind="stable")
@@ -219,8 +221,10 @@ class _Marcher:
         self.kept, self.solved = self.track.begin(), self.every.copy()
         self.visit, self.visited = visit, dict[int, Array]()
         ends = [end for side in range(len(self.route.sides)) if (end := self._side(side)) is not None]
-        back = self.route.back
-        return March(self.kept[:, back], self.track.worst.tolist(), self.solved[back], tuple(ends), self.visited)
+        kept, solved, back = self.kept, self.solved, self.route.back
+        if back is not AS_THEY_ARE:
+            kept, solved = kept[:, back], solved[back]
+        return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
 
     def _side(self, number: int) -> End | None:
         """Follow one side to its last sample; None, or where and why it ends before."""

@@ -17,9 +17,17 @@ SIDE = ("ptr samples", "i64 stride", "i64 first", "i64 step")
 def follow(plan: Plan, width: int) -> str:
     """See `Track.follow`: W samples at a time, and on from the last one accepted."""
     vector, begin, test, given = f"<{width} x double>", *(Lines(width, prefix) for prefix in "btg")
-    # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and no faster
+    # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and but for one no faster
     enter, up, down, back, move, leave = (Rows(width, name) for name in ("enter", "up", "down", "back", "move", "leave"))
     sources, targets = zip(*plan.carried, strict=True)
+    extrapolates = plan.extrapolates(width)
+    quick = extrapolates or not plan.onward
+    rates = {slot for name in plan.onward for slot in plan.programs[name].outputs}
+    carry = Lines(width, "c")  # what a group is followed by that was accepted whole: each time but for a few
+    for source, target in plan.carried:
+        if source not in rates:
+            place = carry.number(carry.slot(source), width - 1)
+            carry.write(target, carry.spread(carry.anew(f"load double, ptr {place}, align 8")))
     (slot,) = enter.table(targets)
     enter.write(slot, enter.spread(enter.let(f"load double, ptr {enter.number('%place', enter.row)}, align 8")))
     (slot,) = leave.table(targets)
@@ -41,7 +49,6 @@ def follow(plan: Plan, width: int) -> str:
     source, target = back.table(sources[::-1], targets[::-1])
     back.write(source, back.read(target))
     tables = "\n".join(each.constants for each in (enter, up, down, back, move, leave))
-    extrapolates = plan.extrapolates(width)
     worst = _Worst(plan, width)
     return f"""{tables}
 {worst.declarations}
@@ -57,8 +64,8 @@ entry:
   {enter.loop("entry")}
   br label %head
 head:
-  %at = phi i64 [%from, %enter_end], [%next, %move_end]
-  %smooth = phi i1 [false, %enter_end], [%whole, %move_end]
+  %at = phi i64 [%from, %enter_end], [%next, %carry], [%next, %move_end]
+  %smooth = phi i1 [false, %enter_end], [{str(extrapolates).lower()}, %carry], [false, %move_end]
   %more = icmp slt i64 %at, %stop
   br i1 %more, label %begin, label %end
 begin:
@@ -81,7 +88,7 @@ attempt:
   %left = sub i64 %stop, %at
   %accepted = call i64 @llvm.smin.i64(i64 %leading, i64 %left)
   %next = add i64 %at, %accepted
-  %full = icmp eq i64 %accepted, {width if extrapolates else -1}
+  %full = icmp eq i64 %accepted, {width if quick else -1}
   %further = icmp slt i64 %next, %stop
   %whole = and i1 %full, %further
   %none = icmp eq i64 %accepted, 0
@@ -106,13 +113,14 @@ backward:
   br label %kept
 kept:
   br i1 %whole, label %carry, label %onward
+carry:
+  {carry.text}
+  br label %head
 onward:
   {calls(plan.onward)}
-  br label %carry
-carry:
   %before = sub i64 %accepted, 1
   %last = call i64 @llvm.smax.i64(i64 %before, i64 0)
-  {move.loop("carry")}
+  {move.loop("onward")}
   br label %head
 end:
   {leave.loop("end")}
