@@ -15,8 +15,9 @@ from ..mechanism import Mechanism
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
 from ..program.compiled import available
 from ..trajectory import Array
+from . import following
 from .components import Section
-from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, RATE, RATE_T, SIGMA, TIME, Request
+from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
 from .tracing import Tracing, traced
 
 MAX_ITERATIONS = 12
@@ -70,6 +71,8 @@ class Model:
             self.programs,
             self.slots,
             after=("motion", "outputs") if self.request.order else ("outputs",),
+            alone=following.ALONE,
+            joined=() if self.request.state else following.JOINED,
             onward=() if self.request.order == 2 else ("tangent",),
             sampled=self.sampled,
             carried=tracing.carried,
@@ -90,7 +93,7 @@ class Model:
     def _wanted(self) -> list[str]:
         """Names of the vectors asked for, those of one motion side by side."""
         order = self.request.order + 1
-        found = [*self.state, *(f"predicted {name}" for name in self.state), RATE, RATE_T] if self.request.state else []
+        found = [*self.state, *(PREDICTED + name for name in self.state), RATE, RATE_T] if self.request.state else []
         found += [f"{label} {name}" for name in self.request.points for label in ("position", "velocity", "acceleration")[:order]]
         labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
         return found + [f"{label} {name}" for name in self.request.bodies for group in labels for label in group]

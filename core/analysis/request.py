@@ -46,6 +46,10 @@ GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 """The vectors that tell how a given body moves, and how many numbers each has [units and seconds]."""
 FROM, EARLIER = "from ", "earlier "
 """Before the names of what a lane is predicted from, and of what that was predicted from."""
+PREDICTED = "predicted "
+"""Before the names of the state that a lane was predicted to have."""
+BLOCKS = "", PREDICTED, FROM
+"""The states whose vectors stand one after the other in a lane, each in a block of its own: they are compared slot by slot."""
 
 SIGMA, ORIENTATION = "sigma", "orientation"
 """The slots of an estimate of the smallest singular value of the rows, and of the signs of their determinants (`Elimination`)."""

@@ -25,9 +25,9 @@ from .driven import locked_drivers
 from .elements import Elements, Indices
 from .equations import constraints, measured
 from .factors import Factors, SingularError
+from .following import ABOUT
 from .model import CLOSED, MAX_ITERATIONS
 from .orientation import Blocks
-from .programs import ABOUT
 from .redundancy import RANK_TOLERANCE
 from .request import CONSISTENT
 from .sparse_rows import Jacobian

@@ -16,6 +16,7 @@ from pathlib import Path
 from ..mechanism import Mechanism
 from ..program import ITERATIONS, Program
 from ..program.compiled import available, kept
+from . import following
 from .components import Section
 from .equations import Frames
 from .freedom import Selection
@@ -79,17 +80,20 @@ def _source() -> bytes:
 
 def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> Tracing:
     tracer = Tracer(mechanism, request, section)
-    programs = [tracer.newton(), tracer.predict()]
+    programs = [tracer.newton(), following.predict(tracer)]
     if request.order:
         programs.append(tracer.motion("motion", request.order))
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
         programs.append(tracer.motion("tangent", 2))
         if not request.state:
-            programs.append(tracer.extrapolate())
-    programs += [tracer.outputs(), tracer.test("alone", neighbours=False), tracer.test("joined", neighbours=True)]
+            programs.append(following.extrapolate(tracer))
+    programs.append(tracer.outputs())
+    programs += following.tests(tracer, neighbours=False)
+    if not request.state:  # parts of a mechanism are attempted lane by lane
+        programs += following.tests(tracer, neighbours=True)
     if request.varied:
         programs.append(tracer.prepared.program())
-    carried = tracer.carried
+    carried = following.carried(tracer)
     tracer.layout.scalar(ITERATIONS)
     return Tracing(
         programs,

@@ -22,8 +22,7 @@ class Plan:
     """The programs of a model, and what the loops over its lanes are made of.
 
     An attempt runs `predict`, then `newton` until the slot `residual` of every lane is below the tolerance or not finite, then the
-    programs in `after`, and at last the test whose margin is positive where the lane may be accepted: `alone` for lanes that know
-    nothing of each other, `joined` for lanes that are neighbours on one way.
+    programs in `after`, and at last those of a test, whose margin is positive where the lane may be accepted.
 
     Where there is a program `extrapolate` it takes the place of `predict` for lanes that follow a group that was accepted whole:
     it goes by what stands in those lanes, so that `onward` need not be run for them.
@@ -32,6 +31,7 @@ class Plan:
         programs: by name; they share one layout of slots.
         slots: place of every scalar in a lane, by name.
         after: names of the programs that end an attempt.
+        alone, joined: names of the programs that test lanes: that know nothing of each other, or are neighbours on one way.
         onward: names of the programs that make a solved lane ready to be predicted from.
         sampled: slots that are given anew at every sample.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
@@ -47,6 +47,8 @@ class Plan:
     programs: Mapping[str, Program]
     slots: Mapping[str, int]
     after: Sequence[str] = ()
+    alone: Sequence[str] = ()
+    joined: Sequence[str] = ()
     onward: Sequence[str] = ()
     sampled: Sequence[int] = ()
     carried: Sequence[tuple[int, int]] = ()

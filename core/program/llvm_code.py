@@ -1,4 +1,4 @@
-"""Programs as LLVM code: straight lines over a vector of lanes; the loops around them are in llvm_loops.
+"""LLVM code over a vector of lanes, line by line; what is written of it is in llvm_programs, llvm_loops and llvm_follow.
 
 The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are reduced and summed in place. The W
 lanes of a vector stand together in memory, slot by slot: what a program touches is one stretch of a few kilobytes.
@@ -8,26 +8,21 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterable, Sequence
-
-from .straight_line import Program
-from .trace import LEAVES, Node, operands, place_of
+from collections.abc import Sequence
 
 # The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after reduction.
 SINE_TERMS, COSINE_TERMS = 9, 9
 # pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
 HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 BINARY = {"+": "fadd contract", "-": "fsub contract", "*": "fmul contract", "/": "fdiv contract"}
-# Values held at once, of 32 registers: LLVM's own schedule moves lines about. With 16, narrower vectors, LLVM does as well alone.
-HELD, WIDE = 24, 8
 CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
 
 class Lines:
     """The body of a function over vectors of W lanes, written line by line in single assignment."""
 
-    def __init__(self, width: int, prefix: str = "x") -> None:
-        self.width, self.prefix, self.lines = width, prefix, list[str]()
+    def __init__(self, width: int, prefix: str = "x", lane: str = "%lane") -> None:
+        self.width, self.prefix, self.lines, self._lane = width, prefix, list[str](), lane
         self.vector = f"<{width} x double>"
         self._known: dict[str, str] = {}
 
@@ -72,7 +67,7 @@ class Lines:
 
     def slot(self, number: str | int) -> str:
         """Where a slot of the lanes stands."""
-        return self.let(f"getelementptr {self.vector}, ptr %lane, i64 {number}")
+        return self.let(f"getelementptr {self.vector}, ptr {self._lane}, i64 {number}")
 
     def read(self, number: str | int) -> str:
         """A slot of the lanes."""
@@ -153,119 +148,6 @@ class Lines:
                 f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]}, <{self.width} x i32> <{order}>"
             )
         return self.trigonometric(operands[0], {"sin": 0.0, "cos": 1.0}[op])
-
-
-def function(program: Program, width: int) -> str:
-    """A program as a function of its W lanes."""
-    return f"define internal void @{program.name}(ptr %lane) {{\n  {_Straight(program, width).text}\n  ret void\n}}\n"
-
-
-class _Straight(Lines):
-    """The lines of a program that holds no more values at once than there are registers for.
-
-    What is too much goes to memory: that which is used again last (Belady 1966), inputs to where they came from. Left to itself,
-    LLVM's allocator takes as long for that as all else together, and its code is a few percent slower.
-    """
-
-    def __init__(self, program: Program, width: int) -> None:
-        super().__init__(width)
-        self._nodes, self._most = program.nodes, HELD if width == WIDE else len(program.nodes)
-        self._held, self._masks = dict[int, str](), dict[int, str]()
-        self._stacked, self._free, self._room = dict[int, int](), list[int](), 0
-        self._due, writes = _uses(program)
-        self._sizes = set[int]()  # values without a sign
-        for number, node in enumerate(program.nodes):
-            if node[0] not in LEAVES:
-                self._step(number, node)
-                if number in writes:
-                    self._write_all(writes[number])
-        self._write_all(writes.get(len(program.nodes), ()))
-        if self._room:
-            self.lines.insert(0, f"%stack = alloca {self.vector}, i64 {self._room}, align 64")
-
-    def _step(self, number: int, node: Node) -> None:
-        wanted = operands(node)
-        values = [self._held.get(k) or self._fetched(k, wanted) for k in wanted]
-        sizes = node[0] == "max" and self._sizes.issuperset(wanted)
-        if sizes or node[0] == "abs":
-            self._sizes.add(number)
-        result = self.larger_size(*values) if sizes else self.operation(node[0], values)
-        self._used(wanted)
-        if node[0] == "larger":
-            self._masks[number] = result
-        else:
-            self._hold(number, result, ())
-
-    def _write_all(self, writes: Sequence[tuple[int, int]]) -> None:
-        """Write slots; all that stands in slots is read before."""
-        values = [(slot, self._held.get(k) or self._fetched(k, ())) for slot, k in writes]
-        for slot, value in values:
-            self.write(slot, value)
-        self._used(k for _, k in writes)
-
-    def _fetched(self, k: int, wanted: Sequence[int]) -> str:
-        """The name of a value that is not held; for it, none of those wanted with it is given up."""
-        node = self._nodes[k]
-        if node[0] == "const":
-            return self.constant(float(node[1]))
-        if node[0] == "larger":
-            return self._masks[k]
-        if node[0] == "node":
-            place = self.number(self.slot(int(node[1])), place_of(int(node[2]), self.width))
-            name = self.spread(self.anew(f"load double, ptr {place}, align 8"))
-        else:
-            place = self.slot(int(node[1])) if node[0] == "input" else self._place(self._stacked[k])
-            name = self.anew(f"load {self.vector}, ptr {place}, align 8")
-        self._hold(k, name, wanted)
-        return name
-
-    def _hold(self, k: int, name: str, wanted: Sequence[int]) -> None:
-        if len(self._held) >= self._most:
-            last = max((x for x in self._held if x not in wanted), key=lambda x: self._due[x][-1])
-            value = self._held.pop(last)
-            if self._nodes[last][0] not in LEAVES and last not in self._stacked:
-                if not self._free:
-                    self._free.append(self._room)
-                    self._room += 1
-                self._stacked[last] = self._free.pop()
-                self.lines.append(f"store {self.vector} {value}, ptr {self._place(self._stacked[last])}, align 8")
-        self._held[k] = name
-
-    def _used(self, values: Iterable[int]) -> None:
-        """What will not be used again needs no place any more."""
-        for k in values:
-            due = self._due[k]
-            due.pop()
-            if not due:
-                self._held.pop(k, None)
-                if k in self._stacked:
-                    self._free.append(self._stacked.pop(k))
-
-    def _place(self, number: int) -> str:
-        return self.let(f"getelementptr {self.vector}, ptr %stack, i64 {number}")
-
-
-def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, int]]]]:
-    """By value, the operations that use it, the first one last; by operation, the slots written after it, with their values.
-
-    A slot is written as soon as its value is there and nothing is to read what stood in it before.
-    """
-    nodes, end = program.nodes, len(program.nodes)
-    due: list[list[int]] = [[] for _ in nodes]
-    for number in reversed(range(end)):
-        for k in operands(nodes[number]):
-            due[k].append(number)
-    last_read: dict[int, int] = {}
-    for k, node in enumerate(nodes):
-        if node[0] in ("input", "node") and due[k]:
-            last_read[int(node[1])] = max(due[k][0], last_read.get(int(node[1]), 0))
-    last_read |= {int(nodes[k][1]): end for k in program.outputs.values() if nodes[k][0] in ("input", "node")}
-    writes: dict[int, list[tuple[int, int]]] = {}
-    for slot, k in program.outputs.items():
-        when = end if nodes[k][0] in LEAVES else max(k, last_read.get(slot, 0))
-        writes.setdefault(when, []).append((slot, k))
-        due[k] = sorted([*due[k], when], reverse=True)
-    return due, writes
 
 
 def declarations(width: int) -> str:

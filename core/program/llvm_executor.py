@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from . import compiled, llvm_code, llvm_follow, llvm_loops, llvm_tables
+from . import compiled, llvm_code, llvm_follow, llvm_loops, llvm_programs, llvm_tables
 from .executor import Parts, Plan, Side
 
 LINE, BYTES = 8, 8
 """Numbers in a cache line, and bytes of a number."""
 OUT = llvm_follow.MOTION.index("ptr out")
+SOURCES = llvm_code, llvm_follow, llvm_loops, llvm_programs, llvm_tables
+"""Modules that write the text."""
 LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], int]] = {
     "follow": (llvm_follow.follow, 5),
     "fan": (llvm_loops.fan, 10),
@@ -35,16 +37,16 @@ class LlvmCode:
         if plan.after:
             signatures["attempt"] = 2
         # what determines the text; writing that takes longer than loading the code it means
-        content = [plan, self.width, *(inspect.getsource(each) for each in (llvm_code, llvm_follow, llvm_loops, llvm_tables))]
+        content = [plan, self.width, *(inspect.getsource(each) for each in SOURCES)]
         self._owner, self.functions = compiled.load(repr(content), self._text, signatures)
 
     def _text(self) -> str:
         plan, width, slots = self.plan, self.width, len(self.plan.slots)
-        text = [llvm_code.function(program, width) for program in plan.programs.values()]
+        text = [llvm_programs.function(program, width) for program in plan.programs.values()]
         text += [llvm_loops.over_groups(f"run_{name}", [name], slots, width) for name in plan.programs]
         if plan.after:  # a plan that is only run makes no attempt
             text.append(llvm_loops.settle(plan, width))
-            text.append(llvm_loops.over_groups("attempt", ["predict", "settle", "alone"], slots, width))
+            text.append(llvm_loops.over_groups("attempt", ["predict", "settle", *plan.alone], slots, width))
         text += [LOOPS[loop][0](plan, width) for loop in plan.loops]
         return "\n".join([*text, llvm_code.declarations(width)])
 

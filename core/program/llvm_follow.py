@@ -79,7 +79,7 @@ predict:
   br label %attempt
 attempt:
   call void @settle(ptr %lane)
-  call void @joined(ptr %lane)
+  {calls(plan.joined)}
   {test.text}
   %bits = bitcast <{width} x i1> {accepted} to i{width}
   %wide = zext i{width} %bits to i64

@@ -98,7 +98,7 @@ sample:
   {begin.text}
   call void @predict(ptr %lane)
   call void @settle(ptr %lane)
-  call void @alone(ptr %lane)
+  {calls(plan.alone)}
   {test.text}
   %still = and {mask} %alive, {accepted}
   {keep.text}
@@ -155,7 +155,7 @@ group:
   {begin.text}
   call void @predict(ptr %lane)
   call void @settle(ptr %lane)
-  call void @alone(ptr %lane)
+  {calls(plan.alone)}
   {keep.text}
   %next = add i64 %g, 1
   %more = icmp slt i64 %next, %groups

@@ -22,7 +22,7 @@ def _max(a: Array, b: Array, out: Array) -> None:
 
 
 def _before(x: Array, first: Array, out: Array) -> None:
-    out[0], out[1:] = first[0], x[:-1]
+    out[..., 0], out[..., 1:] = first[..., 0], x[..., :-1]
 
 
 _UFUNCS: dict[str, Callable[..., Any]] = {
@@ -52,6 +52,10 @@ def _where(m: Array, p: Array, q: Array, out: Array) -> None:
     np.copyto(out, p, where=m)
 
 
+def _largest(out: Array, values: Array) -> None:
+    np.maximum.reduce(values, axis=0, out=out)
+
+
 class NumpyExecutor:
     """A plan bound to a block of lanes, shape (slots, lanes)."""
 
@@ -61,7 +65,6 @@ class NumpyExecutor:
         self.lanes = lanes
         self.block: Array = np.zeros((len(plan.slots), lanes))
         self.plan = plan
-        self._scratch = np.empty((2, lanes))
         self._calls: dict[str, list[Call]] = {}
 
     def clear(self) -> None:
@@ -86,9 +89,9 @@ class NumpyExecutor:
 
     def attempt(self) -> None:
         """See `Executor`."""
-        self.settle("predict", "alone")
+        self.settle("predict", self.plan.alone)
 
-    def settle(self, start: str, test: str) -> None:
+    def settle(self, start: str, tests: Sequence[str]) -> None:
         """Attempt all lanes: predict, iterate and test by the programs of these names."""
         slots = self.plan.slots
         residual, iterations = (self.block[slots[name]] for name in ("residual", ITERATIONS))
@@ -104,7 +107,8 @@ class NumpyExecutor:
         for name in self.plan.after:
             self.run(name)
         self.block[slots[DONE]] = done
-        self.run(test)
+        for name in tests:
+            self.run(name)
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:
         """See `Executor`."""
@@ -150,6 +154,9 @@ class NumpyExecutor:
 
     def _bind(self, program: Program) -> list[Call]:
         """Give every operation a register; a register is free again after its last reader."""
+        times, block = program.times, self.block
+        shape = self.lanes if times == 1 else (times, self.lanes)
+        scratch = np.empty((2, self.lanes)) if times == 1 else np.empty((2, times, self.lanes))
         last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
         kept = set(program.outputs.values())
         place: list[Any] = []
@@ -157,7 +164,8 @@ class NumpyExecutor:
         calls: list[Call] = []
         for k, (op, *rest) in enumerate(program.nodes):
             if op == "input":
-                place.append(self.block[int(rest[0])])
+                slot = int(rest[0])
+                place.append(block[slot] if times == 1 else block[slot : slot + times])
                 continue
             if op == "node":
                 lane = place_of(int(rest[1]), self.lanes)
@@ -168,11 +176,11 @@ class NumpyExecutor:
                 continue
             arguments = [int(x) for x in rest]
             kind = np.bool_ if op == "larger" else np.float64
-            out = free[kind].pop() if free[kind] else np.empty(self.lanes, kind)
+            out = free[kind].pop() if free[kind] else np.empty(shape, kind)
             place.append(out)
             read = [place[x] for x in arguments]
             if op == "larger":
-                calls.append((_larger, (*read, *self._scratch, out)))
+                calls.append((_larger, (*read, *scratch, out)))
             else:
                 calls.append((_where if op == "where" else _UFUNCS[op], (*read, out)))
             for x in set(arguments):
@@ -180,11 +188,11 @@ class NumpyExecutor:
                     free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
         for node in kept:  # an input that is put out elsewhere must survive the output that overwrites its slot
             if program.nodes[node][0] == "input":
-                copy = np.empty(self.lanes)
+                copy = np.empty(shape)
                 calls.append((np.copyto, (copy, place[node])))
                 place[node] = copy
-        calls += [(np.copyto, (self.block[slot], place[node])) for slot, node in program.outputs.items()]
-        return calls
+        write = np.copyto if times == 1 else _largest
+        return calls + [(write, (block[slot], place[node])) for slot, node in program.outputs.items()]
 
 
 class NumpyTrack:
@@ -212,7 +220,7 @@ class NumpyTrack:
             count = min(lanes, stop - at)
             block[sampled, :count] = samples[:, at : at + count]
             block[sampled, count:] = samples[:, stop - 1 : stop]
-            executor.settle("extrapolate" if smooth else "predict", "joined")
+            executor.settle("extrapolate" if smooth else "predict", plan.joined)
             good = block[plan.slots[MARGIN], :count] > 0.0
             accepted = count if good.all() else int(good.argmin())
             if accepted:

@@ -20,16 +20,20 @@ class Program:
     Attributes:
         nodes: the live operations only; operands are positions in this tuple.
         outputs: slot -> position of the node it takes. All outputs are written after the last input was read.
+        times: it is run so often, every input one slot further each time, and of what it puts out the largest is taken; those
+            outputs are sizes, not negative. NaN is larger than any number.
     """
 
     name: str
     nodes: tuple[Node, ...]
     outputs: Mapping[int, int]
+    times: int = 1
 
     @property
     def operations(self) -> Counter[str]:
         """How often each operation occurs."""
-        return Counter(node[0] for node in self.nodes)
+        found = Counter({op: self.times * count for op, count in Counter(node[0] for node in self.nodes).items()})
+        return found + Counter({"max": len(self.outputs) * (self.times - 1)})
 
     @cached_property
     def flops(self) -> int:
@@ -37,7 +41,7 @@ class Program:
         return sum(count for op, count in self.operations.items() if op in FLOPS)
 
 
-def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prepared | None = None) -> Program:
+def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prepared | None = None, times: int = 1) -> Program:
     """The part of the tape that the outputs (slot -> scalar) need; what is prepared is read from its slot."""
     wanted = {slot: tape.number(value) for slot, value in outputs.items()}
     live: dict[int, Node] = {}
@@ -51,7 +55,7 @@ def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prep
     nodes = tuple(
         node if node[0] in LEAVES else (node[0], *(position[int(x)] for x in node[1:])) for _, node in sorted(live.items())
     )
-    return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()})
+    return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()}, times)
 
 
 class Prepared:

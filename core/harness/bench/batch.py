@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import msgspec
 import numpy as np
 
+from ...analysis.following import ALONE
 from ...analysis.geometry import places
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
@@ -91,7 +92,7 @@ def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float
     reached = int(found.solved.sum())
     taken: list[float] = found.kept[model.rows["iterations"].start][found.solved].tolist()
     iterations = statistics.fmean(taken) if taken else 0.0
-    flops = flops_of(model, iterations, "alone")
+    flops = flops_of(model, iterations, ALONE)
     rate = flops * reached / seconds.median
     return Batch(
         case=case.name,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...analysis.following import JOINED
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
@@ -100,10 +101,10 @@ def loops_alone(case: Case, tol: float) -> Callable[[], None]:
     return work
 
 
-def flops_of(model: Model, iterations: float, test: str = "joined") -> float:
+def flops_of(model: Model, iterations: float, test: Sequence[str] = JOINED) -> float:
     """Floating-point operations of a sample: predictor, Newton's iterations, rates, outputs and the test of a solution.
 
     Those of lanes that were computed and not accepted, or iterated on because a neighbour did, do not count.
     """
     sizes = {name: each["flops"] for name, each in model.sizes.items()}
-    return sizes["predict"] + iterations * sizes["newton"] + sizes["motion"] + sizes["outputs"] + sizes[test]
+    return sizes["predict"] + iterations * sizes["newton"] + sizes["motion"] + sizes["outputs"] + sum(sizes[name] for name in test)

@@ -1,0 +1,146 @@
+"""Programs that follow a motion: what lanes are predicted from, how, and which of them are accepted (see `programs`).
+
+predict   from state, v, a and time; time    -> state        Taylor step of second order
+extrapolate   states and times of a group of lanes; time   -> state        through `NODES` of them, without v and a
+gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
+alone, joined   all that is tested, and the tolerance   -> margin    positive where a lane may be accepted
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import mul
+
+from ..algebra import Scalar
+from ..program import DONE, MARGIN, NODES, Program, absolute, before, maximum, minimum, program, where_larger
+from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
+from .programs import Tracer
+from .request import ACCEPT, BLOCKS, EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, STOOD, TIME
+
+EULER_PARAMETERS = 4
+ABOUT = 1.5
+"""A step may be this much longer than the one it learns from."""
+ALONE, JOINED = ("alone_gaps", "alone"), ("joined_gaps", "joined")
+"""The programs of the two tests: of lanes that know nothing of each other, and of neighbours on one way."""
+GAPS = GAP, MOVED, REACH = "gap", "moved", "reach"
+"""Slots of the largest change of a correction, of a component of the state, and of its distance from the start."""
+
+
+def carried(tracer: Tracer) -> list[tuple[int, int]]:
+    """Slots of a solved lane, and of what the lanes after it are predicted from."""
+    sizes = {name: len(value) for name, value in tracer.formulation.design.items()}
+    sizes |= {PREDICTED + name: count for name, count in sizes.items()}
+    sizes |= {RATE: tracer.unknowns, RATE_T: tracer.unknowns}
+    pairs = [(tracer.layout.scalar(FROM + TIME), tracer.layout.scalar(EARLIER + TIME))]
+    pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in (TIME, SIGMA, ORIENTATION, LARGEST_SIGMA)]
+    pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(name)) for name in ACCEPT]
+    for name, count in sizes.items():
+        pairs += zip(tracer.layout.vector(name, count), tracer.layout.vector(FROM + name, count), strict=True)
+    return pairs
+
+
+def predict(tracer: Tracer) -> Program:
+    """The state at the time by a Taylor step of second order, and what the last such step lacked.
+
+    That is of third order, whatever the coordinates: it grows by the cube of the step. It is known where the step before was
+    about as long as this one, or longer.
+    """
+    read, vector = tracer.read, tracer.vector
+    time, here, earlier = (read(label + TIME) for label in ("", FROM, EARLIER))
+    h, h_before = time - here, here - earlier
+    v, a = vector(FROM + RATE, tracer.unknowns), vector(FROM + RATE_T, tracer.unknowns)
+    step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
+    start = {name: vector(FROM + name, len(value)) for name, value in tracer.formulation.design.items()}
+    taylor = tracer.formulation.retract(tracer.formulation.configuration(start), step)
+    part = h / h_before
+    lack = where_larger(ABOUT * h_before, h, part * part * part, 0.0)
+    out: dict[int, Scalar] = {}
+    corrected: dict[str, list[Scalar]] = {}
+    for name, value in taylor.items():
+        tracer.store(out, PREDICTED + name, value)  # kept, to see what the iteration makes of it
+        solved, predicted = start[name], vector(FROM + PREDICTED + name, len(value))
+        corrected[name] = [x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)]
+        corrected[name] = _of_length_one(corrected[name])
+    tracer.store_state(out, corrected)
+    return program("predict", tracer.tape, out, tracer.prepared)
+
+
+def extrapolate(tracer: Tracer) -> Program:
+    """The state at the time by Lagrange's formula, through nodes of the group of lanes before; NaN where two share a time."""
+    time, layout = tracer.read(TIME), tracer.layout
+    nodes = [tracer.tape.at(k, layout.scalar(STOOD)) for k in range(NODES)]
+    weights: list[Scalar] = []
+    for node in nodes:
+        others = [each for each in nodes if each is not node]
+        weights.append(reduce(mul, (time - each for each in others)) / reduce(mul, (node - each for each in others)))
+    out: dict[int, Scalar] = {}
+    for name, value in tracer.formulation.design.items():
+        slots = layout.vector(name, len(value))
+        found = [sum((w * tracer.tape.at(k, slot) for k, w in enumerate(weights)), 0.0) for slot in slots]
+        for label in (name, PREDICTED + name):
+            tracer.store(out, label, _of_length_one(found))
+    return program("extrapolate", tracer.tape, out, tracer.prepared)
+
+
+def tests(tracer: Tracer, *, neighbours: bool) -> list[Program]:
+    """The programs of a test."""
+    gaps, margin = JOINED if neighbours else ALONE
+    return [_gaps(tracer, gaps, neighbours=neighbours), _margin(tracer, margin, neighbours=neighbours)]
+
+
+def _gaps(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
+    """How far a lane is from where it should be by the lane before it, or where lanes are no neighbours by the start: the largest
+    of all components of the state.
+
+    The correction that Newton made of the prediction changes from the lane before, or from nothing at the start, by much less
+    than the pose does, where it is the same motion.
+    """
+    design = tracer.formulation.design
+    blocks = [[slot for each in design for slot in tracer.layout.vectors[label + each]] for label in BLOCKS]
+    times = len(blocks[0])
+    assert all(block == list(range(block[0], block[0] + times)) for block in blocks)
+    x, predicted, start = (tracer.tape.input(block[0]) for block in blocks)
+    x_before, predicted_before = (before(x, start), before(predicted, start)) if neighbours else (start, start)
+    sizes = (x - predicted) - (x_before - predicted_before), x - x_before, x - start
+    out = {tracer.layout.scalar(label): absolute(size) for label, size in zip(GAPS, sizes, strict=True)}
+    return program(name, tracer.tape, out, times=times)
+
+
+def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
+    """By how much a lane passes all tests of a solution: it has converged, closes, is on its branch, agrees with the
+    redundant rows, and continues the motion it is predicted from.
+
+    The last is seen from its gaps, and from sigma. No lane is taken that is far from there, nor one beyond a singular pose: whether
+    the motion passes it, or turns round a corner before it, is not seen from afar.
+    """
+    read = tracer.read
+    tol, consistent, crossing = (read(label) for label in ACCEPT)
+    closure, sigma, turned = (read(name) for name in ("closure", SIGMA, ORIENTATION))
+    sigma_before, turned_before, largest = (read(FROM + name) for name in (SIGMA, ORIENTATION, LARGEST_SIGMA))
+    largest = maximum(sigma, largest)
+    if neighbours:
+        sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
+    uncertain = (WORSE * largest) * maximum(closure, EPSILON)
+    margins = (
+        read(DONE) - 0.5,
+        tol - closure,
+        consistent - read("leftover"),
+        read("branch"),
+        LARGEST_CORRECTION * read(MOVED) + NEGLIGIBLE - read(GAP),
+        LONGEST_STEP - read(REACH),
+        (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
+        0.5 - absolute(turned - turned_before) + crossing,
+        FOLLOWED * sigma * sigma - uncertain,
+        maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
+    )
+    out = {tracer.layout.scalar(MARGIN): reduce(minimum, margins), tracer.layout.scalar(LARGEST_SIGMA): largest}
+    out |= {tracer.layout.scalar(STOOD): read(TIME)} if neighbours else {}
+    return program(name, tracer.tape, out, tracer.prepared)
+
+
+def _of_length_one(value: list[Scalar]) -> list[Scalar]:
+    """Euler parameters of length one, up to the square of what they lack; any other vector as it is."""
+    if len(value) != EULER_PARAMETERS:
+        return value
+    k = 1.5 - 0.5 * sum((x * x for x in value), 0.0)
+    return [k * x for x in value]
