@@ -61,6 +61,11 @@ class Plan:
     tolerance: float = 0.0
     most: int = 0
 
+    @property
+    def single(self) -> list[str]:
+        """Names of the programs that may be run by themselves; the others occur in attempts only."""
+        return [name for name in self.programs if name not in ("predict", "extrapolate", *self.alone, *self.joined)]
+
     def extrapolates(self, lanes: int) -> bool:
         """Whether a group of that many lanes is followed by extrapolation."""
         return "extrapolate" in self.programs and lanes >= NODES
@@ -125,7 +130,7 @@ class Executor(Protocol):
         ...
 
     def run(self, name: str) -> None:
-        """Run one program over all lanes."""
+        """Run one program over all lanes, one of `Plan.single`."""
         ...
 
     def attempt(self) -> None:

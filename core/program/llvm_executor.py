@@ -33,7 +33,7 @@ class LlvmCode:
 
     def __init__(self, plan: Plan) -> None:
         self.width, self.plan = compiled.vector_width(), plan
-        signatures = {f"run_{name}": 2 for name in plan.programs} | {loop: LOOPS[loop][1] for loop in plan.loops}
+        signatures = {f"run_{name}": 2 for name in plan.single} | {loop: LOOPS[loop][1] for loop in plan.loops}
         if plan.after:
             signatures["attempt"] = 2
         # what determines the text; writing that takes longer than loading the code it means
@@ -43,7 +43,7 @@ class LlvmCode:
     def _text(self) -> str:
         plan, width, slots = self.plan, self.width, len(self.plan.slots)
         text = [llvm_programs.function(program, width) for program in plan.programs.values()]
-        text += [llvm_loops.over_groups(f"run_{name}", [name], slots, width) for name in plan.programs]
+        text += [llvm_loops.over_groups(f"run_{name}", [name], slots, width) for name in plan.single]
         if plan.after:  # a plan that is only run makes no attempt
             text.append(llvm_loops.settle(plan, width))
             text.append(llvm_loops.over_groups("attempt", ["predict", "settle", *plan.alone], slots, width))

@@ -75,7 +75,7 @@ class Prepared:
         """The node, or where it is prepared the input that reads it."""
         node = self.tape.nodes[number]
         # a decision is no number that a slot could hold: it is made anew of what is prepared
-        if node[0] in LEAVES or node[0] == "larger" or not self._is_fixed(number):
+        if not self._given or node[0] in LEAVES or node[0] == "larger" or not self._is_fixed(number):
             return node
         if number not in self._kept:
             self._kept[number] = self._slot(f"prepared {len(self._kept)}")
