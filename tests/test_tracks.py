@@ -1,0 +1,110 @@
+"""What executors know of a motion they follow again and again: programs run over blocks of slots, tables, and the worst sample."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from kincheck.core.analysis.march import Route, march
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.request import SIGMA, Request
+from kincheck.core.analysis.sweep import follow
+from kincheck.core.motions import Path, Ramp
+from kincheck.core.program import LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program
+from kincheck.core.program.compiled import available
+
+from .mechanisms import four_bar, mcpherson
+
+COMPILED = [False, pytest.param(True, marks=pytest.mark.skipif(not available(), reason="llvmlite is not installed"))]
+TOL = 1e-12
+
+
+def route_of(mechanism, driver, values, *, compiled=True, order=2):
+    request = Request((driver,), tuple(point.name for point in mechanism.points), order=order, compiled=compiled)
+    return Route(compile_model(mechanism, request), Path({driver: Ramp(1.0)}, np.asarray(values, dtype=float)))
+
+
+@pytest.mark.parametrize("lanes", [1, 7, 8, 19])
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
+    """Blocks of five slots: x from 0 on, y from 5 on."""
+    times, tape = 5, Tape()
+    x, y = tape.input(0), tape.input(times)
+    traced = program("f", tape, {10: absolute(x - y), 11: absolute(before(x, y) * 2.0)}, times=times)
+    plan = Plan({"f": traced}, {str(k): k for k in range(12)})
+    executor = LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    values = np.random.default_rng(3).normal(size=(10, lanes))
+    values[7, -1] = math.nan
+    executor.put(range(10), values)
+    executor.run("f")
+    xs, ys = values[:times], values[times:]
+    shifted = np.roll(xs, 1, axis=1)
+    group = executor.margin if compiled else lanes  # lanes are neighbours within a vector
+    shifted[:, ::group] = ys[:, ::group]
+    wanted = np.abs(xs - ys).max(axis=0), np.abs(2.0 * shifted).max(axis=0)
+    assert np.isnan(wanted[0]).tolist() == [False] * (lanes - 1) + [True]
+    np.testing.assert_array_equal(executor.get([10, 11]), wanted)
+
+
+def test_flops_of_a_program_are_those_of_all_its_runs():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(5)
+    once, five = (program("f", tape, {10: absolute(x - y)}, times=times) for times in (1, 5))
+    assert (once.flops, five.flops) == (2, 14)  # and four times the larger of two
+
+
+SWEEPS = {
+    "every sample": (mcpherson, "stroke", np.linspace(-0.05, 0.05, 33)),
+    "an end on one side": (mcpherson, "stroke", np.linspace(-0.05, 0.4, 46)),
+    "steps that are divided": (four_bar, "turn", np.linspace(0.0, 6.0, 5)),
+}
+
+
+@pytest.mark.parametrize("order", [0, 2])
+@pytest.mark.parametrize("sweep", SWEEPS)
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_the_worst_is_that_of_the_samples_that_are_kept(compiled, sweep, order):
+    make, driver, values = SWEEPS[sweep]
+    route = route_of(make(), driver, values, compiled=compiled, order=order)
+    for _ in range(2):
+        found = march(route, TOL)
+        assert found.solved.all() == (sweep != "an end on one side")
+        closure, leftover, sigma = (
+            found.kept[route.model.rows[name].start, found.solved] for name in ("closure", "leftover", SIGMA)
+        )
+        assert found.worst == [closure.max(), leftover.max(), sigma.min()]
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_the_worst_of_a_march_before_is_forgotten(compiled):
+    route = route_of(mcpherson(), "stroke", np.linspace(0.0, 0.2, 41), compiled=compiled)
+    whole, half = march(route, TOL), march(route, TOL, visit={20})
+    sigma = half.kept[route.model.rows[SIGMA].start, :21]
+    assert half.worst[-1] == sigma.min() > whole.worst[-1]
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_sweeps_of_one_model_leave_each_other_alone(compiled):
+    """Whatever was swept in between, by whatever tolerance: the same bits, and what was given away stays as it was."""
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33), compiled=compiled)
+    other = Route(route.model, Path({"stroke": Ramp(1.0)}, np.linspace(0.02, 0.3, 33)))
+    first = follow(route, TOL).points["wheel"]
+    was = first.position.copy(), first.acceleration.copy()
+    follow(other, TOL)
+    assert not march(route, 1e-19).solved.all()
+    again = follow(route, TOL).points["wheel"]
+    assert not np.shares_memory(first.position, again.position)
+    for now in (first, again):
+        np.testing.assert_array_equal(now.position, was[0])
+        np.testing.assert_array_equal(now.acceleration, was[1])
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_a_route_may_be_swept_by_several_threads(compiled):
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), compiled=compiled)
+    alone = follow(route, TOL).points["wheel"].acceleration.copy()
+    with ThreadPoolExecutor(4) as threads:
+        for found in threads.map(lambda _: follow(route, TOL), range(24)):
+            np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
