@@ -61,7 +61,7 @@ class LlvmExecutor:
         self.lanes, self.margin, self._code = lanes, code.width, code
         self._groups = self.groups(lanes)
         slots = len(code.plan.slots)
-        self._memory = _aligned(self._groups * slots, code.width).reshape(self._groups, slots, code.width)
+        self._memory = _aligned(self._groups * slots * code.width).reshape(self._groups, slots, code.width)
         self.clear()
         self._address = _address(self._memory)
 
@@ -152,12 +152,11 @@ class LlvmTrack:
         return self._follow(*self._given[side], self._places[anew], at, stop)
 
 
-def _aligned(rows: int, columns: int) -> Array:
-    """Room for numbers, at least as many columns: every row begins with a cache line, so that no vector is in two of them."""
-    columns += -columns % LINE
-    room = np.empty(rows * columns + LINE)
+def _aligned(count: int) -> Array:
+    """Room for numbers that begins with a cache line, so that no vector is in two of them."""
+    room = np.empty(count + LINE)
     start = -(_address(room) // BYTES) % LINE
-    return room[start : start + rows * columns].reshape(rows, columns)
+    return room[start : start + count]
 
 
 def _address(array: NDArray[Any]) -> int:
