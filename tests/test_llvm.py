@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kincheck.core import Revolute, solve
+from kincheck.core import Revolute, solve, solve_designs
 from kincheck.core.analysis import tracing
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.model import compile_model
@@ -35,6 +35,7 @@ from kincheck.core.program import (
 from kincheck.core.program import compiled as code
 
 from .mechanisms import four_bar, mcpherson
+from .test_chain import chain
 
 llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
@@ -220,3 +221,32 @@ def test_without_llvmlite_numpy_takes_over(monkeypatch):
 
 def test_the_width_is_that_of_the_processor():
     assert code.vector_width() in (2, 4, 8)
+
+
+WAYS = {
+    "one program": lambda: solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points,
+    "one program, positions": lambda: solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33), order=0).points,
+    "components": lambda: solve(chain(8), "turn", np.linspace(-0.5, 0.5, 33)).points,
+    "designs": lambda: (
+        solve_designs(
+            mcpherson(),
+            "stroke",
+            [-0.05, 0.0, 0.05],
+            {"joints.tie_rod.points.0": TIE_ROD + np.linspace(0.0, 0.01, 11)[:, None]},
+            order=2,
+        ).points
+    ),
+}
+TIE_ROD = np.array([1.115, 0.665, 0.118])
+
+
+@pytest.mark.parametrize("width", [2, 4])
+@pytest.mark.parametrize("way", WAYS)
+def test_vectors_of_every_width_give_the_same(way, width, monkeypatch):
+    expected = WAYS[way]()
+    monkeypatch.setattr(code, "vector_width", lambda: width)
+    found = WAYS[way]()
+    for name, motion in expected.items():
+        for label, limit in (("position", 2e-15), ("velocity", 2e-14), ("acceleration", 2e-13)):
+            if getattr(motion, label) is not None:
+                assert np.abs(getattr(motion, label) - getattr(found[name], label)).max() <= limit
