@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,8 +71,7 @@ class Motions(Mapping[str, _Motion], Generic[_Motion]):
         return len(self._columns)
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(msgspec.Struct, frozen=True, eq=False):  # a frozen dataclass takes ten times as long to make, 2 us of 40
     """The motion of all wanted points over the samples of a sweep, in the order of the sweep.
 
     Attributes:
@@ -90,4 +90,4 @@ class Trajectory:
     residual: float
     message: str
     details: Mapping[str, Any]
-    bodies: Mapping[str, BodyMotion] = field(default_factory=dict[str, BodyMotion])
+    bodies: Mapping[str, BodyMotion] = msgspec.field(default_factory=dict[str, BodyMotion])

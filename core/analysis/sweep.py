@@ -36,14 +36,18 @@ def follow(route: Route, tol: float) -> Trajectory:
         closure, leftover, sigma = _worst(found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved])
         message, findings = "; ".join(scrutiny.messages), scrutiny.details
     iterations, table, unit = found.kept[rows[ITERATIONS].start], found.kept.T, model.frame.unit
-    tests = {"redundant_residual": leftover * unit, "smallest_singular_value": min(1.0, sigma)}
     return Trajectory(
         points=Motions(PointMotion, table, model.of_points),
         solved=found.solved,
         iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
         residual=closure * unit,
         message=message,
-        details={**model.details, **tests, **findings},
+        details={
+            **model.details,
+            "redundant_residual": leftover * unit,
+            "smallest_singular_value": min(1.0, sigma),
+            **findings,
+        },
         bodies=Motions(BodyMotion, table, model.of_bodies),
     )
 

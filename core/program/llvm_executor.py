@@ -17,7 +17,7 @@ from .executor import Parts, Plan, Side
 
 LINE, BYTES = 8, 8
 """Numbers in a cache line, and bytes of a number."""
-OUT = llvm_follow.MOTION.index("ptr out")
+OUT, ANEW = (llvm_follow.MOTION.index(each) for each in ("ptr out", "i64 anew"))
 SOURCES = llvm_code, llvm_follow, llvm_loops, llvm_programs, llvm_tables
 """Modules that write the text."""
 LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], int]] = {
@@ -122,10 +122,8 @@ class LlvmTrack:
 
     def __init__(self, code: LlvmCode, memory: Array, sides: Sequence[Side], start: Array, n: int) -> None:
         plan, width = code.plan, code.width
-        self._follow, self._alive = code.functions["follow"], (code, memory, sides)
         self._start, self.anchor = start.copy(), start.copy()
-        self._nothing = np.repeat([0.0, np.inf], [len(plan.largest), len(plan.smallest)])
-        self.worst = self._nothing.copy()
+        self.worst = np.zeros(len(plan.largest) + len(plan.smallest))
         below = min((side.first for side in sides if side.step > 0), default=n)
         margin = width + -below % width  # a vector may be written beyond either end
         row = margin + n + width
@@ -134,9 +132,11 @@ class LlvmTrack:
         self._room = len(plan.kept) * row + LINE
         self._places = {True: _address(self._start), False: _address(self.anchor)}
         # in the order of llvm_follow.MOTION and SIDE
-        self._motion = np.array([_address(memory), _address(self.anchor), _address(self.worst), 0, row], np.int64)
+        self._motion = np.array([_address(memory), _address(self.anchor), _address(self.worst), 0, row, 1], np.int64)
         self._sides = [np.array([_address(s.samples), s.samples.shape[1], margin + s.first, s.step], np.int64) for s in sides]
-        self._given = [(_address(self._motion), _address(each)) for each in self._sides]
+        follow, motion = code.functions["follow"], _address(self._motion)
+        self._follow = [partial(follow, motion, _address(each)) for each in self._sides]
+        self._alive = code, memory, sides  # their addresses are held
 
     def begin(self) -> Array:
         """See `Track`."""
@@ -144,12 +144,12 @@ class LlvmTrack:
         address = _address(room)
         skip = -address % (LINE * BYTES)
         self._motion[OUT] = address + skip
-        self.worst[:] = self._nothing
+        self._motion[ANEW] = 1
         return np.ndarray(self._shape, np.float64, room, skip + self._margin, self._strides)
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
         """See `Track`."""
-        return self._follow(*self._given[side], self._places[anew], at, stop)
+        return self._follow[side](self._places[anew], at, stop)
 
 
 def _aligned(count: int) -> Array:

@@ -9,9 +9,11 @@ from .llvm_code import Lines
 from .llvm_loops import calls
 from .llvm_tables import Rows
 
-MOTION = ("ptr lane", "ptr anchor", "ptr worst", "ptr out", "i64 row")
+MOTION = ("ptr lane", "ptr anchor", "ptr worst", "ptr out", "i64 row", "i64 anew")
 SIDE = ("ptr samples", "i64 stride", "i64 first", "i64 step")
-"""What `follow` is told of a motion and of one of its sides, eight bytes each: few arguments make a quick call."""
+"""What `follow` is told of a motion and of one of its sides, eight bytes each: few arguments make a quick call. The first call of a
+march sets "anew" to zero: the worst is that of all its calls.
+"""
 
 
 def follow(plan: Plan, width: int) -> str:
@@ -144,13 +146,17 @@ class _Worst:
     def __init__(self, plan: Plan, width: int) -> None:
         enter, update, leave = (Lines(width, f"worst_{part}") for part in ("enter", "update", "leave"))
         vector, words = enter.vector, f"<{width} x i64>"
+        enter.lines.append("%nothing = icmp ne i64 %anew, 0")
+        enter.lines.append(f"store i64 0, ptr {enter.number('%motion', MOTION.index('i64 anew'))}, align 8")
         numbers = ", ".join(f"i64 {k}" for k in range(width))
         one = update.let(f"insertelement {words} poison, i64 %accepted, i64 0")
         count = update.let(f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer")
         kept = update.let(f"icmp ult {words} <{numbers}>, {count}")
         for k, (slot, kind) in enumerate([*((x, "max") for x in plan.largest), *((x, "min") for x in plan.smallest)]):
             place, here = enter.number("%worst", k), enter.anew(f"alloca {vector}, align 64")
-            start = enter.spread(enter.let(f"load double, ptr {place}, align 8"))
+            nothing = "0.0" if kind == "max" else "0x7FF0000000000000"
+            start = enter.let(f"load double, ptr {place}, align 8")
+            start = enter.spread(enter.let(f"select i1 %nothing, double {nothing}, double {start}"))
             enter.lines.append(f"store {vector} {start}, ptr {here}, align 64")
             so_far = update.let(f"load {vector}, ptr {here}, align 64")
             value = update.choose(kept, update.read(slot), so_far)
