@@ -17,7 +17,7 @@ from .executor import Parts, Plan, Side
 
 LINE, BYTES = 8, 8
 """Numbers in a cache line, and bytes of a number."""
-OUT, ANEW = (llvm_follow.MOTION.index(each) for each in ("ptr out", "i64 anew"))
+OUT, FORGET = (llvm_follow.MOTION.index(each) for each in ("ptr out", "i64 forget"))
 SOURCES = llvm_code, llvm_follow, llvm_loops, llvm_programs, llvm_tables
 """Modules that write the text."""
 LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], int]] = {
@@ -144,7 +144,7 @@ class LlvmTrack:
         address = _address(room)
         skip = -address % (LINE * BYTES)
         self._motion[OUT] = address + skip
-        self._motion[ANEW] = 1
+        self._motion[FORGET] = 1
         return np.ndarray(self._shape, np.float64, room, skip + self._margin, self._strides)
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:

@@ -9,10 +9,10 @@ from .llvm_code import Lines
 from .llvm_loops import calls
 from .llvm_tables import Rows
 
-MOTION = ("ptr lane", "ptr anchor", "ptr worst", "ptr out", "i64 row", "i64 anew")
+MOTION = ("ptr lane", "ptr anchor", "ptr worst", "ptr out", "i64 row", "i64 forget")
 SIDE = ("ptr samples", "i64 stride", "i64 first", "i64 step")
-"""What `follow` is told of a motion and of one of its sides, eight bytes each: few arguments make a quick call. The first call of a
-march sets "anew" to zero: the worst is that of all its calls.
+"""What `follow` is told of a motion and of one of its sides, eight bytes each: few arguments make a quick call. A call that is
+told to forget begins the worst anew, and clears that field: the calls after it go on.
 """
 
 
@@ -146,8 +146,8 @@ class _Worst:
     def __init__(self, plan: Plan, width: int) -> None:
         enter, update, leave = (Lines(width, f"worst_{part}") for part in ("enter", "update", "leave"))
         vector, words = enter.vector, f"<{width} x i64>"
-        enter.lines.append("%nothing = icmp ne i64 %anew, 0")
-        enter.lines.append(f"store i64 0, ptr {enter.number('%motion', MOTION.index('i64 anew'))}, align 8")
+        enter.lines.append("%nothing = icmp ne i64 %forget, 0")
+        enter.lines.append(f"store i64 0, ptr {enter.number('%motion', MOTION.index('i64 forget'))}, align 8")
         numbers = ", ".join(f"i64 {k}" for k in range(width))
         one = update.let(f"insertelement {words} poison, i64 %accepted, i64 0")
         count = update.let(f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer")
