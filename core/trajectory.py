@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,7 +70,8 @@ class Motions(Mapping[str, _Motion], Generic[_Motion]):
         return len(self._columns)
 
 
-class Trajectory(msgspec.Struct, frozen=True, eq=False):  # a frozen dataclass takes ten times as long to make, 2 us of 40
+@dataclass(frozen=True, eq=False, init=False)
+class Trajectory:
     """The motion of all wanted points over the samples of a sweep, in the order of the sweep.
 
     Attributes:
@@ -90,4 +90,24 @@ class Trajectory(msgspec.Struct, frozen=True, eq=False):  # a frozen dataclass t
     residual: float
     message: str
     details: Mapping[str, Any]
-    bodies: Mapping[str, BodyMotion] = msgspec.field(default_factory=dict[str, BodyMotion])
+    bodies: Mapping[str, BodyMotion]
+
+    def __init__(  # a frozen dataclass sets its fields one by one, which takes 2 us of a sweep's 40
+        self,
+        points: Mapping[str, PointMotion],
+        solved: NDArray[np.bool_],
+        iterations: NDArray[np.int64],
+        residual: float,
+        message: str,
+        details: Mapping[str, Any],
+        bodies: Mapping[str, BodyMotion] | None = None,
+    ) -> None:
+        self.__dict__.update(
+            points=points,
+            solved=solved,
+            iterations=iterations,
+            residual=residual,
+            message=message,
+            details=details,
+            bodies={} if bodies is None else bodies,
+        )

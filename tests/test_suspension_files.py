@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field, replace
 
-import msgspec
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
@@ -168,7 +167,7 @@ class Bent:
         found = self.native.solve(model, case, tol)
         spin = found.points["~wheel_center.spin"]
         twisted = replace(spin, position=spin.position + np.array([1e-6, 0.0, 0.0]))
-        return msgspec.structs.replace(found, points={**found.points, "~wheel_center.spin": twisted})
+        return replace(found, points={**found.points, "~wheel_center.spin": twisted})
 
 
 @pytest.fixture(scope="module")
