@@ -108,3 +108,16 @@ def test_a_route_may_be_swept_by_several_threads(compiled):
     with ThreadPoolExecutor(4) as threads:
         for found in threads.map(lambda _: follow(route, TOL), range(24)):
             np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
+
+
+def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written():
+    """Whatever the order: the same as taking all over one after the other."""
+    pairs = [(5, 6), (4, 5), (9, 9), *((k, k - 57) for k in range(182, 200)), *((k, k + 40) for k in range(20, 30))]
+    plan = Plan({}, {}, carried=pairs)
+    assert {*plan.moves} == {*pairs} - {(9, 9)}
+    assert plan.moves != [pair for pair in pairs if pair != (9, 9)]
+    one, other = list(range(300)), list(range(300))
+    for slots, moves in ((one, pairs), (other, plan.moves)):
+        for source, target in moves:
+            slots[target] = slots[source]
+    assert one == other

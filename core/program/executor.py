@@ -15,6 +15,8 @@ from .trace import NODES
 
 DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
 """Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
+PAGE = 64
+"""Slots of vectors of eight numbers in a page of memory."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,19 @@ class Plan:
     loops: Sequence[str] = ()
     tolerance: float = 0.0
     most: int = 0
+
+    @property
+    def moves(self) -> list[tuple[int, int]]:
+        """What is carried, in an order in which no slot is read soon after one was written that is a page away, or several.
+
+        Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that move by up to half a page go
+        upwards, the others downwards. What stays where it is is left out, and a slot that is read and written is read first.
+        """
+        targets = {target for _, target in self.carried}
+        first = [pair for pair in self.carried if pair[0] in targets and pair[0] != pair[1]]
+        rest = [pair for pair in self.carried if pair not in first and pair[0] != pair[1]]
+        up = [pair for pair in rest if (pair[0] - pair[1]) % PAGE < PAGE // 2]
+        return first + up + [pair for pair in reversed(rest) if pair not in up]
 
     @property
     def single(self) -> list[str]:

@@ -26,7 +26,7 @@ def follow(plan: Plan, width: int) -> str:
     quick = extrapolates or not plan.onward
     rates = {slot for name in plan.onward for slot in plan.programs[name].outputs}
     carry = Lines(width, "c")  # what a group is followed by that was accepted whole: each time but for a few
-    for source, target in plan.carried:
+    for source, target in plan.moves:
         if source not in rates:
             place = carry.number(carry.slot(source), width - 1)
             carry.write(target, carry.spread(carry.anew(f"load double, ptr {place}, align 8")))

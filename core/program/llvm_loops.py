@@ -80,7 +80,7 @@ def fan(plan: Plan, width: int) -> str:
     for row, slot in enumerate(plan.kept):
         place = keep.number("%out", keep.sum(keep.product(plane, row), place_in_plane))
         keep.lines.append(f"store {vector} {keep.choose('%still', keep.read(slot), keep.constant(math.nan))}, ptr {place}, align 8")
-    for source, target in plan.carried:  # one by one: read all at once they would not fit into the registers
+    for source, target in plan.moves:  # one by one: read all at once they would not fit into the registers
         move.write(target, move.read(source))
     inputs = "ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted"
     return f"""define void @fan({inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step) {{
