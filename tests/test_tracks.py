@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -99,6 +100,15 @@ def test_sweeps_of_one_model_leave_each_other_alone(compiled):
     for now in (first, again):
         np.testing.assert_array_equal(now.position, was[0])
         np.testing.assert_array_equal(now.acceleration, was[1])
+
+
+@pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+def test_a_route_keeps_no_results():
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33))
+    found = follow(route, TOL)
+    table = weakref.ref(found.points["wheel"].position.base)
+    del found
+    assert table() is None
 
 
 @pytest.mark.parametrize("compiled", COMPILED)

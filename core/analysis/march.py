@@ -222,6 +222,7 @@ class _Marcher:
         self.visit, self.visited = visit, dict[int, Array]()
         ends = [end for side in range(len(self.route.sides)) if (end := self._side(side)) is not None]
         kept, solved, back = self.kept, self.solved, self.route.back
+        del self.kept, self.solved  # they are whose they are given to
         if back is not AS_THEY_ARE:
             kept, solved = kept[:, back], solved[back]
         return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
