@@ -102,12 +102,5 @@ class Trajectory:
         details: Mapping[str, Any],
         bodies: Mapping[str, BodyMotion] | None = None,
     ) -> None:
-        self.__dict__.update(
-            points=points,
-            solved=solved,
-            iterations=iterations,
-            residual=residual,
-            message=message,
-            details=details,
-            bodies={} if bodies is None else bodies,
-        )
+        self.__dict__.update(points=points, solved=solved, iterations=iterations, residual=residual, message=message)
+        self.__dict__.update(details=details, bodies={} if bodies is None else bodies)
