@@ -88,13 +88,15 @@ def eight_lanes(monkeypatch):
 
 
 @pytest.mark.usefixtures("eight_lanes")
-def test_positions_alone_are_extrapolated_to_one_iteration():
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_lanes_are_extrapolated_to_one_iteration(order):
     fine = np.linspace(-0.08, 0.08, 161)
-    alone, all_orders = positions(fine), positions(fine, 2)
-    assert np.abs(alone.points["wheel"].position - all_orders.points["wheel"].position).max() <= 4e-16
+    found = positions(fine, order)
     later = np.abs(np.arange(161) - 80) > 8  # there is nothing yet to extrapolate the first eight on either side from
-    assert (alone.iterations[later] == 1).all()
-    assert (all_orders.iterations[later] == 2).sum() > 100
+    assert (found.iterations[later] == 1).all()
+    by_rates = positions(fine[::8], order)  # all that is left of the lanes before are rates
+    assert (by_rates.iterations[1:-1] > 1).any()
+    assert np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max() <= 4e-16
 
 
 @pytest.mark.usefixtures("eight_lanes")
@@ -104,10 +106,14 @@ def test_positions_alone_are_extrapolated_to_one_iteration():
     [np.repeat(STROKES, 2), [*np.linspace(0.0, 0.008, 17), *np.linspace(0.01, 0.08, 8)], [*np.linspace(0.0, 0.008, 16), 0.08]],
     ids=["every sample twice", "a fine grid gets coarse", "one step as long as a hundred"],
 )
-def test_where_extrapolation_fails_the_rates_take_over(values, compiled):
-    """Two samples at one time make it infinite, a long step makes it wild."""
-    found, expected = positions(values, compiled=compiled), positions(values, 2)
-    assert np.abs(found.points["wheel"].position - expected.points["wheel"].position).max() <= 4e-16
+@pytest.mark.parametrize("order", [0, 2])
+def test_where_extrapolation_fails_the_rates_take_over(values, order, compiled, monkeypatch):
+    """Two samples at one time make it infinite, a long step makes it wild. A lane alone is never extrapolated."""
+    found = positions(values, order, compiled=compiled)
+    monkeypatch.setattr("kincheck.core.analysis.march.LANES", 1)
+    expected = positions(values, order, compiled=False).points["wheel"]
+    assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
+    assert order == 0 or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
 
 
 # Closed forms

@@ -2,6 +2,7 @@
 
 predict   from state, v, a and time; time    -> state        Taylor step of second order
 extrapolate   states and times of a group of lanes; time   -> state        through `NODES` of them, without v and a
+extend    states of the samples before, and their weights   -> state        likewise, for lanes that are motions of their own
 gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
 alone, joined   all that is tested, and the tolerance   -> margin    positive where a lane may be accepted
 """
@@ -11,12 +12,17 @@ from __future__ import annotations
 from functools import reduce
 from operator import mul
 
+import numpy as np
+
 from ..algebra import Scalar
 from ..program import DONE, MARGIN, NODES, Program, absolute, before, maximum, minimum, program, where_larger
+from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
 from .programs import Tracer
 from .request import ACCEPT, BLOCKS, EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, STOOD, TIME
 
+WEIGHT, PAST = "weight", "past"
+"""The vectors of the samples that `extend` goes by: their weights, and their states one after the other."""
 EULER_PARAMETERS = 4
 ABOUT = 1.5
 """A step may be this much longer than the one it learns from."""
@@ -80,6 +86,42 @@ def extrapolate(tracer: Tracer) -> Program:
         for label in (name, PREDICTED + name):
             tracer.store(out, label, _of_length_one(found))
     return program("extrapolate", tracer.tape, out, tracer.prepared)
+
+
+def extend(tracer: Tracer) -> Program:
+    """The state from what it was at the last `NODES` samples, by their weights (see `weights`)."""
+    weight = tracer.vector(WEIGHT, NODES)
+    design = tracer.formulation.design
+    size = sum(len(value) for value in design.values())
+    past = tracer.vector(PAST, NODES * size)
+    out: dict[int, Scalar] = {}
+    first = 0
+    for name, value in design.items():
+        places = range(first, first := first + len(value))
+        found = [sum((w * past[size * k + place] for k, w in enumerate(weight)), 0.0) for place in places]
+        for label in (name, PREDICTED + name):
+            tracer.store(out, label, _of_length_one(found))
+    return program("extend", tracer.tape, out, tracer.prepared)
+
+
+def weights(times: Array) -> Array:
+    """Lagrange's weights of the `NODES` samples before each, by the places at which they are kept (`Plan.past`).
+
+    Args:
+        times: of samples in the order in which they are gone through, shape (n,).
+
+    Returns:
+        Shape (NODES, n): zero before there are so many, not finite where two of them share a time.
+    """
+    found = np.zeros((NODES, len(times)))
+    wanted = np.arange(NODES, len(times))
+    if len(wanted):
+        nodes = {k: times[wanted - k] for k in range(1, NODES + 1)}  # k samples before
+        with np.errstate(all="ignore"):
+            for k, node in nodes.items():
+                factors = ((times[wanted] - each) / (node - each) for j, each in nodes.items() if j != k)
+                found[(wanted - k) % NODES, wanted] = reduce(mul, factors)
+    return found
 
 
 def tests(tracer: Tracer, *, neighbours: bool) -> list[Program]:

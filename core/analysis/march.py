@@ -213,6 +213,7 @@ class _Marcher:
         self.executor = self.model.executor(route.lanes)
         self.every = np.ones(len(route.path.times), dtype=np.bool_)
         self.track = self.executor.track(route.sides, self.start[self.model.ahead], len(self.every))
+        self.counts = [side.count for side in route.sides]
 
     def run(self, visit: Collection[int] = ()) -> March:
         """See `march`."""
@@ -220,40 +221,42 @@ class _Marcher:
             self.executor.put(range(len(self.start)), self.start[:, None])
         self.kept, self.solved = self.track.begin(), self.every.copy()
         self.visit, self.visited = visit, dict[int, Array]()
-        ends = [end for side in range(len(self.route.sides)) if (end := self._side(side)) is not None]
+        reached = [0] * len(self.counts) if visit else self.track.run()
+        ends: list[End] = []
+        if reached != self.counts:
+            ends = [end for side, at in enumerate(reached) if (end := self._side(side, at)) is not None]
         kept, solved, back = self.kept, self.solved, self.route.back
         del self.kept, self.solved  # they are whose they are given to
         if back is not AS_THEY_ARE:
             kept, solved = kept[:, back], solved[back]
         return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
 
-    def _side(self, number: int) -> End | None:
-        """Follow one side to its last sample; None, or where and why it ends before."""
-        side = self.route.sides[number]
-        at, rounds, anew, stops = 0, 0, True, self._stops(side) if self.visit else [side.count]
-        while stops:
-            came, at = at, self.track.follow(number, at, stops[0], anew=anew)
-            anew = False
-            if at == stops[0]:
-                stops.pop(0)
-                if self.visit:
-                    self._stand(side, at)
-                continue
-            rounds = 0 if at > came else rounds + 1
-            anchor, wanted = self._anchor(), float(side.samples[0, at])
-            further, reason = self._divide(anchor, wanted)
-            if further is None or rounds > MAX_ROUNDS:
-                columns = side.first + side.step * np.arange(at, side.count)
-                self.kept[:, columns], self.solved[columns] = np.nan, False
-                message = self._end(side, at, anchor, reason or "the parts of the step get smaller and smaller")
-                return End(message, self.route, anchor, wanted)
-            self.track.anchor[:] = further[self.model.ahead]
+    def _side(self, number: int, at: int) -> End | None:
+        """Follow one side, which came so far, to its last sample; None, or where and why it ends before."""
+        side, anew = self.route.sides[number], True
+        for stop in self._stops(side) if self.visit else [side.count]:
+            if self.visit:
+                at, anew = self.track.follow(number, at, stop, anew=anew), False
+            rounds = 0
+            while at < stop:
+                anchor, wanted = self._anchor(number), float(side.samples[0, at])
+                further, reason = self._divide(anchor, wanted)
+                if further is None or rounds > MAX_ROUNDS:
+                    columns = side.first + side.step * np.arange(at, side.count)
+                    self.kept[:, columns], self.solved[columns] = np.nan, False
+                    message = self._end(side, at, anchor, reason or "the parts of the step get smaller and smaller")
+                    return End(message, self.route, anchor, wanted)
+                self.track.anchors[number] = further[self.model.ahead]
+                came, at = at, self.track.follow(number, at, stop, anew=False)
+                rounds = 0 if at > came else rounds + 1
+            if self.visit:
+                self._stand(number, at)
         return None
 
-    def _anchor(self) -> Array:
-        """All slots of a lane where the motion stands."""
+    def _anchor(self, number: int) -> Array:
+        """All slots of a lane where the motion stands on a side."""
         found = self.start.copy()
-        found[self.model.ahead] = self.track.anchor
+        found[self.model.ahead] = self.track.anchors[number]
         return found
 
     def _stops(self, side: Side) -> list[int]:
@@ -262,10 +265,11 @@ class _Marcher:
         passed = {int((place[k] - side.first) * side.step) + 1 for k in self.visit}
         return sorted(count for count in passed if 1 <= count <= side.count)
 
-    def _stand(self, side: Side, passed: int) -> None:
+    def _stand(self, number: int, passed: int) -> None:
+        side = self.route.sides[number]
         sample = int(self.route.order[side.first + side.step * (passed - 1)])
         if sample in self.visit:
-            self.visited[sample] = self._anchor()
+            self.visited[sample] = self._anchor(number)
 
     def _divide(self, anchor: Array, aim: float) -> tuple[Array | None, str]:
         """Go a part of the step to a sample that could not be reached: the lane there, and why the shortest refused is."""

@@ -63,6 +63,9 @@ class Model:
         self.geometry = [slot for place in tracing.geometry for slot in self.vectors[place]]
         self.sampled = [self.slots[TIME]]
         self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
+        fans = bool(self.request.varied) and not self.request.state
+        if fans:
+            self.sampled += self.vectors[following.WEIGHT]
         self._tangent = "motion" if self.request.order == 2 else "tangent"
         kept = [slot for name in self._wanted() for slot in self.vectors[name]]
         self.rows = self._rows()
@@ -73,15 +76,17 @@ class Model:
             after=("motion", "outputs") if self.request.order else ("outputs",),
             alone=following.ALONE,
             joined=() if self.request.state else following.JOINED,
-            onward=() if self.request.order == 2 else ("tangent",),
+            onward=(self._tangent,),
             sampled=self.sampled,
+            remembered=[slot for name in self.state for slot in self.vectors[name]] if fans else (),
+            past=self.vectors[following.PAST][0] if fans else 0,
             carried=tracing.carried,
             kept=[*kept, *(self.slots[name] for name in self._tests)],
             largest=[self.slots["closure"], self.slots["leftover"]],
             smallest=[self.slots[SIGMA]],
             fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
             taken=[slot for name in self.given for slot in self.vectors[name]],
-            loops=("parts",) if self.request.state else ("follow", "fan") if self.request.varied else ("follow",),
+            loops=("parts",) if self.request.state else ("follow", "fan") if fans else ("follow",),
             tolerance=self.request.last_iteration,
             most=MAX_ITERATIONS,
         )
@@ -166,7 +171,7 @@ class Model:
         return self._executors[key]
 
     def samples(self, times: Array, drive: Array) -> Array:
-        """What `sampled` holds at the times, shape (sampled, n).
+        """What `sampled` holds at times that are gone through in that order, shape (sampled, n).
 
         Args:
             drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, n).
@@ -178,6 +183,8 @@ class Model:
             rows = found[5 * k + 1 : 5 * k + 6]
             rows[:3] = drive[:, k] * (1.0 if angle else 1.0 / self.frame.unit)
             rows[3], rows[4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
+        if self._plan.remembered:
+            found[5 * len(self.request.drivers) + 1 :] = following.weights(times)
         return found
 
     def moving(self, lane: Array, sample: Array) -> Array:

@@ -85,14 +85,16 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> T
         programs.append(tracer.motion("motion", request.order))
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
         programs.append(tracer.motion("tangent", 2))
-        if not request.state:
-            programs.append(following.extrapolate(tracer))
+    if not request.state:
+        programs.append(following.extrapolate(tracer))
     programs.append(tracer.outputs())
     programs += following.tests(tracer, neighbours=False)
     if not request.state:  # parts of a mechanism are attempted lane by lane
         programs += following.tests(tracer, neighbours=True)
     if request.varied:
         programs.append(tracer.prepared.program())
+        if not request.state:
+            programs.append(following.extend(tracer))
     carried = following.carried(tracer)
     tracer.layout.scalar(ITERATIONS)
     return Tracing(

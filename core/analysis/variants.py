@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ from .request import SIGMA, accept_by
 # Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
 # it is too long is solved again alone.
 LEAD = 16
+# Bytes of the largest blocks that are used again: glibc's own limit is twice that.
+RECYCLED = 16_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         geometry: numbers of the varied places in their order, shape (numbers, V).
         tol: as for `solve`.
     """
+    _recycle()
     model, n, count = route.model, len(route.path.times), geometry.shape[1]
     executor = model.executor(count)
     closes = model.stand(executor, geometry)
@@ -60,7 +64,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     model.start(executor, route.origin)
     ahead = model.ahead
     start = executor.get(ahead)
-    whole = np.empty((model.kept, n, executor.room))
+    whole = executor.table(n)
     for k, side in enumerate(route.sides):
         if k:
             executor.put(ahead, start)
@@ -80,8 +84,10 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         if found.messages:
             messages[k] = "; ".join(found.messages)
     closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
-    doubted = solved & doubtful(sigma, closure, tol)
-    kept[:, doubted], solved[doubted] = np.nan, False
+    doubted = np.zeros_like(solved)
+    if doubtful(np.fmin.reduce(sigma, axis=None, initial=1.0), np.fmax.reduce(closure, axis=None, initial=0.0), tol):  # the worst
+        doubted = solved & doubtful(sigma, closure, tol)
+        kept[:, doubted], solved[doubted] = np.nan, False
     for k in np.flatnonzero(doubted.any(axis=0)).tolist():
         near = route.path.where(float(route.path.times[route.order][doubted[:, k].argmax()]))
         refused = (
@@ -91,12 +97,20 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
 
 
+@cache
+def _recycle() -> None:
+    """Have freed blocks kept for the next ones, else the system clears every page of every table anew: that takes half as long as
+    filling it. glibc keeps them up to the size of the largest that was ever freed.
+    """
+    np.empty(RECYCLED, dtype=np.uint8)
+
+
 def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
     """Take lanes from the design to the first sample, where they stand afterwards; which of them arrived there."""
     model, last = route.model, route.path.lead_in()
     way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
     model.start(executor, way.origin)
-    found = np.empty((model.kept, LEAD, executor.room))
+    found = executor.table(LEAD)
     (side,) = way.sides
     executor.fan(np.ascontiguousarray(side.samples[:, :LEAD]), found, side.first, side.step)
     return ~np.isnan(found[model.rows["closure"].start, -1, :count])

@@ -15,6 +15,8 @@ from .trace import NODES
 
 DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
 """Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
+LINE = 8
+"""Numbers in a cache line."""
 PAGE = 64
 """Slots of vectors of eight numbers in a page of memory."""
 
@@ -27,15 +29,18 @@ class Plan:
     programs in `after`, and at last those of a test, whose margin is positive where the lane may be accepted.
 
     Where there is a program `extrapolate` it takes the place of `predict` for lanes that follow a group that was accepted whole:
-    it goes by what stands in those lanes, so that `onward` need not be run for them.
+    it goes by what stands in those lanes, and needs nothing of what `onward` puts out. So does `extend`, which takes it for lanes
+    that have come through `NODES` samples: it goes by what is remembered of these.
 
     Attributes:
         programs: by name; they share one layout of slots.
         slots: place of every scalar in a lane, by name.
         after: names of the programs that end an attempt.
         alone, joined: names of the programs that test lanes: that know nothing of each other, or are neighbours on one way.
-        onward: names of the programs that make a solved lane ready to be predicted from.
+        onward: names of the programs that make a solved lane ready to be predicted from; they may be in `after` too.
         sampled: slots that are given anew at every sample.
+        remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for `extend`.
+        past: the slot it begins to keep them at: those of sample k are at place k modulo `NODES`.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
         kept: slots that are stored of every sample.
         largest, smallest: slots of which `follow` finds the largest and the smallest over the samples it keeps.
@@ -53,6 +58,8 @@ class Plan:
     joined: Sequence[str] = ()
     onward: Sequence[str] = ()
     sampled: Sequence[int] = ()
+    remembered: Sequence[int] = ()
+    past: int = 0
     carried: Sequence[tuple[int, int]] = ()
     kept: Sequence[int] = ()
     largest: Sequence[int] = ()
@@ -77,9 +84,19 @@ class Plan:
         return first + up + [pair for pair in reversed(rest) if pair not in up]
 
     @property
+    def remaining(self) -> list[str]:
+        """Names of the programs that make a lane ready to be predicted from once its attempt has ended."""
+        return [name for name in self.onward if name not in self.after]
+
+    @property
+    def rates(self) -> set[int]:
+        """Slots of what makes a solved lane ready to be predicted from."""
+        return {slot for name in self.onward for slot in self.programs[name].outputs}
+
+    @property
     def single(self) -> list[str]:
         """Names of the programs that may be run by themselves; the others occur in attempts only."""
-        return [name for name in self.programs if name not in ("predict", "extrapolate", *self.alone, *self.joined)]
+        return [name for name in self.programs if name not in ("predict", "extrapolate", "extend", *self.alone, *self.joined)]
 
     def extrapolates(self, lanes: int) -> bool:
         """Whether a group of that many lanes is followed by extrapolation."""
@@ -161,12 +178,16 @@ class Executor(Protocol):
         """Lanes with those that fill up the last vector."""
         ...
 
+    def table(self, columns: int) -> Array:
+        """Room for what `fan` puts out, shape (kept, columns, room)."""
+        ...
+
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """Follow as many motions as there are lanes through the same samples, each lane alone.
 
         Args:
             samples: `Plan.sampled`, shape (sampled, n).
-            out: takes `Plan.kept`, shape (kept, columns, room), contiguous; NaN from where a lane was not accepted.
+            out: a table, which takes `Plan.kept`; NaN from where a lane was not accepted.
             first, step: column of the first sample, and from each to the next: 1 or -1.
         """
         ...
@@ -187,15 +208,22 @@ class Track(Protocol):
     """A motion that an executor follows along both sides of where it starts, through samples it knows.
 
     Attributes:
-        anchor: where the motion stands: what `Plan.carried` takes over.
+        anchors: where the motion stands on each side: what `Plan.carried` takes over, a row a side.
         worst: the largest of `Plan.largest`, or zero, and the smallest of `Plan.smallest`, over all samples kept since `begin`.
     """
 
-    anchor: Array
+    anchors: Array
     worst: Array
 
     def begin(self) -> Array:
         """Room for `Plan.kept` of all samples, shape (kept, n), which is filled from now on."""
+        ...
+
+    def run(self) -> Sequence[int]:
+        """Follow every side from the start to its end: the first sample of each that was not accepted, or how many there are.
+
+        The anchor of a side that came to its end is of no use: nothing is made ready there to go on.
+        """
         ...
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
@@ -203,7 +231,7 @@ class Track(Protocol):
 
         Args:
             at, stop: the sample that comes next, and the one before which to end.
-            anew: from the start, and not from the anchor. That goes along.
+            anew: from the start, and not from the side's anchor. That goes along.
 
         Returns:
             The first sample that was not accepted, or stop.

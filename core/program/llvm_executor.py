@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import inspect
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -12,20 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from . import compiled, llvm_code, llvm_follow, llvm_loops, llvm_programs, llvm_tables
-from .executor import Parts, Plan, Side
+from . import compiled, llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_programs, llvm_tables
+from .executor import LINE, Parts, Plan, Side
 
-LINE, BYTES = 8, 8
-"""Numbers in a cache line, and bytes of a number."""
+BYTES = 8
+"""Of a number."""
 OUT, FORGET = (llvm_follow.MOTION.index(each) for each in ("ptr out", "i64 forget"))
-SOURCES = llvm_code, llvm_follow, llvm_loops, llvm_programs, llvm_tables
+REACHED = llvm_follow.SIDE.index("i64 reached")
+SOURCES = llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_programs, llvm_tables
 """Modules that write the text."""
-LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], int]] = {
-    "follow": (llvm_follow.follow, 5),
-    "fan": (llvm_loops.fan, 10),
-    "parts": (llvm_loops.parts, 10),
+LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], Mapping[str, int]]] = {
+    "follow": (llvm_follow.follow, {"follow": 5, "run": 2}),
+    "fan": (llvm_fan.fan, {"fan": 10}),
+    "parts": (llvm_loops.parts, {"parts": 10}),
 }
-"""Loop -> what writes it, and how many arguments it takes."""
+"""Loop -> what writes it, and how many arguments its functions take."""
 
 
 class LlvmCode:
@@ -33,7 +35,9 @@ class LlvmCode:
 
     def __init__(self, plan: Plan) -> None:
         self.width, self.plan = compiled.vector_width(), plan
-        signatures = {f"run_{name}": 2 for name in plan.single} | {loop: LOOPS[loop][1] for loop in plan.loops}
+        signatures = {f"run_{name}": 2 for name in plan.single}
+        for loop in plan.loops:
+            signatures |= LOOPS[loop][1]
         if plan.after:
             signatures["attempt"] = 2
         # what determines the text; writing that takes longer than loading the code it means
@@ -100,6 +104,11 @@ class LlvmExecutor:
         """See `Executor`."""
         return self._groups * self.margin
 
+    def table(self, columns: int) -> Array:
+        """See `Executor`."""
+        shape = len(self._code.plan.kept), columns, self.room
+        return _aligned(math.prod(shape)).reshape(shape)
+
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
@@ -122,7 +131,7 @@ class LlvmTrack:
 
     def __init__(self, code: LlvmCode, memory: Array, sides: Sequence[Side], start: Array, n: int) -> None:
         plan, width = code.plan, code.width
-        self._start, self.anchor = start.copy(), start.copy()
+        self._start, self.anchors = start.copy(), np.tile(start, (len(sides), 1))
         self.worst = np.zeros(len(plan.largest) + len(plan.smallest))
         below = min((side.first for side in sides if side.step > 0), default=n)
         margin = width + -below % width  # a vector may be written beyond either end
@@ -130,12 +139,19 @@ class LlvmTrack:
         row += -row % LINE
         self._shape, self._strides, self._margin = (len(plan.kept), n), (row * BYTES, BYTES), margin * BYTES
         self._room = len(plan.kept) * row + LINE
-        self._places = {True: _address(self._start), False: _address(self.anchor)}
+        start_at, anchors = _address(self._start), [_address(anchor) for anchor in self.anchors]
         # in the order of llvm_follow.MOTION and SIDE
-        self._motion = np.array([_address(memory), _address(self.anchor), _address(self.worst), 0, row, 1], np.int64)
-        self._sides = [np.array([_address(s.samples), s.samples.shape[1], margin + s.first, s.step], np.int64) for s in sides]
-        follow, motion = code.functions["follow"], _address(self._motion)
-        self._follow = [partial(follow, motion, _address(each)) for each in self._sides]
+        self._motion = np.array([_address(memory), start_at, _address(self.worst), 0, row, 1, len(sides)], np.int64)
+        told = [
+            (_address(side.samples), side.samples.shape[1], margin + side.first, side.step, side.count, anchor, 0)
+            for side, anchor in zip(sides, anchors, strict=True)
+        ]
+        self._sides = np.array([*told, (0,) * len(llvm_follow.SIDE)], np.int64)  # never empty: that has no address
+        self._counts, motion = [side.count for side in sides], _address(self._motion)
+        self._run = partial(code.functions["run"], motion, _address(self._sides))
+        follow = partial(code.functions["follow"], motion)
+        places = [(_address(each), anchor) for each, anchor in zip(self._sides, anchors, strict=False)]
+        self._follow = [{True: partial(follow, at, start_at), False: partial(follow, at, anchor)} for at, anchor in places]
         self._alive = code, memory, sides  # their addresses are held
 
     def begin(self) -> Array:
@@ -147,9 +163,13 @@ class LlvmTrack:
         self._motion[FORGET] = 1
         return np.ndarray(self._shape, np.float64, room, skip + self._margin, self._strides)
 
+    def run(self) -> Sequence[int]:
+        """See `Track`."""
+        return self._sides[: len(self._counts), REACHED].tolist() if self._run() else self._counts
+
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
         """See `Track`."""
-        return self._follow[side](self._places[anew], at, stop)
+        return self._follow[side][anew](at, stop)
 
 
 def _aligned(count: int) -> Array:

@@ -9,22 +9,22 @@ from .llvm_code import Lines
 from .llvm_loops import calls
 from .llvm_tables import Rows
 
-MOTION = ("ptr lane", "ptr anchor", "ptr worst", "ptr out", "i64 row", "i64 forget")
-SIDE = ("ptr samples", "i64 stride", "i64 first", "i64 step")
-"""What `follow` is told of a motion and of one of its sides, eight bytes each: few arguments make a quick call. A call that is
-told to forget begins the worst anew, and clears that field: the calls after it go on.
+MOTION = ("ptr lane", "ptr start", "ptr worst", "ptr out", "i64 row", "i64 forget", "i64 sides")
+SIDE = ("ptr samples", "i64 stride", "i64 first", "i64 step", "i64 count", "ptr anchor", "i64 reached")
+"""What is told of a motion and of each of its sides, eight bytes each: few arguments make a quick call. A call that is told to
+forget begins the worst anew, and clears that field: the calls after it go on. `run` writes how far it came.
 """
 
 
 def follow(plan: Plan, width: int) -> str:
-    """See `Track.follow`: W samples at a time, and on from the last one accepted."""
+    """See `Track`: W samples at a time, and on from the last one accepted."""
     vector, begin, test, given = f"<{width} x double>", *(Lines(width, prefix) for prefix in "btg")
     # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and but for one no faster
     enter, up, down, back, move, leave = (Rows(width, name) for name in ("enter", "up", "down", "back", "move", "leave"))
     sources, targets = zip(*plan.carried, strict=True)
     extrapolates = plan.extrapolates(width)
-    quick = extrapolates or not plan.onward
-    rates = {slot for name in plan.onward for slot in plan.programs[name].outputs}
+    quick = extrapolates or not plan.remaining
+    rates = plan.rates if extrapolates else ()
     carry = Lines(width, "c")  # what a group is followed by that was accepted whole: each time but for a few
     for source, target in plan.moves:
         if source not in rates:
@@ -57,6 +57,7 @@ def follow(plan: Plan, width: int) -> str:
 declare i64 @llvm.cttz.i64(i64, i1)
 declare i64 @llvm.smin.i64(i64, i64)
 declare i64 @llvm.smax.i64(i64, i64)
+{_run()}
 define i64 @follow(ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop) {{
 entry:
   {_fields("motion", MOTION)}
@@ -100,7 +101,8 @@ missed:
 return:
   {back.loop("return")}
   {given.text}
-  br label %onward
+  {calls(plan.onward)}
+  br label %take
 keep:
   {worst.update}
   %up_column = add i64 %first, %at
@@ -119,15 +121,47 @@ carry:
   {carry.text}
   br label %head
 onward:
-  {calls(plan.onward)}
+  {calls(plan.remaining)}
+  br label %take
+take:
   %before = sub i64 %accepted, 1
   %last = call i64 @llvm.smax.i64(i64 %before, i64 0)
-  {move.loop("onward")}
+  {move.loop("take")}
   br label %head
 end:
   {leave.loop("end")}
   {worst.leave}
   ret i64 %at
+}}
+"""
+
+
+def _run() -> str:
+    """Follow every side from the start to its end; how many of them ended early."""
+    end = Lines(0, "end")
+    end.lines.append(f"store i64 %at, ptr {end.number('%side', SIDE.index('i64 reached'))}, align 8")
+    return f"""define i64 @run(ptr %motion, ptr %table) {{
+entry:
+  {_fields("motion", MOTION)}
+  br label %head
+head:
+  %k = phi i64 [0, %entry], [%next, %one]
+  %early = phi i64 [0, %entry], [%early_now, %one]
+  %more = icmp ult i64 %k, %sides
+  br i1 %more, label %one, label %end
+one:
+  %offset = mul i64 %k, {len(SIDE)}
+  %side = getelementptr i64, ptr %table, i64 %offset
+  {_fields("side", SIDE)}
+  %at = call i64 @follow(ptr %motion, ptr %side, ptr %start, i64 0, i64 %count)
+  {end.text}
+  %ended = icmp ne i64 %at, %count
+  %counted = zext i1 %ended to i64
+  %early_now = add i64 %early, %counted
+  %next = add i64 %k, 1
+  br label %head
+end:
+  ret i64 %early
 }}
 """
 

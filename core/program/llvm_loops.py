@@ -1,11 +1,11 @@
-"""The loops of a plan as LLVM code: Newton's iteration, and following many motions, lanes as motions; for one, see llvm_follow."""
+"""The loops of a plan as LLVM code: Newton's iteration, and parts of a mechanism; for motions, see llvm_follow and llvm_fan."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 
-from .executor import DONE, ITERATIONS, MARGIN, Plan
+from .executor import DONE, ITERATIONS, Plan
 from .llvm_code import Lines
 
 
@@ -60,56 +60,6 @@ group:
   %next = add i64 %g, 1
   %more = icmp slt i64 %next, %groups
   br i1 %more, label %group, label %end
-end:
-  ret void
-}}
-"""
-
-
-def fan(plan: Plan, width: int) -> str:
-    """See `Executor.fan`: every group of W motions goes through all samples while its slots are in the nearest cache."""
-    vector, mask = f"<{width} x double>", f"<{width} x i1>"
-    begin, test, keep, move = (Lines(width, prefix) for prefix in "btkm")
-    for row, slot in enumerate(plan.sampled):
-        place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%k"))
-        begin.write(slot, begin.spread(begin.let(f"load double, ptr {place}, align 8")))
-    accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
-    column = keep.sum("%first", keep.product("%step", "%k"))
-    place_in_plane = keep.sum(keep.product(column, "%lanes"), keep.product("%g", width))
-    plane = keep.product("%columns", "%lanes")
-    for row, slot in enumerate(plan.kept):
-        place = keep.number("%out", keep.sum(keep.product(plane, row), place_in_plane))
-        keep.lines.append(f"store {vector} {keep.choose('%still', keep.read(slot), keep.constant(math.nan))}, ptr {place}, align 8")
-    for source, target in plan.moves:  # one by one: read all at once they would not fit into the registers
-        move.write(target, move.read(source))
-    inputs = "ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted"
-    return f"""define void @fan({inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step) {{
-entry:
-  br label %group
-group:
-  %g = phi i64 [0, %entry], [%next_group, %end_group]
-  %offset = mul i64 %g, {len(plan.slots) * width}
-  %lane = getelementptr double, ptr %memory, i64 %offset
-  br label %sample
-sample:
-  %k = phi i64 [0, %group], [%next, %sample]
-  %alive = phi {mask} [<{", ".join(["i1 true"] * width)}>, %group], [%still, %sample]
-  {begin.text}
-  call void @predict(ptr %lane)
-  call void @settle(ptr %lane)
-  {calls(plan.alone)}
-  {test.text}
-  %still = and {mask} %alive, {accepted}
-  {keep.text}
-  {calls(plan.onward)}
-  {move.text}
-  %next = add i64 %k, 1
-  %more = icmp slt i64 %next, %wanted
-  br i1 %more, label %sample, label %end_group
-end_group:
-  %next_group = add i64 %g, 1
-  %more_groups = icmp slt i64 %next_group, %groups
-  br i1 %more_groups, label %group, label %end
 end:
   ret void
 }}

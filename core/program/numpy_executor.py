@@ -6,11 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .executor import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
+from .numpy_track import NumpyTrack
 from .straight_line import Program
-from .trace import LEAVES, operands, place_of
+from .trace import LEAVES, NODES, operands, place_of
 
 
 def _min(a: Array, b: Array, out: Array) -> None:
@@ -19,10 +21,6 @@ def _min(a: Array, b: Array, out: Array) -> None:
 
 def _max(a: Array, b: Array, out: Array) -> None:
     np.maximum(a, b, out=out)
-
-
-def _before(x: Array, first: Array, out: Array) -> None:
-    out[..., 0], out[..., 1:] = first[..., 0], x[..., :-1]
 
 
 _UFUNCS: dict[str, Callable[..., Any]] = {
@@ -37,7 +35,6 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "abs": np.absolute,
     "min": _min,
     "max": _max,
-    "before": _before,
 }
 
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
@@ -57,7 +54,11 @@ def _largest(out: Array, values: Array) -> None:
 
 
 class NumpyExecutor:
-    """A plan bound to a block of lanes, shape (slots, lanes)."""
+    """A plan bound to a block of lanes, shape (slots, lanes).
+
+    Attributes:
+        heads: lanes that have no lane before them.
+    """
 
     margin = 0
 
@@ -65,6 +66,7 @@ class NumpyExecutor:
         self.lanes = lanes
         self.block: Array = np.zeros((len(plan.slots), lanes))
         self.plan = plan
+        self.heads: list[int] = [0]
         self._calls: dict[str, list[Call]] = {}
 
     def clear(self) -> None:
@@ -119,19 +121,42 @@ class NumpyExecutor:
         """See `Executor`."""
         return self.lanes
 
+    def table(self, columns: int) -> Array:
+        """See `Executor`."""
+        return np.empty((len(self.plan.kept), columns, self.room))
+
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
         plan, block = self.plan, self.block
         source, target = np.array(plan.carried).T
+        kept, remembered = list(plan.kept), list(plan.remembered)
+        past = block[plan.past : plan.past + NODES * len(remembered)].reshape(NODES, -1, self.lanes)
         alive = np.ones(self.lanes, dtype=np.bool_)
         for k, sample in enumerate(samples.T):
-            block[list(plan.sampled)] = sample[:, None]
-            self.attempt()
-            alive &= block[plan.slots[MARGIN]] > 0.0
-            out[:, first + step * k] = np.where(alive, block[list(plan.kept)], np.nan)
-            for name in plan.onward:
+            accepted = self._accepted("extend", sample) if k >= NODES else ~alive
+            if (alive & ~accepted).any():
+                if k >= NODES:
+                    self.go_back(samples[:, k - 1, None])
+                    block[target] = block[source]
+                accepted = self._accepted("predict", sample)
+            alive &= accepted
+            out[:, first + step * k] = np.where(alive, block[kept], np.nan)
+            past[k % NODES] = block[remembered]
+            for name in plan.remaining if k + 1 < NODES else ():
                 self.run(name)
             block[target] = block[source]
+
+    def _accepted(self, start: str, sample: Array) -> NDArray[np.bool_]:
+        self.block[list(self.plan.sampled)] = sample[:, None]
+        self.settle(start, self.plan.alone)
+        return self.block[self.plan.slots[MARGIN]] > 0.0
+
+    def go_back(self, sample: Array) -> None:
+        """Have lanes stand where they are predicted from, and be ready to be; the sample there, shape (sampled, 1)."""
+        source, target = np.array(self.plan.carried).T
+        self.block[source], self.block[list(self.plan.sampled)] = self.block[target], sample
+        for name in self.plan.onward:
+            self.run(name)
 
     def groups(self, lanes: int) -> int:
         """See `Executor`: its programs are bound to all lanes."""
@@ -152,9 +177,13 @@ class NumpyExecutor:
 
         return call
 
+    def _before(self, x: Array, first: Array, out: Array) -> None:
+        out[..., 1:] = x[..., :-1]
+        out[..., self.heads] = first[..., self.heads]
+
     def _bind(self, program: Program) -> list[Call]:
         """Give every operation a register; a register is free again after its last reader."""
-        times, block = program.times, self.block
+        times, block, functions = program.times, self.block, {**_UFUNCS, "where": _where, "before": self._before}
         shape = self.lanes if times == 1 else (times, self.lanes)
         scratch = np.empty((2, self.lanes)) if times == 1 else np.empty((2, times, self.lanes))
         last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
@@ -182,7 +211,7 @@ class NumpyExecutor:
             if op == "larger":
                 calls.append((_larger, (*read, *scratch, out)))
             else:
-                calls.append((_where if op == "where" else _UFUNCS[op], (*read, out)))
+                calls.append((functions[op], (*read, out)))
             for x in set(arguments):
                 if last[x] == k and x not in kept and program.nodes[x][0] not in LEAVES:
                     free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
@@ -193,53 +222,3 @@ class NumpyExecutor:
                 place[node] = copy
         write = np.copyto if times == 1 else _largest
         return calls + [(write, (block[slot], place[node])) for slot, node in program.outputs.items()]
-
-
-class NumpyTrack:
-    """See `Track`."""
-
-    def __init__(self, executor: NumpyExecutor, sides: Sequence[Side], start: Array, n: int) -> None:
-        self._executor, self._sides, self._start, self._n = executor, sides, start, n
-        self.anchor = start.copy()
-
-    def begin(self) -> Array:
-        """See `Track`."""
-        plan = self._executor.plan
-        self.worst = np.repeat([0.0, np.inf], [len(plan.largest), len(plan.smallest)])
-        self._kept = np.empty((len(plan.kept), self._n))
-        return self._kept
-
-    def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
-        """See `Track`."""
-        executor, samples = self._executor, self._sides[side].samples
-        plan, block, lanes = executor.plan, executor.block, executor.lanes
-        source, target = np.array(plan.carried).T
-        sampled, smooth = list(plan.sampled), False
-        block[target] = (self._start if anew else self.anchor)[:, None]
-        while at < stop:
-            count = min(lanes, stop - at)
-            block[sampled, :count] = samples[:, at : at + count]
-            block[sampled, count:] = samples[:, stop - 1 : stop]
-            executor.settle("extrapolate" if smooth else "predict", plan.joined)
-            good = block[plan.slots[MARGIN], :count] > 0.0
-            accepted = count if good.all() else int(good.argmin())
-            if accepted:
-                self._keep(self._sides[side], at, block[:, :accepted])
-            elif smooth:  # back to where the motion stands, and on from there by its rates
-                block[source], block[sampled] = block[target], samples[:, at - 1 : at]
-            else:
-                break
-            smooth = plan.extrapolates(lanes) and accepted == lanes and at + accepted < stop
-            for name in () if smooth else plan.onward:
-                executor.run(name)
-            block[target] = block[source, max(accepted - 1, 0), None]
-            at += accepted
-        self.anchor[:] = block[target, 0]
-        return at
-
-    def _keep(self, side: Side, at: int, found: Array) -> None:
-        plan = self._executor.plan
-        self._kept[:, side.first + side.step * np.arange(at, at + found.shape[1])] = found[list(plan.kept)]
-        largest, smallest = np.split(self.worst, [len(plan.largest)])
-        np.maximum(largest, found[list(plan.largest)].max(axis=1), out=largest)
-        np.minimum(smallest, found[list(plan.smallest)].min(axis=1), out=smallest)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import msgspec
 import numpy as np
 
-from ...analysis.following import ALONE
 from ...analysis.geometry import places
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
@@ -18,7 +17,7 @@ from ...program.compiled import available
 from ...trajectory import Array, PointMotion, Trajectory
 from ..case import Case
 from ..compare import output_series, size
-from .levels import flops_of
+from .levels import MOTIONS, flops_of
 from .peak import Peak
 from .rounds import Spread, Work, take_turns
 
@@ -92,7 +91,7 @@ def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float
     reached = int(found.solved.sum())
     taken: list[float] = found.kept[model.rows["iterations"].start][found.solved].tolist()
     iterations = statistics.fmean(taken) if taken else 0.0
-    flops = flops_of(model, iterations, ALONE)
+    flops = flops_of(model, iterations, MOTIONS)
     rate = flops * reached / seconds.median
     return Batch(
         case=case.name,

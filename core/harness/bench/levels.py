@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...analysis.following import JOINED
+from ...analysis import following
 from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
@@ -80,6 +80,10 @@ LEVELS: Mapping[str, Level] = {
 """What is timed as a whole call, by what is asked."""
 
 
+SAMPLES, MOTIONS = ("extrapolate", *following.JOINED), ("extend", *following.ALONE)
+"""Names of the programs that predict and test lanes, by what lanes are."""
+
+
 def loops_alone(case: Case, tol: float) -> Callable[[], None]:
     """The executor's loops over all samples, everything asked for: no Python but two calls, no result made of the numbers.
 
@@ -93,18 +97,20 @@ def loops_alone(case: Case, tol: float) -> Callable[[], None]:
 
     def work() -> None:
         track.begin()
-        for k, side in enumerate(route.sides):
-            went = track.follow(k, 0, side.count, anew=True)
+        for went, side in zip(track.run(), route.sides, strict=True):
             if went < side.count:
                 raise SolveError(f"case {case.name!r}: the loops alone end after {went} of {side.count} samples on one side")
 
     return work
 
 
-def flops_of(model: Model, iterations: float, test: Sequence[str] = JOINED) -> float:
+def flops_of(model: Model, iterations: float, lanes: Sequence[str] = SAMPLES) -> float:
     """Floating-point operations of a sample: predictor, Newton's iterations, rates, outputs and the test of a solution.
 
     Those of lanes that were computed and not accepted, or iterated on because a neighbour did, do not count.
+
+    Args:
+        lanes: what predicts and tests lanes that are `SAMPLES` of a motion, or `MOTIONS`; of the first few other programs do.
     """
     sizes = {name: each["flops"] for name, each in model.sizes.items()}
-    return sizes["predict"] + iterations * sizes["newton"] + sizes["motion"] + sizes["outputs"] + sum(sizes[name] for name in test)
+    return iterations * sizes["newton"] + sum(sizes[name] for name in ("motion", "outputs", *lanes))

@@ -26,8 +26,6 @@ MOTIONS = ("position", "velocity", "acceleration")
 
 # Bytes of motions at once, of one thread: many samples of many points are solved in parts of a chunk.
 ROOM = 64_000_000
-# Bytes of the largest blocks that are used again: glibc's own limit is twice that.
-RECYCLED = 16_000_000
 # Messages of a chunk that are passed on; all variants without a solution are counted.
 MOST_MESSAGES = 50
 
@@ -143,9 +141,6 @@ class Ready:
     def __post_init__(self) -> None:
         self.model = compile_model(self.study.case.mechanism, request(self.study))
         self.route = Route(self.model, self.study.case.sweep.path)
-        # glibc keeps freed blocks for the next ones up to the size of the largest that was ever freed, else the system clears every
-        # page of every chunk anew: a third of the time around the machine code
-        np.empty(RECYCLED, dtype=np.uint8)
 
     def along(self, path: Path) -> Ready:
         """The same model on another path of the same drivers."""
