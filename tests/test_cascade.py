@@ -8,9 +8,9 @@ from kincheck import cases
 from kincheck.core import Gear, JointAngle, SolveError
 from kincheck.core.analysis.cascade import Cascade
 from kincheck.core.analysis.cascade_sweep import CascadeSweep
-from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.motions import Path, Ramp

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from kincheck.core import Distance, MechanismError, Universal, solve
-from kincheck.core.analysis.march import Route, march
+from kincheck.core.analysis.march import march
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.singularity import solve_closely
 from kincheck.core.analysis.system import System
 from kincheck.core.harness.case import Truth

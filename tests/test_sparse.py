@@ -23,10 +23,10 @@ from kincheck.core import (
 from kincheck.core.analysis.components import components
 from kincheck.core.analysis.equations import frames
 from kincheck.core.analysis.factors import Factors
-from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.orientation import Blocks
 from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sparse import FailedError, SparseModel
 from kincheck.core.analysis.sparse_sweep import solve_sparse
 from kincheck.core.analysis.sweep import follow

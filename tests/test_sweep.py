@@ -6,11 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute, Spherical, Translational
-from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.solve import solve
-from kincheck.core.analysis.sweep import sweep
-from kincheck.core.motions import Path, Ramp
 
 from .mechanisms import (
     CRANK,
@@ -69,51 +65,6 @@ def test_more_samples_than_lanes():
     found, short = wheel(many), wheel(many[::100])
     assert np.abs(found.position[::100] - short.position).max() <= 2e-16
     assert np.abs(found.acceleration[::100] - short.acceleration).max() <= 2e-14
-
-
-# Positions alone
-
-
-def positions(values, order=0, *, compiled=False):
-    """Of the strut, as many samples at once as a vector of machine code has lanes."""
-    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=compiled))
-    found = sweep(model, Path({"stroke": Ramp(1.0)}, np.asarray(values)), 1e-12)
-    assert found.solved.all(), found.message
-    return found
-
-
-@pytest.fixture
-def eight_lanes(monkeypatch):
-    monkeypatch.setattr("kincheck.core.analysis.march.LANES", 8)
-
-
-@pytest.mark.usefixtures("eight_lanes")
-@pytest.mark.parametrize("order", [0, 1, 2])
-def test_lanes_are_extrapolated_to_one_iteration(order):
-    fine = np.linspace(-0.08, 0.08, 161)
-    found = positions(fine, order)
-    later = np.abs(np.arange(161) - 80) > 8  # there is nothing yet to extrapolate the first eight on either side from
-    assert (found.iterations[later] == 1).all()
-    by_rates = positions(fine[::8], order)  # all that is left of the lanes before are rates
-    assert (by_rates.iterations[1:-1] > 1).any()
-    assert np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max() <= 4e-16
-
-
-@pytest.mark.usefixtures("eight_lanes")
-@pytest.mark.parametrize("compiled", [False, True])
-@pytest.mark.parametrize(
-    "values",
-    [np.repeat(STROKES, 2), [*np.linspace(0.0, 0.008, 17), *np.linspace(0.01, 0.08, 8)], [*np.linspace(0.0, 0.008, 16), 0.08]],
-    ids=["every sample twice", "a fine grid gets coarse", "one step as long as a hundred"],
-)
-@pytest.mark.parametrize("order", [0, 2])
-def test_where_extrapolation_fails_the_rates_take_over(values, order, compiled, monkeypatch):
-    """Two samples at one time make it infinite, a long step makes it wild. A lane alone is never extrapolated."""
-    found = positions(values, order, compiled=compiled)
-    monkeypatch.setattr("kincheck.core.analysis.march.LANES", 1)
-    expected = positions(values, order, compiled=False).points["wheel"]
-    assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
-    assert order == 0 or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
 
 
 # Closed forms

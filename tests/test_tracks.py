@@ -8,9 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from kincheck.core.analysis.march import Route, march
+from kincheck.core.analysis.march import march
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import SIGMA, Request
+from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program

@@ -7,11 +7,10 @@ import pytest
 from kincheck.cases import load
 from kincheck.core import Ramp, Sine, SolveError, solve, solve_designs
 from kincheck.core.analysis import variants
-from kincheck.core.analysis.following import weights
 from kincheck.core.analysis.geometry import placed, places
-from kincheck.core.analysis.march import Route
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path
@@ -89,25 +88,13 @@ def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(valu
     assert found.solved.all()
     assert found.retried == 0
     iterations = found.kept[model.rows["iterations"].start]
-    assert values is not FINE or (iterations[len(weights(FINE)) :] == 1).all()
-    monkeypatch.setattr("kincheck.core.analysis.model.following.weights", lambda times: np.full((NODES, len(times)), np.nan))
+    assert values is not FINE or (iterations[NODES:] == 1).all()
+    monkeypatch.setattr("kincheck.core.analysis.route.weights_of_samples", lambda times: np.full((NODES, len(times)), np.nan))
     by_rates = solve_variants(Route(model, path), numbers, TOL)
     assert by_rates.retried == 0
     rows = slice(0, model.rows["closure"].start)
     np.testing.assert_allclose(found.kept[rows], by_rates.kept[rows], rtol=0, atol=SAME)
     assert np.array_equal(found.kept[rows], by_rates.kept[rows]) == (values is ROUGH["every sample twice"])  # weights are infinite
-
-
-def test_weights_continue_what_is_of_fifth_order():
-    times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 40))
-    values, found = np.polynomial.Polynomial([1.0, -2.0, 0.5, 1.0, -0.3, 0.02])(times / 10.0), weights(times)
-    assert not found[:, :NODES].any()
-    for k in range(NODES, len(times)):
-        past = [values[j] for place in range(NODES) for j in range(k - NODES, k) if j % NODES == place]
-        assert found[:, k] @ past == pytest.approx(values[k], rel=1e-11)
-    for few in range(NODES + 1):
-        assert weights(times[:few]).shape == (NODES, few)
-    assert not np.isfinite(weights(np.repeat(times, 2))[:, NODES:]).all(axis=0).any()
 
 
 @pytest.mark.parametrize("path", [PATHS["from design, both ways"], Path({"stroke": Ramp(1.0)}, np.linspace(-0.06, 0.06, 61))])

@@ -16,9 +16,10 @@ import numpy as np
 from ..motions import Path
 from ..trajectory import Array
 from .continuity import AMPLIFIED, EPSILON, WORSE
-from .march import Route, arrived, march
+from .march import arrived, march
 from .model import TESTS, Model
 from .request import FROM, ORIENTATION, RATE, SIGMA, TIME
+from .route import Route
 from .singularity import solve_closely
 from .system import System
 

@@ -14,8 +14,8 @@ from ..mechanism import Mechanism
 from ..motions import Motion
 from ..trajectory import Array, PointMotion
 from .geometry import places
-from .march import Route
 from .model import compile_model
+from .route import Route
 from .solve import asked
 from .variants import solve_variants
 

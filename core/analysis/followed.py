@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..trajectory import Array
 from .bridge import bridge, onward
 from .continuity import doubtful
-from .march import End, March, Route, arrived, march
+from .march import End, March, arrived, march
 from .request import FROM, LARGEST_SIGMA, SIGMA, TIME
+from .route import Route
 from .system import System
 
 # A motion that ends with a smallest singular value above this part of the largest that it has had does not end at a singular pose.

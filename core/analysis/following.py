@@ -1,28 +1,29 @@
 """Programs that follow a motion: what lanes are predicted from, how, and which of them are accepted (see `programs`).
 
 predict   from state, v, a and time; time    -> state        Taylor step of second order
-extrapolate   states and times of a group of lanes; time   -> state        through `NODES` of them, without v and a
-extend    states of the samples before, and their weights   -> state        likewise, for lanes that are motions of their own
+extrapolate   states of the group of lanes before, weights   -> state        through `NODES` of them, without v and a
+extend    states of the samples before, weights   -> state        likewise, for lanes that are motions of their own
 gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
 alone, joined   all that is tested, and the tolerance   -> margin    positive where a lane may be accepted
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import mul
 
 import numpy as np
 
 from ..algebra import Scalar
-from ..program import DONE, MARGIN, NODES, Program, absolute, before, maximum, minimum, program, where_larger
+from ..program import DONE, MARGIN, NODES, Program, absolute, before, maximum, minimum, place_of, program, where_larger
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
 from .programs import Tracer
-from .request import ACCEPT, BLOCKS, EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, STOOD, TIME
+from .request import ACCEPT, BLOCKS, EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME
 
 WEIGHT, PAST = "weight", "past"
-"""The vectors of the samples that `extend` goes by: their weights, and their states one after the other."""
+"""The vectors of the samples that a state is continued through: their weights, and where they are remembered their states."""
 EULER_PARAMETERS = 4
 ABOUT = 1.5
 """A step may be this much longer than the one it learns from."""
@@ -72,56 +73,57 @@ def predict(tracer: Tracer) -> Program:
 
 
 def extrapolate(tracer: Tracer) -> Program:
-    """The state at the time by Lagrange's formula, through nodes of the group of lanes before; NaN where two share a time."""
-    time, layout = tracer.read(TIME), tracer.layout
-    nodes = [tracer.tape.at(k, layout.scalar(STOOD)) for k in range(NODES)]
-    weights: list[Scalar] = []
-    for node in nodes:
-        others = [each for each in nodes if each is not node]
-        weights.append(reduce(mul, (time - each for each in others)) / reduce(mul, (node - each for each in others)))
-    out: dict[int, Scalar] = {}
-    for name, value in tracer.formulation.design.items():
-        slots = layout.vector(name, len(value))
-        found = [sum((w * tracer.tape.at(k, slot) for k, w in enumerate(weights)), 0.0) for slot in slots]
-        for label in (name, PREDICTED + name):
-            tracer.store(out, label, _of_length_one(found))
-    return program("extrapolate", tracer.tape, out, tracer.prepared)
+    """The state from what it is in the group of lanes before, by the weights of those; see `weights_of_groups`."""
+    return _continued(tracer, "extrapolate", tracer.tape.at)
 
 
 def extend(tracer: Tracer) -> Program:
-    """The state from what it was at the last `NODES` samples, by their weights (see `weights`)."""
-    weight = tracer.vector(WEIGHT, NODES)
-    design = tracer.formulation.design
-    size = sum(len(value) for value in design.values())
-    past = tracer.vector(PAST, NODES * size)
+    """The state from what it was at the last `NODES` samples, by the weights of those; see `weights_of_samples`."""
+    state = [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[name]]
+    past = tracer.vector(PAST, NODES * len(state))
+    place = {slot: k for k, slot in enumerate(state)}
+    return _continued(tracer, "extend", lambda k, slot: past[k * len(state) + place[slot]])
+
+
+def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar]) -> Program:
+    """The state by Lagrange's formula, without v and a; at(k, slot) is what a slot was at node k."""
+    weights = tracer.vector(WEIGHT, NODES)
     out: dict[int, Scalar] = {}
-    first = 0
-    for name, value in design.items():
-        places = range(first, first := first + len(value))
-        found = [sum((w * past[size * k + place] for k, w in enumerate(weight)), 0.0) for place in places]
-        for label in (name, PREDICTED + name):
+    for part, value in tracer.formulation.design.items():
+        slots = tracer.layout.vector(part, len(value))
+        found = [sum((w * at(k, slot) for k, w in enumerate(weights)), 0.0) for slot in slots]
+        for label in (part, PREDICTED + part):
             tracer.store(out, label, _of_length_one(found))
-    return program("extend", tracer.tape, out, tracer.prepared)
+    return program(name, tracer.tape, out, tracer.prepared)
 
 
-def weights(times: Array) -> Array:
-    """Lagrange's weights of the `NODES` samples before each, by the places at which they are kept (`Plan.past`).
+def weights_of_groups(times: Array, lanes: int) -> Array:
+    """Weights of `NODES` lanes of the group before, for samples in groups of so many lanes.
 
     Args:
         times: of samples in the order in which they are gone through, shape (n,).
 
     Returns:
-        Shape (NODES, n): zero before there are so many, not finite where two of them share a time.
+        Shape (NODES, n): zero for the first group, not finite where two nodes share a time.
     """
-    found = np.zeros((NODES, len(times)))
-    wanted = np.arange(NODES, len(times))
-    if len(wanted):
-        nodes = {k: times[wanted - k] for k in range(1, NODES + 1)}  # k samples before
-        with np.errstate(all="ignore"):
-            for k, node in nodes.items():
-                factors = ((times[wanted] - each) / (node - each) for j, each in nodes.items() if j != k)
-                found[(wanted - k) % NODES, wanted] = reduce(mul, factors)
+    found, wanted = np.zeros((NODES, len(times))), np.arange(lanes, len(times))
+    before = wanted // lanes * lanes - lanes
+    found[:, wanted] = _lagrange(times[wanted], [times[before + place_of(k, lanes)] for k in range(NODES)])
     return found
+
+
+def weights_of_samples(times: Array) -> Array:
+    """Weights of the `NODES` samples before each, by the places at which they are kept (`Plan.past`); otherwise as above."""
+    found, wanted = np.zeros((NODES, len(times))), np.arange(NODES, len(times))
+    nodes = [wanted - 1 - (wanted - 1 - k) % NODES for k in range(NODES)]  # the last sample that was kept at each place
+    found[:, wanted] = _lagrange(times[wanted], [times[each] for each in nodes])
+    return found
+
+
+def _lagrange(times: Array, nodes: Sequence[Array]) -> list[Array]:
+    """Lagrange's weights of nodes, each of the same shape as the times."""
+    with np.errstate(all="ignore"):
+        return [reduce(mul, ((times - b) / (a - b) for j, b in enumerate(nodes) if j != k)) for k, a in enumerate(nodes)]
 
 
 def tests(tracer: Tracer, *, neighbours: bool) -> list[Program]:
@@ -176,7 +178,6 @@ def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
         maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
     )
     out = {tracer.layout.scalar(MARGIN): reduce(minimum, margins), tracer.layout.scalar(LARGEST_SIGMA): largest}
-    out |= {tracer.layout.scalar(STOOD): read(TIME)} if neighbours else {}
     return program(name, tracer.tape, out, tracer.prepared)
 
 

@@ -9,27 +9,22 @@ from __future__ import annotations
 import threading
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motions import Path
 from ..program import MARGIN, Side
 from ..trajectory import Array
 from .model import Model
 from .refusal import why_refused
 from .request import FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, TIME, accept_by
+from .route import AS_THEY_ARE, Route
 
-# Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
-LANES = 256
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
 # passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
 HALVINGS = 40
-# Samples that are in the order of their times.
-AS_THEY_ARE = slice(None)
 # A side that needs more rounds than this without reaching a sample makes no headway.
 MAX_ROUNDS = 200
 
@@ -74,94 +69,6 @@ class End:
     wanted: float
 
 
-@dataclass(frozen=True, eq=False)
-class Route:
-    """A path made ready for a model: everything about the samples that does not depend on the motion.
-
-    Attributes:
-        design: all slots of a lane at the design position of a variant; the model's own unless given.
-        since: the time at which that lane stands on the path, where that is not at the design position but on the way.
-    """
-
-    model: Model
-    path: Path
-    design: Array | None = None
-    since: float | None = None
-
-    @cached_property
-    def from_design(self) -> bool:
-        """Whether the lane it starts from stands on the path: at the design position at time zero, or on the way."""
-        return self.since is not None or self.path.from_design
-
-    @cached_property
-    def start(self) -> float:
-        """The time it starts at: where its lane stands, or else the first sample."""
-        return self.since or 0.0 if self.from_design else float(self.path.times[0])
-
-    @cached_property
-    def order(self) -> NDArray[np.intp]:
-        """The samples by time."""
-        return np.argsort(self.path.times, kind="stable")
-
-    @cached_property
-    def back(self) -> NDArray[np.intp] | slice:
-        """From the samples by time to the order wanted."""
-        n = len(self.path.times)
-        for simple in (AS_THEY_ARE, slice(None, None, -1)):
-            if (self.order == np.arange(n)[simple]).all():
-                return simple
-        return np.argsort(self.order, kind="stable")
-
-    @cached_property
-    def origin(self) -> Array:
-        """What is given at the start, shape (sampled,)."""
-        return self.sampled(np.array([self.start]))[:, 0]
-
-    @cached_property
-    def departure(self) -> Array:
-        """All slots of a lane that stands at the design position and moves as the start says."""
-        return self.model.moving(self.model.design if self.design is None else self.design, self.origin)
-
-    @cached_property
-    def below(self) -> int:
-        """How many samples are before the start."""
-        return int(np.searchsorted(self.path.times[self.order], self.start, side="left"))
-
-    @cached_property
-    def sides(self) -> tuple[Side, ...]:
-        """The side after the start and the side before it, as far as there are samples."""
-        times = self.path.times[self.order]
-        n, below = len(times), self.below
-        pad = self.model.executor(self.lanes).margin
-        found: list[Side] = []
-        for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
-            if len(columns):
-                samples = self.sampled(times[columns])
-                padded = np.concatenate([samples, np.repeat(samples[:, -1:], pad, axis=1)], axis=1)
-                found.append(Side(padded, len(columns), int(columns[0]), step))
-        return tuple(found)
-
-    @cached_property
-    def lanes(self) -> int:
-        """How many samples are tried at once."""
-        return min(LANES, max(1, len(self.path.times)))
-
-    def marcher(self, tol: float, *, crossing: bool) -> _Marcher:
-        """What goes along it from its departure; kept, because binding takes as long as going."""
-        key = threading.get_ident(), tol, crossing
-        if key not in self._marchers:
-            self._marchers[key] = _Marcher(self, self.departure, accept_by(tol, crossing=crossing))
-        return self._marchers[key]
-
-    @cached_property
-    def _marchers(self) -> dict[tuple[int, float, bool], _Marcher]:
-        return {}
-
-    def sampled(self, times: Array) -> Array:
-        """What is given at the times, shape (sampled, n)."""
-        return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
-
-
 def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bool = False) -> March:
     """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance.
 
@@ -171,16 +78,24 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
     """
     model = route.model
     if route.from_design:
-        return route.marcher(tol, crossing=crossing).run(visit)
+        return marcher(route, tol, crossing=crossing).run(visit)
     way = Route(model, route.path.lead_in(), route.design)
     last = len(way.path.times) - 1
-    found = way.marcher(tol, crossing=crossing).run({last})
+    found = marcher(way, tol, crossing=crossing).run({last})
     if not found.solved.all():
         n = len(route.path.times)
         end = replace(found.ends[0], message=f"on the way to the first sample: {found.messages[0]}")
         return March(np.full((len(found.kept), n), np.nan), found.worst, np.zeros(n, np.bool_), (end,))
     start = model.moving(arrived(model, found.visited[last]), route.origin)
-    return _Marcher(route, start, accept_by(tol, crossing=crossing)).run(visit)
+    return Marcher(route, start, accept_by(tol, crossing=crossing)).run(visit)
+
+
+def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
+    """What goes along a route from its departure; kept with it, because binding takes as long as going."""
+    key = threading.get_ident(), tol, crossing
+    if key not in route.marchers:
+        route.marchers[key] = Marcher(route, route.departure, accept_by(tol, crossing=crossing))
+    return route.marchers[key]
 
 
 def arrived(model: Model, lane: Array) -> Array:
@@ -202,7 +117,7 @@ def longest(margins: Array) -> int | None:
     return int(good[0]) if len(good) else None
 
 
-class _Marcher:
+class Marcher:
     """A route bound to lanes of this thread, to be gone along again and again."""
 
     def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float]) -> None:

@@ -64,8 +64,6 @@ class Model:
         self.sampled = [self.slots[TIME]]
         self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
         fans = bool(self.request.varied) and not self.request.state
-        if fans:
-            self.sampled += self.vectors[following.WEIGHT]
         self._tangent = "motion" if self.request.order == 2 else "tangent"
         kept = [slot for name in self._wanted() for slot in self.vectors[name]]
         self.rows = self._rows()
@@ -77,7 +75,7 @@ class Model:
             alone=following.ALONE,
             joined=() if self.request.state else following.JOINED,
             onward=(self._tangent,),
-            sampled=self.sampled,
+            sampled=[*self.sampled, *self.vectors.get(following.WEIGHT, ())],
             remembered=[slot for name in self.state for slot in self.vectors[name]] if fans else (),
             past=self.vectors[following.PAST][0] if fans else 0,
             carried=tracing.carried,
@@ -171,7 +169,7 @@ class Model:
         return self._executors[key]
 
     def samples(self, times: Array, drive: Array) -> Array:
-        """What `sampled` holds at times that are gone through in that order, shape (sampled, n).
+        """What `sampled` holds at the times, shape (sampled, n).
 
         Args:
             drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, n).
@@ -183,8 +181,6 @@ class Model:
             rows = found[5 * k + 1 : 5 * k + 6]
             rows[:3] = drive[:, k] * (1.0 if angle else 1.0 / self.frame.unit)
             rows[3], rows[4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
-        if self._plan.remembered:
-            found[5 * len(self.request.drivers) + 1 :] = following.weights(times)
         return found
 
     def moving(self, lane: Array, sample: Array) -> Array:

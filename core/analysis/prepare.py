@@ -15,9 +15,9 @@ from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Trajectory
 from .equations import Style, frames
-from .march import Route
 from .model import compile_model
 from .request import Request
+from .route import Route
 from .sweep import follow
 
 # Up to as many bodies one program is made in about a second.

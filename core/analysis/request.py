@@ -41,7 +41,6 @@ class Request:
 RATE, RATE_T = "rate", "rate_t"
 """The vectors that hold the rates and accelerations of the unknowns."""
 TIME = "time"
-STOOD = "time of the group before"
 GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 """The vectors that tell how a given body moves, and how many numbers each has [units and seconds]."""
 FROM, EARLIER = "from ", "earlier "

@@ -19,9 +19,10 @@ from .bridge import bridge
 from .continuation import limit_ahead
 from .continuity import AMPLIFIED, WORSE
 from .followed import Followed, Passage
-from .march import End, March, Route
+from .march import End, March
 from .model import TESTS
 from .request import FROM, TIME
+from .route import Route
 from .singularity import CONTINUED, Singularity, examine, listed, solve_closely
 
 # Of one march: the others are counted.

@@ -12,9 +12,10 @@ from ..motions import Path
 from ..program import ITERATIONS
 from ..trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
 from .continuity import doubtful
-from .march import Route, march
+from .march import march
 from .model import Model
 from .request import SIGMA
+from .route import Route
 
 
 def sweep(model: Model, path: Path, tol: float) -> Trajectory:

@@ -17,8 +17,9 @@ from ..motions import Path
 from ..program import Executor
 from ..trajectory import Array
 from .continuity import doubtful
-from .march import Route, march
+from .march import march
 from .request import SIGMA, accept_by
+from .route import Route
 
 # Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
 # it is too long is solved again alone.
@@ -68,8 +69,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     for k, side in enumerate(route.sides):
         if k:
             executor.put(ahead, start)
-        samples = np.ascontiguousarray(side.samples[:, : side.count])
-        executor.fan(samples, whole, side.first, side.step)
+        executor.fan(route.for_motions[k], whole, side.first, side.step)
     kept = whole[:, :, :count]
     kept[:, :, ~(arrived & closes)] = np.nan
     solved = ~np.isnan(kept[model.rows["closure"].start])
@@ -112,5 +112,5 @@ def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
     model.start(executor, way.origin)
     found = executor.table(LEAD)
     (side,) = way.sides
-    executor.fan(np.ascontiguousarray(side.samples[:, :LEAD]), found, side.first, side.step)
+    executor.fan(way.for_motions[0], found, side.first, side.step)
     return ~np.isnan(found[model.rows["closure"].start, -1, :count])

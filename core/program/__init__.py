@@ -5,7 +5,7 @@ from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Tra
 from .llvm_executor import LlvmCode, LlvmExecutor
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
-from .trace import NODES, Tape, Traced, absolute, before, cos, maximum, minimum, sin, sqrt, where_larger
+from .trace import NODES, Tape, Traced, absolute, before, cos, maximum, minimum, place_of, sin, sqrt, where_larger
 
 __all__ = [
     "DONE",
@@ -30,6 +30,7 @@ __all__ = [
     "cos",
     "maximum",
     "minimum",
+    "place_of",
     "program",
     "sin",
     "sqrt",

@@ -38,7 +38,8 @@ class Plan:
         after: names of the programs that end an attempt.
         alone, joined: names of the programs that test lanes: that know nothing of each other, or are neighbours on one way.
         onward: names of the programs that make a solved lane ready to be predicted from; they may be in `after` too.
-        sampled: slots that are given anew at every sample.
+        sampled: slots that are given anew at every sample; what `extrapolate` is given holds for groups that begin at a multiple
+            of their lanes.
         remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for `extend`.
         past: the slot it begins to keep them at: those of sample k are at place k modulo `NODES`.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
@@ -144,6 +145,11 @@ class Executor(Protocol):
 
     @property
     def lanes(self) -> int: ...
+    @property
+    def group(self) -> int:
+        """Lanes that `follow` attempts together."""
+        ...
+
     @property
     def margin(self) -> int:
         """Samples that `follow` may read beyond the last."""

@@ -62,7 +62,7 @@ class LlvmExecutor:
     """
 
     def __init__(self, code: LlvmCode, lanes: int) -> None:
-        self.lanes, self.margin, self._code = lanes, code.width, code
+        self.lanes, self.group, self.margin, self._code = lanes, code.width, code.width, code
         self._groups = self.groups(lanes)
         slots = len(code.plan.slots)
         self._memory = _aligned(self._groups * slots * code.width).reshape(self._groups, slots, code.width)

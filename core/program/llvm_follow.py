@@ -17,7 +17,10 @@ forget begins the worst anew, and clears that field: the calls after it go on. `
 
 
 def follow(plan: Plan, width: int) -> str:
-    """See `Track`: W samples at a time, and on from the last one accepted."""
+    """See `Track`: W samples at a time, and on from the last one accepted.
+
+    What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends there.
+    """
     vector, begin, test, given = f"<{width} x double>", *(Lines(width, prefix) for prefix in "btg")
     # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and but for one no faster
     enter, up, down, back, move, leave = (Rows(width, name) for name in ("enter", "up", "down", "back", "move", "leave"))
@@ -69,6 +72,7 @@ entry:
 head:
   %at = phi i64 [%from, %enter_end], [%next, %carry], [%next, %move_end]
   %smooth = phi i1 [false, %enter_end], [{str(extrapolates).lower()}, %carry], [false, %move_end]
+  %whole_before = phi i1 [false, %enter_end], [false, %carry], [%onto, %move_end]
   %more = icmp slt i64 %at, %stop
   br i1 %more, label %begin, label %end
 begin:
@@ -88,12 +92,19 @@ attempt:
   %wide = zext i{width} %bits to i64
   %rejected = xor i64 %wide, {2 ** (width + 1) - 1}
   %leading = call i64 @llvm.cttz.i64(i64 %rejected, i1 true)
-  %left = sub i64 %stop, %at
+  %offset = and i64 %at, {width - 1}
+  %short = sub i64 {width}, %offset
+  %room = select i1 %whole_before, i64 %short, i64 {width}
+  %wanted = sub i64 %stop, %at
+  %left = call i64 @llvm.smin.i64(i64 %room, i64 %wanted)
   %accepted = call i64 @llvm.smin.i64(i64 %leading, i64 %left)
   %next = add i64 %at, %accepted
   %full = icmp eq i64 %accepted, {width if quick else -1}
   %further = icmp slt i64 %next, %stop
-  %whole = and i1 %full, %further
+  %onto = and i1 %full, {str(extrapolates).lower()}
+  %aligned = icmp ule i64 %offset, {0 if extrapolates else width}
+  %going = and i1 %full, %further
+  %whole = and i1 %going, %aligned
   %none = icmp eq i64 %accepted, 0
   br i1 %none, label %missed, label %keep
 missed:

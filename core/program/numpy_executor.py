@@ -63,7 +63,7 @@ class NumpyExecutor:
     margin = 0
 
     def __init__(self, plan: Plan, lanes: int) -> None:
-        self.lanes = lanes
+        self.lanes = self.group = lanes
         self.block: Array = np.zeros((len(plan.slots), lanes))
         self.plan = plan
         self.heads: list[int] = [0]

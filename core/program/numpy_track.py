@@ -70,10 +70,11 @@ class NumpyTrack:
         executor, samples = self._executor, self._sides[side].samples
         plan, block, lanes = executor.plan, executor.block, executor.lanes
         source, target = np.array(plan.carried).T
-        sampled, smooth = list(plan.sampled), False
+        sampled, smooth, whole = list(plan.sampled), False, False
         block[target] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
-            count = min(lanes, stop - at)
+            # what is extrapolated begins at a multiple of the lanes: on to there as soon as a group is accepted whole
+            count = min(lanes - at % lanes if whole and plan.extrapolates(lanes) else lanes, stop - at)
             block[sampled, :count] = samples[:, at : at + count]
             block[sampled, count:] = samples[:, stop - 1 : stop]
             executor.settle("extrapolate" if smooth else "predict", plan.joined)
@@ -84,7 +85,8 @@ class NumpyTrack:
                 executor.go_back(samples[:, at - 1 : at])
             else:
                 break
-            smooth = plan.extrapolates(lanes) and accepted == lanes and at + accepted < stop
+            whole = accepted == lanes
+            smooth = plan.extrapolates(lanes) and whole and at % lanes == 0 and at + accepted < stop
             for name in () if smooth or not accepted else plan.remaining:
                 executor.run(name)
             block[target] = block[source, max(accepted - 1, 0), None]

@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 
 from ...analysis.geometry import places
-from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
+from ...analysis.route import Route
 from ...analysis.variants import Variants, solve_variants
 from ...program.compiled import available
 from ...trajectory import Array, PointMotion, Trajectory

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...analysis import following
-from ...analysis.march import Route
+from ...analysis.march import marcher
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
+from ...analysis.route import Route
 from ...analysis.sweep import follow
 from ...errors import SolveError
 from ...program.compiled import available
@@ -93,7 +94,7 @@ def loops_alone(case: Case, tol: float) -> Callable[[], None]:
         SolveError: a step has to be divided, which needs Python.
     """
     route = Level().build(case)
-    track = route.marcher(tol, crossing=False).track
+    track = marcher(route, tol, crossing=False).track
 
     def work() -> None:
         track.begin()

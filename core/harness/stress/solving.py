@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...analysis.march import Route
 from ...analysis.model import compile_model
 from ...analysis.request import Request
+from ...analysis.route import Route
 from ...analysis.sweep import follow
 from ...errors import KincheckError
 from ...trajectory import Trajectory

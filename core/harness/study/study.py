@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...algebra import Vec3
 from ...analysis.geometry import placed
-from ...analysis.march import Route
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
+from ...analysis.route import Route
 from ...analysis.variants import solve_variants
 from ...jet import Jet
 from ...motions import Path

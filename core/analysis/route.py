@@ -1,0 +1,110 @@
+"""A path made ready for a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..motions import Path
+from ..program import Side
+from ..trajectory import Array
+from .following import weights_of_groups, weights_of_samples
+from .model import Model
+
+# Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
+LANES = 256
+# Samples that are in the order of their times.
+AS_THEY_ARE = slice(None)
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A path made ready for a model: everything about the samples that does not depend on the motion.
+
+    Attributes:
+        design: all slots of a lane at the design position of a variant; the model's own unless given.
+        since: the time at which that lane stands on the path, where that is not at the design position but on the way.
+    """
+
+    model: Model
+    path: Path
+    design: Array | None = None
+    since: float | None = None
+
+    @cached_property
+    def from_design(self) -> bool:
+        """Whether the lane it starts from stands on the path: at the design position at time zero, or on the way."""
+        return self.since is not None or self.path.from_design
+
+    @cached_property
+    def start(self) -> float:
+        """The time it starts at: where its lane stands, or else the first sample."""
+        return self.since or 0.0 if self.from_design else float(self.path.times[0])
+
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """The samples by time."""
+        return np.argsort(self.path.times, kind="stable")
+
+    @cached_property
+    def back(self) -> NDArray[np.intp] | slice:
+        """From the samples by time to the order wanted."""
+        n = len(self.path.times)
+        for simple in (AS_THEY_ARE, slice(None, None, -1)):
+            if (self.order == np.arange(n)[simple]).all():
+                return simple
+        return np.argsort(self.order, kind="stable")
+
+    @cached_property
+    def origin(self) -> Array:
+        """What is given at the start, shape (sampled,)."""
+        return self.sampled(np.array([self.start]))[:, 0]
+
+    @cached_property
+    def departure(self) -> Array:
+        """All slots of a lane that stands at the design position and moves as the start says."""
+        return self.model.moving(self.model.design if self.design is None else self.design, self.origin)
+
+    @cached_property
+    def below(self) -> int:
+        """How many samples are before the start."""
+        return int(np.searchsorted(self.path.times[self.order], self.start, side="left"))
+
+    @cached_property
+    def sides(self) -> tuple[Side, ...]:
+        """The side after the start and the side before it, as far as there are samples."""
+        times = self.path.times[self.order]
+        n, below, executor = len(times), self.below, self.model.executor(self.lanes)
+        found: list[Side] = []
+        for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
+            if len(columns):
+                samples = self.sampled(times[columns])
+                if len(self.model.plan.sampled) > len(samples):
+                    samples = np.concatenate([samples, weights_of_groups(times[columns], executor.group)])
+                padded = np.concatenate([samples, np.repeat(samples[:, -1:], executor.margin, axis=1)], axis=1)
+                found.append(Side(padded, len(columns), int(columns[0]), step))
+        return tuple(found)
+
+    @cached_property
+    def for_motions(self) -> tuple[Array, ...]:
+        """The samples of each side for lanes that are motions of their own."""
+        given = [self.sampled(side.samples[0, : side.count]) for side in self.sides]
+        return tuple(np.concatenate([each, weights_of_samples(each[0])]) for each in given)
+
+    @cached_property
+    def lanes(self) -> int:
+        """How many samples are tried at once."""
+        return min(LANES, max(1, len(self.path.times)))
+
+    @cached_property
+    def marchers(self) -> dict[tuple[int, float, bool], Any]:
+        """What goes along it, by thread, tolerance and whether it may cross singular poses; see `march`."""
+        return {}
+
+    def sampled(self, times: Array) -> Array:
+        """What is given at the times, shape (sampled, n)."""
+        return self.model.samples(times, self.path.drive(self.model.request.drivers, times))

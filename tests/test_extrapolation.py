@@ -1,0 +1,86 @@
+"""Lanes that are predicted by the samples before them: to one iteration, to the same pose; and where that fails, by their rates."""
+
+import numpy as np
+import pytest
+from kincheck.core.analysis.following import weights_of_groups, weights_of_samples
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.sweep import sweep
+from kincheck.core.motions import Path, Ramp
+from kincheck.core.program import NODES, place_of
+
+from .mechanisms import mcpherson, slider_crank, slider_crank_motion
+
+STROKES = np.linspace(-0.08, 0.08, 33)
+
+
+def test_weights_continue_what_is_of_fifth_order():
+    times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 40))
+    values = np.polynomial.Polynomial([1.0, -2.0, 0.5, 1.0, -0.3, 0.02])(times / 10.0)
+    of_samples, of_groups = weights_of_samples(times), weights_of_groups(times, 8)
+    assert not of_samples[:, :NODES].any()
+    assert not of_groups[:, :8].any()
+    for k in range(8, len(times)):
+        past = [values[j] for place in range(NODES) for j in range(k - NODES, k) if j % NODES == place]
+        assert of_samples[:, k] @ past == pytest.approx(values[k], rel=1e-11)
+        group = values[k // 8 * 8 - 8 : k // 8 * 8]
+        assert of_groups[:, k] @ [group[place_of(j, 8)] for j in range(NODES)] == pytest.approx(values[k], rel=1e-9)
+    for few in range(9):
+        assert weights_of_samples(times[:few]).shape == weights_of_groups(times[:few], 8).shape == (NODES, few)
+    for weights in weights_of_samples(np.repeat(times, 2)), weights_of_groups(np.repeat(times, 2), 8):
+        assert not np.isfinite(weights[:, 8:]).all(axis=0).any()
+
+
+def positions(values, order=0, *, compiled=False):
+    """Of the strut, as many samples at once as a vector of machine code has lanes."""
+    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=compiled))
+    found = sweep(model, Path({"stroke": Ramp(1.0)}, np.asarray(values)), 1e-12)
+    assert found.solved.all(), found.message
+    return found
+
+
+@pytest.fixture
+def eight_lanes(monkeypatch):
+    monkeypatch.setattr("kincheck.core.analysis.route.LANES", 8)
+
+
+@pytest.mark.usefixtures("eight_lanes")
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_lanes_are_extrapolated_to_one_iteration(order):
+    fine = np.linspace(-0.08, 0.08, 161)
+    found = positions(fine, order)
+    later = np.abs(np.arange(161) - 80) > 8  # there is nothing yet to extrapolate the first eight on either side from
+    assert (found.iterations[later] == 1).all()
+    by_rates = positions(fine[::8], order)  # all that is left of the lanes before are rates
+    assert (by_rates.iterations[1:-1] > 1).any()
+    assert np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max() <= 4e-16
+
+
+@pytest.mark.usefixtures("eight_lanes")
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize(
+    "values",
+    [np.repeat(STROKES, 2), [*np.linspace(0.0, 0.008, 17), *np.linspace(0.01, 0.08, 8)], [*np.linspace(0.0, 0.008, 16), 0.08]],
+    ids=["every sample twice", "a fine grid gets coarse", "one step as long as a hundred"],
+)
+@pytest.mark.parametrize("order", [0, 2])
+def test_where_extrapolation_fails_the_rates_take_over(values, order, compiled, monkeypatch):
+    """Two samples at one time make it infinite, a long step makes it wild. A lane alone is never extrapolated."""
+    found = positions(values, order, compiled=compiled)
+    monkeypatch.setattr("kincheck.core.analysis.route.LANES", 1)
+    expected = positions(values, order, compiled=False).points["wheel"]
+    assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
+    assert order == 0 or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
+
+
+@pytest.mark.usefixtures("eight_lanes")
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("order", [0, 2])
+def test_a_grid_that_gets_fine_is_extrapolated_from_there(order, compiled):
+    """Long steps are taken one by one; from the first group that is accepted whole it is on to a multiple of eight."""
+    angles = np.concatenate([[0.3, 0.6, 0.9], 0.9 + 0.002 * np.arange(1.0, 62.0)])
+    model = compile_model(slider_crank(), Request(("turn",), ("end",), order=order, compiled=compiled))
+    found = sweep(model, Path({"turn": Ramp(1.0)}, angles), 1e-12)
+    assert (found.iterations[:3] > 1).all()
+    assert (found.iterations[-32:] == 1).all()
+    assert np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max() <= 1e-15
