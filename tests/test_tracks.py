@@ -132,3 +132,26 @@ def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written()
         for source, target in moves:
             slots[target] = slots[source]
     assert one == other
+
+
+def test_both_sides_are_one_attempt_of_the_numpy_executor(monkeypatch):
+    """Neither side's first lane has a neighbour."""
+    route, settled = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False), list[str]()
+    attempt = NumpyExecutor.settle
+    monkeypatch.setattr(NumpyExecutor, "settle", lambda self, start, tests: (settled.append(start), attempt(self, start, tests)))
+    found = march(route, TOL)
+    assert found.solved.all()
+    assert settled == ["predict"]
+
+
+@pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+def test_tables_begin_with_a_cache_line():
+    mechanism = mcpherson()
+    model = compile_model(mechanism, Request(("stroke",), ("wheel",), varied=("points.wheel.position",)))
+    for lanes in (1, 9, 300):
+        executor = model.executor(lanes)
+        for columns in (1, 3):
+            table = executor.table(columns)
+            assert table.shape == (model.kept, columns, executor.room)
+            assert table.ctypes.data % 64 == 0
+            assert table.flags.c_contiguous
