@@ -136,12 +136,23 @@ def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written()
 
 def test_both_sides_are_one_attempt_of_the_numpy_executor(monkeypatch):
     """Neither side's first lane has a neighbour."""
-    route, settled = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False), list[str]()
+    route, settled = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False), list[list[int]]()
     attempt = NumpyExecutor.settle
-    monkeypatch.setattr(NumpyExecutor, "settle", lambda self, start, tests: (settled.append(start), attempt(self, start, tests)))
-    found = march(route, TOL)
-    assert found.solved.all()
-    assert settled == ["predict"]
+    monkeypatch.setattr(NumpyExecutor, "settle", lambda x, start, tests: (settled.append([*x.heads]), attempt(x, start, tests)))
+    assert march(route, TOL).solved.all()
+    assert settled == [[0, 17]]
+    assert march(route, TOL, visit={32}).solved[32]
+    assert settled[1:] == [[0]]
+
+
+def test_a_lane_that_is_a_head_has_none_before_it():
+    tape = Tape()
+    plan = Plan({"f": program("f", tape, {2: before(tape.input(0), tape.input(1))})}, {str(k): k for k in range(3)})
+    executor = NumpyExecutor(plan, 6)
+    executor.put([0, 1], np.arange(12.0).reshape(2, 6))
+    executor.heads[:] = [0, 4]
+    executor.run("f")
+    assert executor.get([2]).tolist() == [[6.0, 0.0, 1.0, 2.0, 10.0, 4.0]]
 
 
 @pytest.mark.skipif(not available(), reason="llvmlite is not installed")
