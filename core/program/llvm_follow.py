@@ -22,17 +22,15 @@ def follow(plan: Plan, width: int) -> str:
     What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends there.
     """
     vector, begin, test, given = f"<{width} x double>", *(Lines(width, prefix) for prefix in "btg")
-    # loops over tables: written out row by row they would be a fifth of all that is to be compiled, and but for one no faster
-    enter, up, down, back, move, leave = (Rows(width, name) for name in ("enter", "up", "down", "back", "move", "leave"))
+    # loops over tables: written out row by row they would be a quarter of all that is to be compiled, and no faster
+    loops = {name: Rows(width, name) for name in ("enter", "up", "down", "back", "move", "pass", "leave")}
+    enter, up, down, back, move, carry, leave = loops.values()
     sources, targets = zip(*plan.carried, strict=True)
     extrapolates = plan.extrapolates(width)
     quick = extrapolates or not plan.remaining
     rates = plan.rates if extrapolates else ()
-    carry = Lines(width, "c")  # what a group is followed by that was accepted whole: each time but for a few
-    for source, target in plan.moves:
-        if source not in rates:
-            place = carry.number(carry.slot(source), width - 1)
-            carry.write(target, carry.spread(carry.anew(f"load double, ptr {place}, align 8")))
+    source, target = carry.table(*zip(*[pair for pair in plan.moves if pair[0] not in rates], strict=True))
+    carry.write(target, carry.spread(carry.let(f"load double, ptr {carry.number(carry.slot(source), width - 1)}, align 8")))
     (slot,) = enter.table(targets)
     enter.write(slot, enter.spread(enter.let(f"load double, ptr {enter.number('%place', enter.row)}, align 8")))
     (slot,) = leave.table(targets)
@@ -53,7 +51,7 @@ def follow(plan: Plan, width: int) -> str:
     move.write(target, move.spread(move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")))
     source, target = back.table(sources[::-1], targets[::-1])
     back.write(source, back.read(target))
-    tables = "\n".join(each.constants for each in (enter, up, down, back, move, leave))
+    tables = "\n".join(each.constants for each in loops.values())
     worst = _Worst(plan, width)
     return f"""{tables}
 {worst.declarations}
@@ -70,9 +68,9 @@ entry:
   {enter.loop("entry")}
   br label %head
 head:
-  %at = phi i64 [%from, %enter_end], [%next, %carry], [%next, %move_end]
-  %smooth = phi i1 [false, %enter_end], [{str(extrapolates).lower()}, %carry], [false, %move_end]
-  %whole_before = phi i1 [false, %enter_end], [false, %carry], [%onto, %move_end]
+  %at = phi i64 [%from, %enter_end], [%next, %pass_end], [%next, %move_end]
+  %smooth = phi i1 [false, %enter_end], [{str(extrapolates).lower()}, %pass_end], [false, %move_end]
+  %whole_before = phi i1 [false, %enter_end], [false, %pass_end], [%onto, %move_end]
   %more = icmp slt i64 %at, %stop
   br i1 %more, label %begin, label %end
 begin:
@@ -129,7 +127,7 @@ backward:
 kept:
   br i1 %whole, label %carry, label %onward
 carry:
-  {carry.text}
+  {carry.loop("carry")}
   br label %head
 onward:
   {calls(plan.remaining)}
