@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -59,6 +60,14 @@ class Stuck:
     near: Array
 
 
+def _system(route: Route) -> System:
+    """The equations of a route's model; kept with it, because tracing them anew takes longer than all else here."""
+    thread = threading.get_ident()
+    if thread not in route.systems:
+        route.systems[thread] = System(route.model)
+    return route.systems[thread]
+
+
 class Followed:
     """A march, and its going on beyond its ends.
 
@@ -73,7 +82,7 @@ class Followed:
 
     def __init__(self, route: Route, found: March, tol: float) -> None:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
-        self.system = System(route.model)
+        self.system = _system(route)
         self.parts = [Part(route, np.arange(len(self.times)))]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []

@@ -105,6 +105,11 @@ class Route:
         """What goes along it, by thread, tolerance and whether it may cross singular poses; see `march`."""
         return {}
 
+    @cached_property
+    def systems(self) -> dict[int, Any]:
+        """The equations outside the march, by thread, once they were wanted; see `Followed`."""
+        return {}
+
     def sampled(self, times: Array) -> Array:
         """What is given at the times, shape (sampled, n)."""
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))

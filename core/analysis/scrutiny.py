@@ -21,9 +21,9 @@ from .continuity import AMPLIFIED, WORSE
 from .followed import Followed, Passage
 from .march import End, March
 from .model import TESTS
-from .request import FROM, TIME
+from .request import FROM, SIGMA, TIME
 from .route import Route
-from .singularity import CONTINUED, Singularity, examine, listed, solve_closely
+from .singularity import CONTINUED, Singularity, examine, listed, smallest_singular_values, solve_closely
 
 # Of one march: the others are counted.
 NAMED = 8
@@ -112,6 +112,12 @@ class _Scrutiny:
         indices = np.array(sorted(visited), np.intp)
         lanes = np.stack([visited[k] for k in indices.tolist()], axis=1)
         state, sample = self.system.state(lanes), self.route.sampled(self.times[indices])
+        # the estimate says too little of many unknowns: most of their samples are beyond doubt by sigma itself
+        self.found.kept[self.model.rows[SIGMA].start, indices] = smallest_singular_values(self.system, state, sample)
+        left = np.flatnonzero(self.followed.doubtful[indices])
+        if not len(left):
+            return
+        indices, lanes, state, sample = indices[left], lanes[:, left], state[:, left], sample[:, left]
         solved = solve_closely(self.system, state, sample)
         outputs = self.system.outputs(solved.state, sample, solved.rate, solved.rate_t)
         closure, leftover, branch = (outputs.pop(name)[0] for name in ("closure", "leftover", "branch"))

@@ -133,6 +133,12 @@ DIFFERENCE = EPSILON ** (1.0 / 3.0)
 POLISH = 12
 
 
+def smallest_singular_values(system: System, state: Array, sample: Array) -> Array:
+    """Of the rows at states, shape (m,)."""
+    found: Array = np.linalg.svd(_finite(system.equations(state, sample).jacobian), compute_uv=False)
+    return found[:, -1]
+
+
 def solve_closely(system: System, state: Array, sample: Array) -> Solved:
     """Poses near states, iterated until their residuals get no smaller; and how wrong they may still be.
 
