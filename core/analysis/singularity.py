@@ -135,8 +135,7 @@ POLISH = 12
 
 def smallest_singular_values(system: System, state: Array, sample: Array) -> Array:
     """Of the rows at states, shape (m,)."""
-    found: Array = np.linalg.svd(_finite(system.equations(state, sample).jacobian), compute_uv=False)
-    return found[:, -1]
+    return np.linalg.svd(_finite(system.equations(state, sample).jacobian), compute_uv=False)[:, -1].astype(np.float64)
 
 
 def solve_closely(system: System, state: Array, sample: Array) -> Solved:

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import Quat, Vec3, turned_by, vec
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Path
@@ -31,6 +30,7 @@ from .orientation import Blocks
 from .redundancy import RANK_TOLERANCE
 from .request import CONSISTENT
 from .sparse_rows import Jacobian
+from .turning import Turn
 
 # An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.
 CONTRACTS = 1e-2
@@ -102,6 +102,7 @@ class SparseModel:
         self._scale = np.concatenate([np.full(3 * n, length), np.ones(4 * n), coordinates])
         state = np.zeros(numbering.state)
         state[3 * n : 4 * n] = 1.0
+        self._turn = Turn(n, compiled=compiled)
         self._rest = self.drives(Path({}, np.zeros(1)), np.zeros(1))[:, 0]
         self.elements.evaluate(state, self._rest)
         self._select()
@@ -163,10 +164,8 @@ class SparseModel:
     def moved(self, state: Array, step: Array) -> Array:
         """The state after a step of the unknowns; the Euler parameters have length one again."""
         n = self.bodies
-        q = turned_by(
-            euler_parameters(state[3 * n : 7 * n].reshape(4, n)), vec([*(0.5 * step[3 * n : 6 * n]).reshape(3, n)]), np.sqrt
-        )
-        return np.concatenate([state[: 3 * n] + step[: 3 * n], *q, state[7 * n :] + step[6 * n :]])
+        q = self._turn(state[3 * n : 7 * n], step[3 * n : 6 * n])
+        return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])
 
     def _evaluate(self, state: Array, drives: Array) -> float:
         """Evaluate all rows, and the largest residual of those that are solved."""
@@ -289,9 +288,3 @@ class SparseModel:
             names = ", ".join([*self.redundant[:FEW], "..."][: len(self.redundant)])
             raise FailedError(f"the redundant rows ({names}) contradict the others by {leftover:.3g}")
         return closure, leftover, branch
-
-
-def euler_parameters(components: Array) -> Quat:
-    """Four rows as Euler parameters whose scalars are arrays."""
-    e0, x, y, z = components
-    return Quat(e0, Vec3(x, y, z))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from ..motions import Path
 from ..primitives.base import Motion, Pose
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .march import HALVINGS, MAX_ROUNDS
-from .sparse import FailedError, SparseModel, Stand, euler_parameters
+from .sparse import FailedError, SparseModel, Stand
+from .turning import euler_parameters
 
 
 def solve_sparse(
@@ -43,6 +45,10 @@ def solve_sparse(
     return _Sweep(model, path, tol, _Wanted(model, points), _Wanted(model, bodies, frames=True)).solve(order)
 
 
+AT_ONCE = 16
+"""Stands whose motions are computed together: each alone would cost a quarter of finding it."""
+
+
 class _Wanted:
     """Points whose motion is wanted: of bodies the origins, and how their frames turn."""
 
@@ -56,14 +62,23 @@ class _Wanted:
         self._arm = _columns([tuple(model.frame.arm(body, position)) for body, position in found], 3)
         self._frame = _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
 
-    def motion(self, at: Stand) -> Array:
-        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape (components, names)."""
-        n, metres = self._model.bodies, self._model.frame.unit
-        still = np.array([0.0] * 3 + [1.0] + [0.0] * 3)
-        poses = np.column_stack([at.state[: 7 * n].reshape(7, n), still])[:, self._body]
-        rates, accelerations = (
-            np.column_stack([x[: 6 * n].reshape(6, n), np.zeros(6)])[:, self._body] for x in (at.rates, at.accelerations)
-        )
+    def taken(self, at: Stand) -> Array:
+        """What their motion follows from: poses, rates and accelerations of their bodies, shape (19, names)."""
+        n = self._model.bodies
+        still = np.array([0.0] * 3 + [1.0] + [0.0] * 15)
+        parts = at.state[: 7 * n], at.rates[: 6 * n], at.accelerations[: 6 * n]
+        return np.column_stack([np.concatenate(parts).reshape(19, n), still])[:, self._body]
+
+    def motions(self, taken: Array) -> Array:
+        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot.
+
+        Args:
+            taken: of each stand, shape (stands, 19, names).
+
+        Returns:
+            Shape (stands, components, names).
+        """
+        metres, (poses, rates, accelerations) = self._model.frame.unit, np.split(taken.swapaxes(0, 1), [7, 13])
         pose, motion = Pose.of(vec([*poses[:3]]), euler_parameters(poses[3:])), Motion(vec([*rates[:3]]), vec([*rates[3:]]))
         v_t, w_t = vec([*accelerations[:3]]), vec([*accelerations[3:]])
         arm = vec([*self._arm])
@@ -77,7 +92,8 @@ class _Wanted:
             p = pose.q * euler_parameters(self._frame)
             to_body = rotation_less_identity(p).T
             found += [p, motion.w + to_body @ motion.w, w_t + to_body @ w_t]
-        return np.stack([np.broadcast_to(component, len(self.names)) for each in found for component in each])
+        shape = len(taken), len(self.names)
+        return np.stack([np.broadcast_to(component, shape) for each in found for component in each], axis=1)
 
 
 def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
@@ -109,12 +125,14 @@ class _Sweep:
             side = side[np.argsort(np.abs(path.times[side] - start), kind="stable")]
             if departure is None or not len(side):
                 continue
-            for at, k in zip(self._follow(departure, path, path.times[side]), side, strict=False):
+            followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
+            while some := list(islice(followed, AT_ONCE)):
+                reached = [k for _, k in some]
                 for name, values in stands.items():
-                    values[k] = getattr(at, name)
+                    values[reached] = [getattr(at, name) for at, _ in some]
                 for into, each in zip(found, wanted, strict=True):
                     if each.names:
-                        into[k] = each.motion(at)
+                        into[reached] = each.motions(np.array([each.taken(at) for at, _ in some]))
         return self._trajectory(found, stands, order)
 
     def _departure(self, start: float) -> Stand | None:

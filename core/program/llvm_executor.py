@@ -75,17 +75,20 @@ class LlvmExecutor:
 
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
+        places = _places(slots)
         if values.shape[1] == 1:  # the same in all lanes
-            self._memory[:, slots] = values
+            self._memory[:, places] = values
             return
         padded = np.empty((len(slots), self._groups * self.margin))
         padded[:, : self.lanes] = values
         padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
-        self._memory[:, slots] = padded.reshape(len(slots), self._groups, self.margin).transpose(1, 0, 2)
+        self._memory[:, places] = padded.reshape(len(slots), self._groups, self.margin).transpose(1, 0, 2)
 
     def get(self, slots: Sequence[int]) -> Array:
         """See `Executor`."""
-        return self._memory[:, slots].transpose(1, 0, 2).reshape(len(slots), -1)[:, : self.lanes]
+        found = np.empty((len(slots), self._groups, self.margin))
+        found[:] = self._memory[:, _places(slots)].transpose(1, 0, 2)
+        return found.reshape(len(slots), -1)[:, : self.lanes]
 
     def run(self, name: str) -> None:
         """See `Executor`."""
@@ -170,6 +173,11 @@ class LlvmTrack:
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
         """See `Track`."""
         return self._follow[side][anew](at, stop)
+
+
+def _places(slots: Sequence[int]) -> Sequence[int] | slice:
+    """Slots as an index; numpy would make an array of a range each time."""
+    return slice(slots.start, slots.stop) if isinstance(slots, range) and slots.step == 1 else slots
 
 
 def _aligned(count: int) -> Array:
