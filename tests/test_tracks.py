@@ -166,3 +166,21 @@ def test_tables_begin_with_a_cache_line():
             assert table.shape == (model.kept, columns, executor.room)
             assert table.ctypes.data % 64 == 0
             assert table.flags.c_contiguous
+
+
+@pytest.mark.parametrize("lanes", [1, 7, 8, 19])
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_a_window_is_memory_and_takes_what_is_arranged(compiled, lanes):
+    tape = Tape()
+    plan = Plan({"f": program("f", tape, {3: tape.input(1) - tape.input(2)})}, {str(k): k for k in range(4)})
+    executor = LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    values = np.random.default_rng(1).normal(size=(2, lanes))
+    executor.window(range(1, 3))[:] = executor.arranged(values)
+    np.testing.assert_array_equal(executor.get(range(1, 3)), values)
+    executor.run("f")
+    found = np.full(lanes, np.nan)
+    found[executor.arranged(np.arange(lanes)[None])] = executor.window(range(3, 4))
+    np.testing.assert_array_equal(found, values[0] - values[1])
+    copy = executor.get(range(1, 3))
+    executor.clear()
+    np.testing.assert_array_equal(copy, values)

@@ -238,7 +238,7 @@ class _Kind:
         end = self._first_geometry + len(self._geometry)
         programs: dict[str, Program] = {}
         self._results = results
-        self._outputs: dict[str, tuple[range, Indices]] = {}
+        outputs: dict[str, tuple[range, Indices]] = {}
         for name, quantities in ((WHERE, ("phi", "nu", "branch", "entries")), (HOW, ("gamma",))):
             wanted: dict[int, Scalar] = {}
             places: list[Indices] = []
@@ -252,19 +252,26 @@ class _Kind:
                         results[starts[quantity] + lanes] = value
             if wanted:
                 programs[name] = program(name, self._tape, wanted)
-                self._outputs[name] = range(end, end := end + len(wanted)), np.array(places)
+                outputs[name] = range(end, end := end + len(wanted)), np.array(places)
         self.sizes = {"constraints": self._lanes} | {f"flops {name}": each.flops for name, each in programs.items()}
         plan = Plan(programs, {str(k): k for k in range(end)})
         self._executor: Executor = (
             LlvmExecutor(LlvmCode(plan), self._lanes) if compiled and available() else NumpyExecutor(plan, self._lanes)
         )
+        # gathered and scattered by one call each: of some hundred bodies it is the calls that take the time
+        self._windows = {name: self._executor.window(self._inputs[name]) for name in self._inputs}
+        self._read = {name: self._executor.arranged(table).copy() for name, table in self._read.items()}
+        self._written = {
+            name: (self._executor.window(slots), self._executor.arranged(places).copy())
+            for name, (slots, places) in outputs.items()
+        }
         if self._geometry:
             self._executor.put(range(self._first_geometry, self._first_geometry + len(self._geometry)), np.array(self._geometry))
 
     def run(self, name: str, given: Array) -> None:
         """Run a program over numbers of the whole mechanism, and write what it gives."""
-        self._executor.put(self._inputs[name], given[self._read[name]])
-        if name in self._outputs:
-            slots, places = self._outputs[name]
+        self._windows[name][:] = given[self._read[name]]
+        if name in self._written:
+            window, places = self._written[name]
             self._executor.run(name)
-            self._results[places] = self._executor.get(slots)
+            self._results[places] = window

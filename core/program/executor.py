@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..trajectory import Array
 from .straight_line import Program
 from .trace import NODES
+
+Table = TypeVar("Table", bound=NDArray[Any])
 
 DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
 """Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
@@ -165,6 +167,14 @@ class Executor(Protocol):
 
     def get(self, slots: Sequence[int]) -> Array:
         """A copy of slots of all lanes, shape (slots, lanes)."""
+        ...
+
+    def window(self, slots: range) -> Array:
+        """The memory of slots itself, shaped as what `arranged` gives."""
+        ...
+
+    def arranged(self, table: Table) -> Table:
+        """A table of slots by lanes as it would stand in memory; what fills up the last vector is as the last lane."""
         ...
 
     def run(self, name: str) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..trajectory import Array
 from . import compiled, llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_programs, llvm_tables
-from .executor import LINE, Parts, Plan, Side
+from .executor import LINE, Parts, Plan, Side, Table
 
 BYTES = 8
 """Of a number."""
@@ -75,20 +75,26 @@ class LlvmExecutor:
 
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
-        places = _places(slots)
-        if values.shape[1] == 1:  # the same in all lanes
-            self._memory[:, places] = values
-            return
-        padded = np.empty((len(slots), self._groups * self.margin))
-        padded[:, : self.lanes] = values
-        padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
-        self._memory[:, places] = padded.reshape(len(slots), self._groups, self.margin).transpose(1, 0, 2)
+        # the same in all lanes needs no arranging
+        self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self.arranged(values)
 
     def get(self, slots: Sequence[int]) -> Array:
         """See `Executor`."""
         found = np.empty((len(slots), self._groups, self.margin))
         found[:] = self._memory[:, _places(slots)].transpose(1, 0, 2)
         return found.reshape(len(slots), -1)[:, : self.lanes]
+
+    def window(self, slots: range) -> Array:
+        """See `Executor`."""
+        return self._memory[:, _places(slots)]
+
+    def arranged(self, table: Table) -> Table:
+        """See `Executor`."""
+        padded = np.empty((len(table), self.room), table.dtype)
+        padded[:, : self.lanes] = table
+        padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
+        found: Any = padded.reshape(len(table), self._groups, self.margin).transpose(1, 0, 2)
+        return found
 
     def run(self, name: str) -> None:
         """See `Executor`."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from .executor import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
+from .executor import DONE, ITERATIONS, MARGIN, Parts, Plan, Side, Table
 from .numpy_track import NumpyTrack
 from .straight_line import Program
 from .trace import LEAVES, NODES, operands, place_of
@@ -80,6 +80,14 @@ class NumpyExecutor:
     def get(self, slots: Sequence[int]) -> Array:
         """See `Executor`."""
         return self.block[slots]
+
+    def window(self, slots: range) -> Array:
+        """See `Executor`."""
+        return self.block[slots.start : slots.stop]
+
+    def arranged(self, table: Table) -> Table:
+        """See `Executor`."""
+        return table
 
     def run(self, name: str) -> None:
         """See `Executor`."""
