@@ -7,9 +7,18 @@ import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
 from kincheck.core import Distance, JointDisplacement, Point, Translational
-from kincheck.core.analysis.march import longest
+from kincheck.core.analysis import followed
+from kincheck.core.analysis.continuity import doubtful
+from kincheck.core.analysis.march import longest, march
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.request import SIGMA, Request
+from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.solve import solve
+from kincheck.core.analysis.sweep import follow
+from kincheck.core.analysis.system import System
+from kincheck.core.harness.probe import probe
 from kincheck.core.harness.run import run
+from kincheck.core.joints import Joint
 from kincheck.core.program import Elimination, Tape, program
 from mpmath import mp, mpf
 
@@ -26,6 +35,27 @@ def chain_end(loops, turn):
     """Closed form of the last crank's pin, its velocity and acceleration at rate one."""
     s, c, zero = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
     return [np.column_stack(each) for each in ([loops + s, c, zero], [-c, s, zero], [-s, -c, zero])]
+
+
+# In doubt
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, monkeypatch):
+    """The estimate says a fifth of sigma; equations for that are traced for the first sweep only."""
+    case, traced = probe(Joint.registry["revolute_spherical"]), list[System]()
+    monkeypatch.setattr(followed, "System", lambda model: traced.append(System(model)) or traced[-1])
+    model = compile_model(case.mechanism, Request((case.sweep.driver,), case.points, compiled=compiled))
+    route, tol = Route(model, case.sweep.path), 2e-13
+    estimates = march(route, tol).kept[model.rows[SIGMA].start]
+    doubted = doubtful(estimates, 0.0, tol)
+    assert 0 < doubted.sum() < len(doubted)
+    for _ in range(2):
+        found = follow(route, tol)
+        assert found.solved.all(), found.message
+        assert "retried_samples" not in found.details
+        assert estimates.min() < found.details["smallest_singular_value"] == estimates[~doubted].min()
+    assert len(traced) == 1
 
 
 # Bifurcations
