@@ -1,7 +1,7 @@
 """Many variants of one mechanism along one path: the programs' lanes are variants, and geometry is an input.
 
-All variants take the same samples, predicted each from its own poses at the samples before. A lane that is not accepted somewhere is
-solved again alone, by the march that divides its steps; what that does not reach either is NaN, with the reason.
+All variants take the same samples, predicted each from its own poses at the samples before. A lane that is not accepted somewhere
+is solved again alone, by the march that divides its steps; what that does not reach either is NaN, with the reason.
 """
 
 from __future__ import annotations
