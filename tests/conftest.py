@@ -7,11 +7,19 @@ import kincheck.adapters
 import kincheck.cases
 import pytest
 from kincheck.core import Joint
+from kincheck.core.analysis import model
 from kincheck.core.harness import cli
 
 from .fakes import Fake, crank
 
 NATIVE = Fake("native")
+
+
+@pytest.fixture(autouse=True)
+def no_recent_models():
+    """What a test has changed holds for the models it makes."""
+    yield
+    model._recent.cache_clear()
 
 
 @pytest.fixture

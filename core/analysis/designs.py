@@ -14,7 +14,7 @@ from ..mechanism import Mechanism
 from ..motions import Motion
 from ..trajectory import Array, PointMotion
 from .geometry import places
-from .model import compile_model
+from .model import recent_model
 from .route import Route
 from .solve import asked
 from .variants import solve_variants
@@ -77,7 +77,7 @@ def solve_designs(
     if len(counts) != 1:
         raise SolveError(f"solve_designs: found {sorted(counts)} designs for different places, expected as many of each")
     (count,) = counts
-    model = compile_model(mechanism, replace(request, varied=tuple(geometry)))
+    model = recent_model(mechanism, replace(request, varied=tuple(geometry)))
     route, lanes, n = Route(model, path), np.concatenate(numbers), len(path.times)
     labels = ("position", "velocity", "acceleration")[: order + 1]
     motion: dict[str, dict[str, Any]] = {name: {label: np.empty((count, n, 3)) for label in labels} for name in request.points}

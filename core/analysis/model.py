@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,11 @@ from ..trajectory import Array
 from . import following
 from .components import Section
 from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
-from .tracing import Tracing, traced
+from .tracing import Tracing, ours, traced
 
 MAX_ITERATIONS = 12
+# Models that are kept for whoever solves one mechanism again and again: what is fetched from disk takes forty times a sweep.
+RECENT = 8
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
 TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
@@ -36,6 +38,16 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     return Model(mechanism, request, traced(mechanism, request, section))
+
+
+@lru_cache(maxsize=RECENT)
+def _recent(mechanism: Mechanism, request: Request) -> Model:
+    return compile_model(mechanism, request)
+
+
+def recent_model(mechanism: Mechanism, request: Request) -> Model:
+    """As `compile_model`, and no more than one for the same mechanism and request as long as it is among the last few asked for."""
+    return _recent(mechanism, request) if ours(mechanism) else compile_model(mechanism, request)
 
 
 class Model:

@@ -59,13 +59,17 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     Raises:
         SolveError: drivers and degrees of freedom do not match.
     """
-    parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers)
-    ours = all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
-    if section or request.varied or not (ours and request.compiled and available()):
+    if section or request.varied or not (ours(mechanism) and request.compiled and available()):
         return _trace(mechanism, request, section)
     content = _source() + pickle.dumps((mechanism, request))
     found: Tracing = pickle.loads(kept(content, lambda: pickle.dumps(_trace(mechanism, request, None))))
     return found
+
+
+def ours(mechanism: Mechanism) -> bool:
+    """Whether all it is made of is of this package: what is equal then means the same."""
+    parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers)
+    return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
 
 
 @cache
