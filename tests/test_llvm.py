@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kincheck.core import Revolute, solve, solve_designs
-from kincheck.core.analysis import tracing
+from kincheck.core.analysis import model, tracing
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
@@ -136,7 +136,9 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
 
     def positions():
         mechanism = four_bar()
-        return solve(mechanism, mechanism.drivers[0].name, wanted).points[mechanism.points[0].name].position
+        driver, point = mechanism.drivers[0].name, mechanism.points[0].name
+        model = compile_model(mechanism, Request((driver,), (point,)))
+        return sweep(model, Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
 
     fresh = positions()
     entries = [*(tmp_path / "kincheck").iterdir()]
@@ -243,9 +245,11 @@ TIE_ROD = np.array([1.115, 0.665, 0.118])
 @pytest.mark.parametrize("width", [2, 4])
 @pytest.mark.parametrize("way", WAYS)
 def test_vectors_of_every_width_give_the_same(way, width, monkeypatch):
-    expected = WAYS[way]()
-    monkeypatch.setattr(code, "vector_width", lambda: width)
+    expected, asked = WAYS[way](), list[int]()
+    monkeypatch.setattr(code, "vector_width", lambda: asked.append(width) or width)
+    model._recent.cache_clear()
     found = WAYS[way]()
+    assert asked  # whatever was kept was made for other vectors
     for name, motion in expected.items():
         for label, limit in (("position", 2e-15), ("velocity", 2e-14), ("acceleration", 2e-13)):
             if getattr(motion, label) is not None:

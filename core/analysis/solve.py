@@ -33,6 +33,8 @@ def solve(
 ) -> Trajectory:
     """Sweep one driver over values, measured from the design position.
 
+    What was made ready for the last few mechanisms is kept in the process: the next call for one of them costs a fraction.
+
     Args:
         mechanism: what to solve.
         driver: name of the driver that moves; the others hold their design value.
