@@ -145,6 +145,16 @@ def test_both_sides_are_one_attempt_of_the_numpy_executor(monkeypatch):
     assert settled[1:] == [[0]]
 
 
+def test_an_interrupted_attempt_leaves_no_heads_behind(monkeypatch):
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False)
+    first = march(route, TOL)
+    with monkeypatch.context() as interrupted, pytest.raises(KeyboardInterrupt):
+        interrupted.setattr(NumpyExecutor, "run", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        march(route, TOL)
+    assert route.model.executor(route.lanes).heads == [0]
+    np.testing.assert_array_equal(march(route, TOL).kept, first.kept)
+
+
 def test_a_lane_that_is_a_head_has_none_before_it():
     tape = Tape()
     plan = Plan({"f": program("f", tape, {2: before(tape.input(0), tape.input(1))})}, {str(k): k for k in range(3)})

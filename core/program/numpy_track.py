@@ -47,8 +47,10 @@ class NumpyTrack:
             block[list(plan.sampled), end - side.count :] = side.samples[:, -1:]
             block[list(plan.sampled), end - side.count : end] = side.samples
         executor.heads[:] = [0, *ends[:-1]]
-        executor.settle("predict", plan.joined)
-        executor.heads[:] = [0]
+        try:
+            executor.settle("predict", plan.joined)
+        finally:  # it may be interrupted, and the executor is used again
+            executor.heads[:] = [0]
         lanes = [block[:, end - count : end] for count, end in zip(counts, ends, strict=True)]
         reached = [_leading(each[plan.slots[MARGIN]]) for each in lanes]
         for side, each, accepted in zip(self._sides, lanes, reached, strict=True):
