@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import weakref
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -148,9 +149,10 @@ def test_both_sides_are_one_attempt_of_the_numpy_executor(monkeypatch):
 def test_an_interrupted_attempt_leaves_no_heads_behind(monkeypatch):
     route = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False)
     first = march(route, TOL)
-    with monkeypatch.context() as interrupted, pytest.raises(KeyboardInterrupt):
-        interrupted.setattr(NumpyExecutor, "run", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(NumpyExecutor, "run", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
         march(route, TOL)
+    monkeypatch.undo()
     assert route.model.executor(route.lanes).heads == [0]
     np.testing.assert_array_equal(march(route, TOL).kept, first.kept)
 
