@@ -58,11 +58,14 @@ class Level:
         """Never."""
         return None
 
+    def request(self, case: Case) -> Request:
+        """What is asked."""
+        bodies = tuple(body.name for body in case.mechanism.moving) if self.bodies else ()
+        return Request(tuple(case.sweep.path.motions), case.points, bodies, self.order, compiled=self.compiled)
+
     def build(self, case: Case) -> Route:
         """The programs for what is asked, and the samples laid out."""
-        path, bodies = case.sweep.path, tuple(body.name for body in case.mechanism.moving) if self.bodies else ()
-        request = Request(tuple(path.motions), case.points, bodies, self.order, compiled=self.compiled)
-        return Route(compile_model(case.mechanism, request), path)
+        return Route(compile_model(case.mechanism, self.request(case)), case.sweep.path)
 
     def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
         """The whole call, Python included."""

@@ -17,7 +17,7 @@ import msgspec
 
 from ..case import Case
 from ..engine import Engine
-from .fresh import STAGES
+from .fresh import FIRST, STAGES
 from .rounds import Spread, spread
 
 # A process takes a second: as many rounds as of solves would take minutes.
@@ -69,7 +69,7 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def beyond_numpy(self) -> float | None:
         """Seconds from the import of numpy to the first solution."""
-        return sum(self.stages[name].median for name in STAGES[1:-1]) if self.stages else None
+        return sum(self.stages[name].median for name in FIRST) if self.stages else None
 
 
 @dataclass
