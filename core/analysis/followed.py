@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -60,14 +59,6 @@ class Stuck:
     near: Array
 
 
-def _system(route: Route) -> System:
-    """The equations of a route's model; kept with it, because tracing them anew takes longer than all else here."""
-    thread = threading.get_ident()
-    if thread not in route.systems:
-        route.systems[thread] = System(route.model)
-    return route.systems[thread]
-
-
 class Followed:
     """A march, and its going on beyond its ends.
 
@@ -82,7 +73,7 @@ class Followed:
 
     def __init__(self, route: Route, found: March, tol: float) -> None:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
-        self.system = _system(route)
+        self.system = route.bound("system", lambda: System(route.model))  # tracing it anew takes longer than all else here
         self.parts = [Part(route, np.arange(len(self.times)))]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []

@@ -6,7 +6,6 @@ costs steps; where no part of a step succeeds the motion ends, and a message say
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -92,10 +91,7 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
 
 def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
     """What goes along a route from its departure; kept with it, because binding takes as long as going."""
-    key = threading.get_ident(), tol, crossing
-    if key not in route.marchers:
-        route.marchers[key] = Marcher(route, route.departure, accept_by(tol, crossing=crossing))
-    return route.marchers[key]
+    return route.bound((tol, crossing), lambda: Marcher(route, route.departure, accept_by(tol, crossing=crossing)))
 
 
 def arrived(model: Model, lane: Array) -> Array:

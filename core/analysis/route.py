@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from .model import Model
 LANES = 256
 # Samples that are in the order of their times.
 AS_THEY_ARE = slice(None)
+
+Bound = TypeVar("Bound")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +86,7 @@ class Route:
         found: list[Side] = []
         for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
             if len(columns):
-                samples = self.sampled(times[columns])
-                if len(self.model.plan.sampled) > len(samples):
-                    samples = np.concatenate([samples, weights_of_groups(times[columns], executor.group)])
+                samples = np.concatenate([self.sampled(times[columns]), weights_of_groups(times[columns], executor.group)])
                 padded = np.concatenate([samples, np.repeat(samples[:, -1:], executor.margin, axis=1)], axis=1)
                 found.append(Side(padded, len(columns), int(columns[0]), step))
         return tuple(found)
@@ -100,14 +102,16 @@ class Route:
         """How many samples are tried at once."""
         return min(LANES, max(1, len(self.path.times)))
 
-    @cached_property
-    def marchers(self) -> dict[tuple[int, float, bool], Any]:
-        """What goes along it, by thread, tolerance and whether it may cross singular poses; see `march`."""
-        return {}
+    def bound(self, key: Hashable, make: Callable[[], Bound]) -> Bound:
+        """What was made of it under this key and for this thread before; or is made now, and kept with it."""
+        found: dict[Any, Bound] = self._bound
+        key = threading.get_ident(), key
+        if key not in found:
+            found[key] = make()
+        return found[key]
 
     @cached_property
-    def systems(self) -> dict[int, Any]:
-        """The equations outside the march, by thread, once they were wanted; see `Followed`."""
+    def _bound(self) -> dict[Any, Any]:
         return {}
 
     def sampled(self, times: Array) -> Array:
