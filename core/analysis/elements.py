@@ -259,18 +259,18 @@ class _Kind:
             LlvmExecutor(LlvmCode(plan), self._lanes) if compiled and available() else NumpyExecutor(plan, self._lanes)
         )
         # gathered and scattered by one call each: of some hundred bodies it is the calls that take the time
-        self._windows = {name: self._executor.window(self._inputs[name]) for name in self._inputs}
-        self._read = {name: self._executor.arranged(table).copy() for name, table in self._read.items()}
-        self._written = {
-            name: (self._executor.window(slots), self._executor.arranged(places).copy())
-            for name, (slots, places) in outputs.items()
-        }
+        inputs = {name: (self._inputs[name], places) for name, places in self._read.items()}
+        self._taken, self._written = (
+            {name: (self._executor.window(slots), self._executor.arranged(places).copy()) for name, (slots, places) in each.items()}
+            for each in (inputs, outputs)
+        )
         if self._geometry:
             self._executor.put(range(self._first_geometry, self._first_geometry + len(self._geometry)), np.array(self._geometry))
 
     def run(self, name: str, given: Array) -> None:
         """Run a program over numbers of the whole mechanism, and write what it gives."""
-        self._windows[name][:] = given[self._read[name]]
+        window, places = self._taken[name]
+        window[:] = given[places]
         if name in self._written:
             window, places = self._written[name]
             self._executor.run(name)

@@ -21,7 +21,7 @@ from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE,
 from .tracing import Tracing, ours, traced
 
 MAX_ITERATIONS = 12
-# Models that are kept for whoever solves one mechanism again and again: what is fetched from disk takes forty times a sweep.
+# Models that are kept for whoever solves one mechanism again and again: to fetch one from disk takes longer than many sweeps.
 RECENT = 8
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12

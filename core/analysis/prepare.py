@@ -15,7 +15,7 @@ from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Trajectory
 from .equations import Style, frames
-from .model import Model, compile_model
+from .model import recent_model
 from .request import Request
 from .route import Route
 from .sweep import follow
@@ -29,13 +29,8 @@ Solver = Callable[[float], Trajectory]
 """Solves what it was made for, to a tolerance."""
 
 
-def prepare(
-    mechanism: Mechanism, request: Request, path: Path, model_of: Callable[[Mechanism, Request], Model] = compile_model
-) -> Solver:
+def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """Make a mechanism ready to be solved along a path.
-
-    Args:
-        model_of: makes one program of it.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
@@ -56,4 +51,4 @@ def prepare(
 
             model = SparseModel(mechanism, compiled=request.compiled)
             return partial(solve_sparse, model, path, request.points, request.bodies, request.order)
-    return partial(follow, Route(model_of(mechanism, request), path))
+    return partial(follow, Route(recent_model(mechanism, request), path))

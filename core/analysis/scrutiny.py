@@ -1,8 +1,8 @@
 """Samples of a march that are nearly singular, and singular poses that it crossed or ended at: none is passed in silence.
 
 A pose is wrong by up to its residual over the smallest singular value sigma of its rows. The march sees residuals, and of sigma
-only an estimate. Where that leaves room for an error the sample is solved again by orthogonal factors, and sigma and the
-errors are computed; where they are too large the sample is interpolated, if the motion goes on beyond, or else refused.
+only an estimate. Where that leaves room for an error sigma is computed; where sigma does, the sample is solved again by orthogonal
+factors, and its errors are computed; where they are too large it is interpolated, if the motion goes on beyond, or else refused.
 """
 
 from __future__ import annotations

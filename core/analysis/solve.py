@@ -13,7 +13,6 @@ from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, Trajectory
 from .driven import require_driven
 from .equations import Style
-from .model import recent_model
 from .prepare import prepare
 from .request import Request
 
@@ -57,7 +56,7 @@ def solve(
             argument makes no sense.
     """
     path, request = asked(mechanism, driver, values, rate, points, bodies, order, style, motions)
-    return prepare(mechanism, request, path, recent_model)(tol)
+    return prepare(mechanism, request, path)(tol)
 
 
 def asked(

@@ -85,7 +85,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             messages[k] = "; ".join(found.messages)
     closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
     doubted = np.zeros_like(solved)
-    if doubtful(np.fmin.reduce(sigma, axis=None, initial=1.0), np.fmax.reduce(closure, axis=None, initial=0.0), tol):  # the worst
+    # the worst of all first: to judge each takes a twentieth of the time
+    if doubtful(np.fmin.reduce(sigma, axis=None, initial=1.0), np.fmax.reduce(closure, axis=None, initial=0.0), tol):
         doubted = solved & doubtful(sigma, closure, tol)
         kept[:, doubted], solved[doubted] = np.nan, False
     for k in np.flatnonzero(doubted.any(axis=0)).tolist():
