@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program
+from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, begin
 from ..program.compiled import available
 from ..trajectory import Array
 from . import following
@@ -37,6 +37,8 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
+    if request.compiled and available():
+        begin()
     return Model(mechanism, request, traced(mechanism, request, section))
 
 
@@ -96,7 +98,6 @@ class Model:
             smallest=[self.slots[SIGMA]],
             fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
             taken=[slot for name in self.given for slot in self.vectors[name]],
-            loops=("parts",) if self.request.state else ("follow", "fan") if fans else ("follow",),
             tolerance=self.request.last_iteration,
             most=MAX_ITERATIONS,
         )

@@ -2,7 +2,7 @@
 
 from .elimination import Elimination
 from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
-from .llvm_executor import LlvmCode, LlvmExecutor
+from .llvm_executor import LlvmCode, LlvmExecutor, begin
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
 from .trace import NODES, Tape, Traced, absolute, before, cos, maximum, minimum, place_of, sin, sqrt, where_larger
@@ -27,6 +27,7 @@ __all__ = [
     "Track",
     "absolute",
     "before",
+    "begin",
     "cos",
     "maximum",
     "minimum",

@@ -46,31 +46,54 @@ def vector_width() -> int:
     return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 
 
-def load(content: str, text: Callable[[], str], signatures: Mapping[str, int]) -> tuple[Any, dict[str, Callable[..., int]]]:
-    """Compile the text, or fetch from the cache what the content meant before; (what owns the code, the functions by name).
+class Code:
+    """Machine code of functions; calls of them release Python's lock.
 
-    A signature is how many arguments a function takes: addresses and whole numbers. All return a whole number, or nothing of sense.
-    The functions release Python's lock while they run.
+    Args:
+        signatures: by function, how many arguments it takes: addresses and whole numbers. All return a whole number, or nothing
+            of sense. Others are known by their address.
     """
-    llvm = _llvm()
+
+    def __init__(self, code: bytes, signatures: Mapping[str, int]) -> None:
+        llvm = _llvm()
+        self._owner = llvm.create_mcjit_compiler(llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
+        self._owner.add_object_file(llvm.ObjectFileRef.from_data(code))
+        self._owner.finalize_object()
+        # whole numbers are passed as addresses are: ctypes takes a third of the time for those
+        types = {name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count) for name, count in signatures.items()}
+        self.calls: dict[str, Callable[..., int]] = {name: kind(self.address(name)) for name, kind in types.items()}
+
+    def address(self, name: str) -> int:
+        """Where a function stands."""
+        return self._owner.get_function_address(name)
+
+
+def load(content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None) -> Code:
+    """Compile the text, or fetch from the cache what the content meant before."""
     machine, identity = _target()
-    code = kept(f"{identity}\n{content}".encode(), lambda: machine.emit_object(llvm.parse_assembly(text())))
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    # whole numbers are passed as addresses are: ctypes takes a third of the time for those
-    types = {name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count) for name, count in signatures.items()}
-    return engine, {name: kind(engine.get_function_address(name)) for name, kind in types.items()}
+    code = kept(f"{identity}\n{content}".encode(), lambda: machine.emit_object(_llvm().parse_assembly(text())))
+    return Code(code, signatures or {})
+
+
+def find(content: str) -> Code | None:
+    """What the content meant before, if it is in the cache."""
+    _, identity = _target()
+    code = _read(_entry(f"{identity}\n{content}".encode()))
+    return code and Code(code, {})
 
 
 def kept(content: bytes, make: Callable[[], bytes]) -> bytes:
     """What the content meant before, from the cache; or made now, and kept."""
-    entry = folder() / hashlib.sha256(content).hexdigest()
+    entry = _entry(content)
     found = _read(entry)
     if found is None:
         found = make()
         _write(entry, found)
     return found
+
+
+def _entry(content: bytes) -> Path:
+    return folder() / hashlib.sha256(content).hexdigest()
 
 
 def folder() -> Path:

@@ -49,7 +49,6 @@ class Plan:
         largest, smallest: slots of which `follow` finds the largest and the smallest over the samples it keeps.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
         taken: slots that a part takes from what was solved before it.
-        loops: methods of the executor that are used besides `run` and `attempt`: "follow", "fan" or "parts".
         tolerance: of the residual before an iteration; that iteration is the last.
         most: iterations at most.
     """
@@ -69,7 +68,6 @@ class Plan:
     smallest: Sequence[int] = ()
     fixed: Sequence[int] = ()
     taken: Sequence[int] = ()
-    loops: Sequence[str] = ()
     tolerance: float = 0.0
     most: int = 0
 
@@ -95,11 +93,6 @@ class Plan:
     def rates(self) -> set[int]:
         """Slots of what makes a solved lane ready to be predicted from."""
         return {slot for name in self.onward for slot in self.programs[name].outputs}
-
-    @property
-    def single(self) -> list[str]:
-        """Names of the programs that may be run by themselves; the others occur in attempts only."""
-        return [name for name in self.programs if name not in ("predict", "extrapolate", "extend", *self.alone, *self.joined)]
 
     def extrapolates(self, lanes: int) -> bool:
         """Whether a group of that many lanes is followed by extrapolation."""

@@ -10,11 +10,13 @@ import math
 import struct
 from collections.abc import Sequence
 
+from .lowering import FUSED
+
 # The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after reduction.
 SINE_TERMS, COSINE_TERMS = 9, 9
 # pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
 HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
-BINARY = {"+": "fadd contract", "-": "fsub contract", "*": "fmul contract", "/": "fdiv contract"}
+BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
 CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
 
@@ -88,7 +90,7 @@ class Lines:
         # nsz: which of two zeros is the larger does not matter, and costs three more instructions
         return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
 
-    def larger_size(self, a: str, b: str) -> str:
+    def umax(self, a: str, b: str) -> str:
         """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and NaN comes last."""
         words = f"<{self.width} x i64>"
         x, y = (self.let(f"bitcast {self.vector} {each} to {words}") for each in (a, b))
@@ -99,6 +101,12 @@ class Lines:
         """a op b."""
         return self.let(f"{BINARY[op]} {self.vector} {a}, {b}")
 
+    def fused(self, op: str, a: str, b: str, c: str) -> str:
+        """A product and a sum; see `lowering.FUSED`. Rounded once where the processor can."""
+        first = self.let(f"fneg {self.vector} {a}") if op == "fnma" else a
+        last = self.let(f"fneg {self.vector} {c}") if op == "fms" else c
+        return self.call("fmuladd", first, b, last)
+
     def choose(self, mask: str, p: str, q: str) -> str:
         """p where the mask is true, else q."""
         return self.let(f"select <{self.width} x i1> {mask}, {self.vector} {p}, {self.vector} {q}")
@@ -107,7 +115,7 @@ class Lines:
         """By Horner, lowest coefficient first."""
         total = self.constant(coefficients[-1])
         for c in reversed(coefficients[:-1]):
-            total = self.arithmetic("+", self.arithmetic("*", total, x), self.constant(c))
+            total = self.fused("fma", total, x, self.constant(c))
         return total
 
     def trigonometric(self, x: str, quadrant: float) -> str:
@@ -115,8 +123,8 @@ class Lines:
         k = self.call("rint", self.arithmetic("*", x, self.constant(2.0 / math.pi)))
         y = x
         for part in HALF_PI:
-            # not contracted into one rounding: the products are exact, the differences must be seen as such
-            y = self.let(f"fsub {self.vector} {y}, {self.let(f'fmul {self.vector} {k}, {self.constant(part)}')}")
+            # not rounded once: the products are exact, the differences must be seen as such
+            y = self.arithmetic("-", y, self.arithmetic("*", k, self.constant(part)))
         z = self.arithmetic("*", y, y)
         odd = [(-1.0) ** n / math.factorial(2 * n + 1) for n in range(SINE_TERMS)]
         even = [(-1.0) ** n / math.factorial(2 * n) for n in range(COSINE_TERMS)]
@@ -134,6 +142,10 @@ class Lines:
         """The value of a traced operation."""
         if op in BINARY:
             return self.arithmetic(op, *operands)
+        if op in FUSED:
+            return self.fused(op, *operands)
+        if op == "umax":
+            return self.umax(*operands)
         if op in CALLS:
             return self.call(CALLS[op], *operands)
         if op == "neg":
@@ -155,5 +167,5 @@ def declarations(width: int) -> str:
     vector = f"<{width} x double>"
     one = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector})" for name in ("sqrt", "fabs", "rint", "floor"))
     two = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})" for name in ("minimum", "maximum"))
-    words = f"<{width} x i64>"
-    return f"{one}\n{two}\ndeclare {words} @llvm.umax.v{width}i64({words}, {words})\n"
+    words, three = f"<{width} x i64>", f"declare {vector} @llvm.fmuladd.v{width}f64({vector}, {vector}, {vector})"
+    return f"{one}\n{two}\n{three}\ndeclare {words} @llvm.umax.v{width}i64({words}, {words})\n"

@@ -5,54 +5,117 @@ from __future__ import annotations
 import ctypes
 import inspect
 import math
+import pickle
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
+from threading import Lock, Thread
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from . import compiled, llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_programs, llvm_tables
+from . import compiled, llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_plan, llvm_programs, llvm_walk, lowering, walk
 from .executor import LINE, Parts, Plan, Side, Table
 
 BYTES = 8
 """Of a number."""
 OUT, FORGET = (llvm_follow.MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = llvm_follow.SIDE.index("i64 reached")
-SOURCES = llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_programs, llvm_tables
+SOURCES = llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_plan, llvm_programs, llvm_walk, lowering, walk
 """Modules that write the text."""
-LOOPS: Mapping[str, tuple[Callable[[Plan, int], str], Mapping[str, int]]] = {
-    "follow": (llvm_follow.follow, {"follow": 5, "run": 2}),
-    "fan": (llvm_fan.fan, {"fan": 10}),
-    "parts": (llvm_loops.parts, {"parts": 10}),
+_NEEDED = llvm_plan.rows, llvm_loops.settle
+LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {
+    "walk": ([llvm_walk.walker], {"walk": 2}),
+    "follow": ([*_NEEDED, llvm_loops.run, llvm_follow.follow], {"run_program": 4, "attempt": 3, "follow": 6, "run": 3}),
+    "fan": ([*_NEEDED, llvm_fan.fan], {"fan": 11}),
+    "parts": ([*_NEEDED, llvm_loops.parts], {"parts": 11}),
 }
-"""Loop -> what writes it, and how many arguments its functions take."""
+"""What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
+OFTEN, OPERATIONS = 64, 3000
+"""Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more. Whoever
+comes back after that comes many times: a sweep of 161 samples is 21 groups."""
 
 
 class LlvmCode:
-    """A plan compiled for this processor. Raises ImportError where llvmlite is missing."""
+    """A plan that this processor can run: its programs are walked at first, and compiled where they are run often.
+
+    Raises ImportError where llvmlite is missing.
+
+    Attributes:
+        stride: slots of a lane, with those after `Plan.slots` that programs keep their values in.
+        walked: whether programs are not compiled yet.
+    """
 
     def __init__(self, plan: Plan) -> None:
         self.width, self.plan = compiled.vector_width(), plan
-        signatures = {f"run_{name}": 2 for name in plan.single}
-        for loop in plan.loops:
-            signatures |= LOOPS[loop][1]
-        if plan.after:
-            signatures["attempt"] = 2
-        # what determines the text; writing that takes longer than loading the code it means
-        content = [plan, self.width, *(inspect.getsource(each) for each in SOURCES)]
-        self._owner, self.functions = compiled.load(repr(content), self._text, signatures)
+        # what determines the code; writing its text takes longer than loading it
+        self._content = repr([plan.programs, self.width, _sources()])
+        code = compiled.find(self._content)
+        self.walked, tables = code is None, {} if code else self._tables()
+        self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
+        self.memory = llvm_plan.PlanInMemory(plan, self.width, self.stride)
+        if code:
+            self._take(code)
+        for name, table in tables.items():
+            self.memory.entries[self.memory.calls[name]] = _loop("walk", self.width).address("walk"), _address(table.words)
+        operations = sum(len(each.nodes) for each in plan.programs.values())
+        self._alive, self._left = tables, OFTEN * max(OPERATIONS, operations) // OPERATIONS
+
+    def call(self, loop: str, name: str) -> Callable[..., int]:
+        """A function of a loop, for this plan."""
+        return partial(_loop(loop, self.width).calls[name], self.memory.address)
+
+    def count(self, groups: int) -> None:
+        """Said by whoever has run programs for so many groups of lanes."""
+        self._left -= groups
+        if self._left <= 0:
+            self._take(compiled.load(self._content, self._text))
+            self.walked = False
+
+    def _take(self, code: compiled.Code) -> None:
+        self._code = code
+        for name, at in self.memory.calls.items():
+            self.memory.entries[at, 0] = code.address(name)  # a function that is compiled needs no table
+
+    def _tables(self) -> dict[str, walk.Walk]:
+        slots = len(self.plan.slots)
+
+        def made() -> bytes:
+            return pickle.dumps({name: walk.walk(each, slots, self.width) for name, each in self.plan.programs.items()})
+
+        return pickle.loads(compiled.kept(f"{slots} {self._content}".encode(), made))
 
     def _text(self) -> str:
-        plan, width, slots = self.plan, self.width, len(self.plan.slots)
-        text = [llvm_programs.function(program, width) for program in plan.programs.values()]
-        text += [llvm_loops.over_groups(f"run_{name}", [name], slots, width) for name in plan.single]
-        if plan.after:  # a plan that is only run makes no attempt
-            text.append(llvm_loops.settle(plan, width))
-            text.append(llvm_loops.over_groups("attempt", ["predict", "settle", *plan.alone], slots, width))
-        text += [LOOPS[loop][0](plan, width) for loop in plan.loops]
-        return "\n".join([*text, llvm_code.declarations(width)])
+        programs = (llvm_programs.function(program, self.width) for program in self.plan.programs.values())
+        return "\n".join([*programs, llvm_code.declarations(self.width)])
+
+
+@cache
+def begin() -> None:
+    """Make ready what is needed first, while programs are traced: the compiler does not wait for Python's lock."""
+    Thread(target=lambda: [_loop(name, compiled.vector_width()) for name in ("walk", "follow")]).start()
+
+
+def _loop(name: str, width: int) -> compiled.Code:
+    with _LOCK:
+        return _made(name, width)
+
+
+_LOCK = Lock()
+
+
+@cache
+def _made(name: str, width: int) -> compiled.Code:
+    """Functions that run any plan."""
+    writers, signatures = LOOPS[name]
+    text = partial("\n".join, [*(write(width) for write in writers), llvm_code.declarations(width)])
+    return compiled.load(repr([name, width, _sources()]), text, signatures)
+
+
+@cache
+def _sources() -> list[str]:
+    return [inspect.getsource(each) for each in SOURCES]
 
 
 class LlvmExecutor:
@@ -64,8 +127,7 @@ class LlvmExecutor:
     def __init__(self, code: LlvmCode, lanes: int) -> None:
         self.lanes, self.group, self.margin, self._code = lanes, code.width, code.width, code
         self._groups = self.groups(lanes)
-        slots = len(code.plan.slots)
-        self._memory = _aligned(self._groups * slots * code.width).reshape(self._groups, slots, code.width)
+        self._memory = _aligned(self._groups * code.stride * code.width).reshape(self._groups, code.stride, code.width)
         self.clear()
         self._address = _address(self._memory)
 
@@ -98,11 +160,14 @@ class LlvmExecutor:
 
     def run(self, name: str) -> None:
         """See `Executor`."""
-        self._code.functions[f"run_{name}"](self._address, self._groups)
+        code = self._code
+        code.call("follow", "run_program")(self._address, self._groups, code.memory.entry(name))
+        self._count(self._groups)
 
     def attempt(self) -> None:
         """See `Executor`."""
-        self._code.functions["attempt"](self._address, self._groups)
+        self._code.call("follow", "attempt")(self._address, self._groups)
+        self._count(self._groups)
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> LlvmTrack:
         """See `Executor`."""
@@ -122,7 +187,8 @@ class LlvmExecutor:
         """See `Executor`."""
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
         given = self._address, self._groups, samples.ctypes.data, stride, wanted
-        self._code.functions["fan"](*given, out.ctypes.data, *out.shape[1:], first, step)
+        self._code.call("fan", "fan")(*given, out.ctypes.data, *out.shape[1:], first, step)
+        self._count(self._groups * wanted)
 
     def groups(self, lanes: int) -> int:
         """See `Executor`."""
@@ -132,7 +198,17 @@ class LlvmExecutor:
         """See `Executor`."""
         samples, addresses = parts.samples, [each.ctypes.data for each in (parts.taken, parts.world)]
         tables = parts.members.ctypes.data, parts.fixed.ctypes.data, samples.ctypes.data, samples.shape[1], *addresses
-        return partial(self._code.functions["parts"], self._address, len(parts.members), *tables, parts.base)
+        call = partial(self._code.call("parts", "parts"), self._address, len(parts.members), *tables, parts.base)
+
+        def count(groups: int) -> None:
+            call(groups)
+            self._count(groups * len(parts.members))
+
+        return count
+
+    def _count(self, groups: int) -> None:
+        if self._code.walked:
+            self._code.count(groups)
 
 
 class LlvmTrack:
@@ -157,11 +233,12 @@ class LlvmTrack:
         ]
         self._sides = np.array([*told, (0,) * len(llvm_follow.SIDE)], np.int64)  # never empty: that has no address
         self._counts, motion = [side.count for side in sides], _address(self._motion)
-        self._run = partial(code.functions["run"], motion, _address(self._sides))
-        follow = partial(code.functions["follow"], motion)
+        self._run = partial(code.call("follow", "run"), motion, _address(self._sides))
+        follow = partial(code.call("follow", "follow"), motion)
         places = [(_address(each), anchor) for each, anchor in zip(self._sides, anchors, strict=False)]
         self._follow = [{True: partial(follow, at, start_at), False: partial(follow, at, anchor)} for at, anchor in places]
-        self._alive = code, memory, sides  # their addresses are held
+        self._code, self._groups = code, sum(-(-side.count // width) for side in sides)
+        self._alive = memory, sides  # their addresses are held
 
     def begin(self) -> Array:
         """See `Track`."""
@@ -174,7 +251,10 @@ class LlvmTrack:
 
     def run(self) -> Sequence[int]:
         """See `Track`."""
-        return self._sides[: len(self._counts), REACHED].tolist() if self._run() else self._counts
+        early = self._run()
+        if self._code.walked:
+            self._code.count(self._groups)
+        return self._sides[: len(self._counts), REACHED].tolist() if early else self._counts
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
         """See `Track`."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .executor import MARGIN, Plan
 from .llvm_code import Lines
-from .llvm_loops import calls
-from .llvm_tables import Rows
+from .llvm_plan import Rows, call, function, over
 
 MOTION = ("ptr lane", "ptr start", "ptr worst", "ptr out", "i64 row", "i64 forget", "i64 sides")
 SIDE = ("ptr samples", "i64 stride", "i64 first", "i64 step", "i64 count", "ptr anchor", "i64 reached")
@@ -16,75 +14,37 @@ forget begins the worst anew, and clears that field: the calls after it go on. `
 """
 
 
-def follow(plan: Plan, width: int) -> str:
+def follow(width: int) -> str:
     """See `Track`: W samples at a time, and on from the last one accepted.
 
     What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends there.
     """
-    vector, begin, test, given = f"<{width} x double>", *(Lines(width, prefix) for prefix in "btg")
-    # loops over tables: written out row by row they would be a quarter of all that is to be compiled, and no faster
-    loops = {name: Rows(width, name) for name in ("enter", "up", "down", "back", "move", "pass", "leave")}
-    enter, up, down, back, move, carry, leave = loops.values()
-    sources, targets = zip(*plan.carried, strict=True)
-    extrapolates = plan.extrapolates(width)
-    quick = extrapolates or not plan.remaining
-    rates = plan.rates if extrapolates else ()
-    source, target = carry.table(*zip(*[pair for pair in plan.moves if pair[0] not in rates], strict=True))
-    carry.write(target, carry.spread(carry.let(f"load double, ptr {carry.number(carry.slot(source), width - 1)}, align 8")))
-    (slot,) = enter.table(targets)
-    enter.write(slot, enter.spread(enter.let(f"load double, ptr {enter.number('%place', enter.row)}, align 8")))
-    (slot,) = leave.table(targets)
-    value = leave.let(f"load double, ptr {leave.slot(slot)}, align 8")
-    leave.lines.append(f"store double {value}, ptr {leave.number('%anchor', leave.row)}, align 8")
-    for row, slot in enumerate(plan.sampled):
-        place = begin.number("%samples", begin.sum(begin.product("%stride", row), "%at"))
-        begin.write(slot, begin.let(f"load {vector}, ptr {place}, align 8"))
-        place = given.number("%samples", given.sum(given.sum(given.product("%stride", row), "%at"), -1))
-        given.write(slot, given.spread(given.let(f"load double, ptr {place}, align 8")))
-    accepted = test.let(f"fcmp ogt {vector} {test.read(plan.slots[MARGIN])}, zeroinitializer")
-    for keep in (up, down):
-        (slot,) = keep.table(plan.kept)
-        value = keep.turned(keep.read(slot)) if keep is down else keep.read(slot)
-        place = keep.number("%out", keep.sum(keep.product("%row", keep.row), f"%{keep.prefix}_column"))
-        keep.lines.append(f"store {vector} {value}, ptr {place}, align 8")
-    source, target = move.table(sources, targets)
-    move.write(target, move.spread(move.let(f"load double, ptr {move.number(move.slot(source), '%last')}, align 8")))
-    source, target = back.table(sources[::-1], targets[::-1])
-    back.write(source, back.read(target))
-    tables = "\n".join(each.constants for each in loops.values())
-    worst = _Worst(plan, width)
-    return f"""{tables}
-{worst.declarations}
-declare i64 @llvm.cttz.i64(i64, i1)
-declare i64 @llvm.smin.i64(i64, i64)
-declare i64 @llvm.smax.i64(i64, i64)
-{_run()}
-define i64 @follow(ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop) {{
-entry:
-  {_fields("motion", MOTION)}
-  {_fields("side", SIDE)}
-  {worst.enter}
+    vector, test = f"<{width} x double>", Lines(width, "test")
+    accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
+    body = f"""{_told("motion", MOTION)}
+  {_told("side", SIDE)}
   %descending = icmp slt i64 %step, 0
-  {enter.loop("entry")}
+  %extrapolates = icmp ne i64 %plan_extrapolates, 0
+  %quick = icmp ne i64 %plan_quick, 0
+  %forget_at = getelementptr i64, ptr %motion, i64 {_index(MOTION, "forget")}
+  store i64 0, ptr %forget_at, align 8
+  %worst_here = alloca {vector}, i64 %plan_worst_count, align 64
+  {over("begin_worst", "worst", "ptr %worst_here", "ptr %worst", "i64 %forget")}
+  {over("give", "targets", "ptr %place", "i64 1")}
   br label %head
 head:
-  %at = phi i64 [%from, %enter_end], [%next, %pass_end], [%next, %move_end]
-  %smooth = phi i1 [false, %enter_end], [{str(extrapolates).lower()}, %pass_end], [false, %move_end]
-  %whole_before = phi i1 [false, %enter_end], [false, %pass_end], [%onto, %move_end]
+  %at = phi i64 [%from, %entry], [%next, %pass], [%next, %take]
+  %smooth = phi i1 [false, %entry], [%extrapolates, %pass], [false, %take]
+  %whole_before = phi i1 [false, %entry], [false, %pass], [%onto, %take]
   %more = icmp slt i64 %at, %stop
-  br i1 %more, label %begin, label %end
-begin:
-  {begin.text}
-  br i1 %smooth, label %extrapolate, label %predict
-extrapolate:
-  call void @{"extrapolate" if extrapolates else "predict"}(ptr %lane)
-  br label %attempt
-predict:
-  call void @predict(ptr %lane)
-  br label %attempt
+  br i1 %more, label %attempt, label %end
 attempt:
-  call void @settle(ptr %lane)
-  {calls(plan.joined)}
+  %samples_here = getelementptr double, ptr %samples, i64 %at
+  {over("take", "sampled", "ptr %samples_here", "i64 %stride")}
+  %first_call = select i1 %smooth, ptr %plan_extrapolate, ptr %plan_predict
+  {call("first", "%first_call")}
+  call void @settle(ptr %plan, ptr %lane)
+  {over("calls", "joined")}
   {test.text}
   %bits = bitcast <{width} x i1> {accepted} to i{width}
   %wide = zext i{width} %bits to i64
@@ -97,10 +57,12 @@ attempt:
   %left = call i64 @llvm.smin.i64(i64 %room, i64 %wanted)
   %accepted = call i64 @llvm.smin.i64(i64 %leading, i64 %left)
   %next = add i64 %at, %accepted
-  %full = icmp eq i64 %accepted, {width if quick else -1}
+  %every = icmp eq i64 %accepted, {width}
+  %full = and i1 %every, %quick
   %further = icmp slt i64 %next, %stop
-  %onto = and i1 %full, {str(extrapolates).lower()}
-  %aligned = icmp ule i64 %offset, {0 if extrapolates else width}
+  %onto = and i1 %full, %extrapolates
+  %largest_offset = select i1 %extrapolates, i64 0, i64 {width}
+  %aligned = icmp ule i64 %offset, %largest_offset
   %going = and i1 %full, %further
   %whole = and i1 %going, %aligned
   %none = icmp eq i64 %accepted, 0
@@ -108,50 +70,58 @@ attempt:
 missed:
   br i1 %smooth, label %return, label %end
 return:
-  {back.loop("return")}
-  {given.text}
-  {calls(plan.onward)}
+  %before_here = getelementptr double, ptr %samples_here, i64 -1
+  {over("copy", "returned")}
+  {over("give", "sampled", "ptr %before_here", "i64 %stride")}
+  {over("calls", "onward")}
   br label %take
 keep:
-  {worst.update}
+  {over("update_worst", "worst", "ptr %worst_here", "i64 %accepted")}
   %up_column = add i64 %first, %at
   %down_first = sub i64 %first, %at
   %down_column = sub i64 %down_first, {width - 1}
+  %column = select i1 %descending, i64 %down_column, i64 %up_column
+  %out_here = getelementptr double, ptr %out, i64 %column
   br i1 %descending, label %backward, label %forward
 forward:
-  {up.loop("forward")}
+  {over("keep", "kept", "ptr %out_here", "i64 %row")}
   br label %kept
 backward:
-  {down.loop("backward")}
+  {over("keep_turned", "kept", "ptr %out_here", "i64 %row")}
   br label %kept
 kept:
-  br i1 %whole, label %carry, label %onward
-carry:
-  {carry.loop("carry")}
+  br i1 %whole, label %pass, label %onward
+pass:
+  {over("spread", "moves", f"i64 {width - 1}")}
   br label %head
 onward:
-  {calls(plan.remaining)}
+  {over("calls", "remaining")}
   br label %take
 take:
   %before = sub i64 %accepted, 1
   %last = call i64 @llvm.smax.i64(i64 %before, i64 0)
-  {move.loop("take")}
+  {over("spread", "carried", "i64 %last")}
   br label %head
 end:
-  {leave.loop("end")}
-  {worst.leave}
-  ret i64 %at
-}}
-"""
+  {over("put", "targets", "ptr %anchor", "i64 1")}
+  {over("end_worst", "worst", "ptr %worst_here", "ptr %worst")}
+  ret i64 %at"""
+    turned = Rows(width)
+    place = turned.number("%numbers", turned.product("%stride", "%row"))
+    turned.lines.append(f"store {vector} {turned.turned(turned.read(turned.entry()))}, ptr {place}, align 8")
+    return f"""declare i64 @llvm.cttz.i64(i64, i1)
+declare i64 @llvm.smin.i64(i64, i64)
+declare i64 @llvm.smax.i64(i64, i64)
+{turned.function("keep_turned", "ptr %numbers", "i64 %stride")}{_worst(width)}{_run()}""" + function(
+        "i64 @follow(ptr %plan, ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop)", body
+    )
 
 
 def _run() -> str:
     """Follow every side from the start to its end; how many of them ended early."""
-    end = Lines(0, "end")
-    end.lines.append(f"store i64 %at, ptr {end.number('%side', SIDE.index('i64 reached'))}, align 8")
-    return f"""define i64 @run(ptr %motion, ptr %table) {{
+    return f"""define i64 @run(ptr %plan, ptr %motion, ptr %table) {{
 entry:
-  {_fields("motion", MOTION)}
+  {_told("motion", MOTION)}
   br label %head
 head:
   %k = phi i64 [0, %entry], [%next, %one]
@@ -161,9 +131,10 @@ head:
 one:
   %offset = mul i64 %k, {len(SIDE)}
   %side = getelementptr i64, ptr %table, i64 %offset
-  {_fields("side", SIDE)}
-  %at = call i64 @follow(ptr %motion, ptr %side, ptr %start, i64 0, i64 %count)
-  {end.text}
+  {_told("side", SIDE)}
+  %at = call i64 @follow(ptr %plan, ptr %motion, ptr %side, ptr %start, i64 0, i64 %count)
+  %reached_at = getelementptr i64, ptr %side, i64 {_index(SIDE, "reached")}
+  store i64 %at, ptr %reached_at, align 8
   %ended = icmp ne i64 %at, %count
   %counted = zext i1 %ended to i64
   %early_now = add i64 %early, %counted
@@ -175,39 +146,45 @@ end:
 """
 
 
-def _fields(name: str, fields: Sequence[str]) -> str:
+def _told(name: str, told: Sequence[str]) -> str:
     """Read what stands at an address, each under its own name."""
     lines = Lines(0, f"{name}_")
-    for k, (kind, field) in enumerate(each.split() for each in fields):
+    for k, (kind, field) in enumerate(each.split() for each in told):
         lines.lines.append(f"%{field} = load {kind}, ptr {lines.number(f'%{name}', k)}, align 8")
     return lines.text
 
 
-class _Worst:
-    """The largest and the smallest of slots over the lanes that are kept, in vectors on the stack until the end."""
+def _index(told: Sequence[str], name: str) -> int:
+    return [each.split()[1] for each in told].index(name)
 
-    def __init__(self, plan: Plan, width: int) -> None:
-        enter, update, leave = (Lines(width, f"worst_{part}") for part in ("enter", "update", "leave"))
-        vector, words = enter.vector, f"<{width} x i64>"
-        enter.lines.append("%nothing = icmp ne i64 %forget, 0")
-        enter.lines.append(f"store i64 0, ptr {enter.number('%motion', MOTION.index('i64 forget'))}, align 8")
-        numbers = ", ".join(f"i64 {k}" for k in range(width))
-        one = update.let(f"insertelement {words} poison, i64 %accepted, i64 0")
-        count = update.let(f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer")
-        kept = update.let(f"icmp ult {words} <{numbers}>, {count}")
-        for k, (slot, kind) in enumerate([*((x, "max") for x in plan.largest), *((x, "min") for x in plan.smallest)]):
-            place, here = enter.number("%worst", k), enter.anew(f"alloca {vector}, align 64")
-            nothing = "0.0" if kind == "max" else "0x7FF0000000000000"
-            start = enter.let(f"load double, ptr {place}, align 8")
-            start = enter.spread(enter.let(f"select i1 %nothing, double {nothing}, double {start}"))
-            enter.lines.append(f"store {vector} {start}, ptr {here}, align 64")
-            so_far = update.let(f"load {vector}, ptr {here}, align 64")
-            value = update.choose(kept, update.read(slot), so_far)
-            worse = update.let(f"fcmp {'ogt' if kind == 'max' else 'olt'} {vector} {value}, {so_far}")
-            update.lines.append(f"store {vector} {update.choose(worse, value, so_far)}, ptr {here}, align 64")
-            found = leave.let(f"load {vector}, ptr {here}, align 64")
-            found = leave.let(f"call nnan double @llvm.vector.reduce.f{kind}.v{width}f64({vector} {found})")
-            leave.lines.append(f"store double {found}, ptr {place}, align 8")
-        self.enter, self.update, self.leave = enter.text, update.text, leave.text
-        reductions = (f"declare double @llvm.vector.reduce.f{kind}.v{width}f64({vector})" for kind in ("max", "min"))
-        self.declarations = "\n".join(reductions)
+
+def _worst(width: int) -> str:
+    """The largest of slots, times a sign, over the lanes that are kept: in vectors until the end.
+
+    Functions that begin, take account of a group, and put the largest where it is found.
+    """
+    begin, update, end = (Rows(width) for _ in range(3))
+    vector, words = begin.vector, f"<{width} x i64>"
+    here, *_ = [rows.let(f"getelementptr {vector}, ptr %here, i64 %row") for rows in (begin, update, end)]
+    new, sign = begin.let("icmp ne i64 %forget, 0"), begin.entry(1, 3, "double")
+    so_far = begin.let(f"load double, ptr {begin.number('%found', '%row')}, align 8")
+    so_far = begin.let(f"fmul double {so_far}, {sign}")
+    start = begin.spread(begin.let(f"select i1 {new}, double {begin.entry(2, 3, 'double')}, double {so_far}"))
+    begin.lines.append(f"store {vector} {start}, ptr {here}, align 64")
+    numbers = ", ".join(f"i64 {k}" for k in range(width))
+    one = update.let(f"insertelement {words} poison, i64 %accepted, i64 0")
+    wanted = update.let(f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer")
+    kept = update.let(f"icmp ult {words} <{numbers}>, {wanted}")
+    before = update.let(f"load {vector}, ptr {here}, align 64")
+    signed = update.arithmetic("*", update.read(update.entry(0, 3)), update.spread(update.entry(1, 3, "double")))
+    value = update.choose(kept, signed, before)
+    worse = update.let(f"fcmp ogt {vector} {value}, {before}")
+    update.lines.append(f"store {vector} {update.choose(worse, value, before)}, ptr {here}, align 64")
+    largest = end.let(f"load {vector}, ptr {here}, align 64")
+    largest = end.let(f"call nnan double @llvm.vector.reduce.fmax.v{width}f64({vector} {largest})")
+    largest = end.let(f"fmul double {largest}, {end.entry(1, 3, 'double')}")
+    end.lines.append(f"store double {largest}, ptr {end.number('%found', '%row')}, align 8")
+    return f"""declare double @llvm.vector.reduce.fmax.v{width}f64({vector})
+{begin.function("begin_worst", "ptr %here", "ptr %found", "i64 %forget")}{
+        update.function("update_worst", "ptr %here", "i64 %accepted")
+    }{end.function("end_worst", "ptr %here", "ptr %found")}"""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from .llvm_code import Lines
+from .lowering import lowered
 from .straight_line import Program
 from .trace import LEAVES, Node, operands, place_of
 
@@ -14,9 +15,10 @@ HELD, WIDE = 24, 8
 
 def function(program: Program, width: int) -> str:
     """A program as a function of its W lanes."""
+    program = lowered(program)
     if program.times > 1:
         return _repeated(program, width)
-    return f"define internal void @{program.name}(ptr noalias %lane) {{\n  {_Straight(program, width).text}\n  ret void\n}}\n"
+    return f"define void @{program.name}(ptr noalias %lane, ptr %table) {{\n  {_Straight(program, width).text}\n  ret void\n}}\n"
 
 
 def _repeated(program: Program, width: int) -> str:
@@ -28,11 +30,11 @@ def _repeated(program: Program, width: int) -> str:
         values.append(known or body.operation(node[0], [values[k] for k in operands(node)]))
     largest = list[str]()
     for k, (slot, number) in enumerate(program.outputs.items()):
-        found = body.larger_size(f"%largest{k}", values[number])
+        found = body.umax(f"%largest{k}", values[number])
         largest.append(f"%largest{k} = phi {body.vector} [zeroinitializer, %entry], [{found}, %run]")
         end.write(slot, found)
     phis = "\n  ".join(largest)
-    return f"""define internal void @{program.name}(ptr noalias %lane) {{
+    return f"""define void @{program.name}(ptr noalias %lane, ptr %table) {{
 entry:
   br label %run
 run:
@@ -63,7 +65,6 @@ class _Straight(Lines):
         self._held, self._masks = dict[int, str](), dict[int, str]()
         self._stacked, self._free, self._room = dict[int, int](), list[int](), 0
         self._due, writes = _uses(program)
-        self._sizes = set[int]()  # values without a sign
         for number, node in enumerate(program.nodes):
             if node[0] not in LEAVES:
                 self._step(number, node)
@@ -76,10 +77,7 @@ class _Straight(Lines):
     def _step(self, number: int, node: Node) -> None:
         wanted = operands(node)
         values = [self._held.get(k) or self._fetched(k, wanted) for k in wanted]
-        sizes = node[0] == "max" and self._sizes.issuperset(wanted)
-        if sizes or node[0] == "abs":
-            self._sizes.add(number)
-        result = self.larger_size(*values) if sizes else self.operation(node[0], values)
+        result = self.operation(node[0], values)
         self._used(wanted)
         if node[0] == "larger":
             self._masks[number] = result

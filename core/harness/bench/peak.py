@@ -49,10 +49,10 @@ def prepare() -> Peak:
     """Compile the kernel. Raises ImportError where llvmlite is missing."""
     width = compiled.vector_width()
     text = _text(width)
-    owner, functions = compiled.load(text, lambda: text, {"peak": 2})
+    code = compiled.load(text, lambda: text, {"peak": 2})
     # x <- 0.5 x + 1 stays near two: no overflow, no subnormal number
     memory = np.repeat([0.5, 1.0, *np.linspace(1.0, 2.0, CHAINS)], width)
-    return Peak(width, 2 * CHAINS * width * STEPS, functions["peak"], memory, owner)
+    return Peak(width, 2 * CHAINS * width * STEPS, code.calls["peak"], memory, code)
 
 
 def _text(width: int) -> str:

@@ -1,0 +1,63 @@
+"""Programs in the operations of a processor: a product and a sum are one, and rounded once.
+
+It is decided here, and not by the compiler, so that a program gives the same numbers to the last bit whether it is compiled or walked.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from .straight_line import Program
+from .trace import LEAVES, Node
+
+FUSED = frozenset({"fma", "fnma", "fms"})
+"""a b + c, c - a b and a b - c, of operands a, b, c."""
+SUMS = {"+": ("fma", "fma"), "-": ("fnma", "fms")}
+"""What sums and differences become where their second operand is a product, or their first."""
+SIZES = frozenset({"abs", "umax"})
+"""What is never negative. "umax" is the larger of two such numbers, or NaN if either is."""
+
+
+def lowered(program: Program) -> Program:
+    """The same program, in which a product that goes into nothing but one sum or difference is part of it."""
+    nodes = program.nodes
+    uses = Counter(k for node in nodes if node[0] not in LEAVES for k in node[1:])
+    uses.update(program.outputs.values())
+    taken: dict[int, int] = {}
+    for k, (op, *rest) in enumerate(nodes):
+        if op in SUMS:
+            # of two products the later: the other has been there for longer
+            products = [int(x) for x in rest if nodes[int(x)][0] == "*" and uses[x] == 1]
+            if products:
+                taken[k] = max(products)
+    parts, sizes, place = set(taken.values()), set[float](), [0] * len(nodes)
+    found = list[Node]()
+    for k, node in enumerate(nodes):
+        op, *rest = node
+        if k in parts:
+            continue
+        if k in taken:
+            product, (a, b) = taken[k], rest
+            op, last = (SUMS[op][0], a) if b == product else (SUMS[op][1], b)
+            rest = [*nodes[product][1:], last]
+        elif op == "max" and sizes.issuperset(rest):
+            op = "umax"
+        if op in SIZES:
+            sizes.add(k)
+        place[k] = len(found)
+        found.append(node if op in LEAVES else (op, *[place[int(x)] for x in rest]))
+    return Program(program.name, tuple(found), {slot: place[k] for slot, k in program.outputs.items()}, program.times)
+
+
+def unrolled(program: Program) -> Program:
+    """A program that is run several times, written out."""
+    nodes, outputs = list(program.nodes), dict(program.outputs)
+    for k in range(1, program.times):
+        first = len(nodes)
+        for op, *rest in program.nodes:
+            moved = rest if op == "const" else [rest[0] + k, *rest[1:]] if op in LEAVES else [x + first for x in rest]
+            nodes.append((op, *moved))
+        for slot, number in program.outputs.items():
+            nodes.append(("umax", outputs[slot], number + first))
+            outputs[slot] = len(nodes) - 1
+    return Program(program.name, tuple(nodes), outputs)
