@@ -33,6 +33,7 @@ from kincheck.core.program import (
     where_larger,
 )
 from kincheck.core.program import compiled as code
+from kincheck.core.program import llvm_executor
 
 from .mechanisms import four_bar, mcpherson
 from .test_chain import chain
@@ -134,25 +135,35 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     wanted = np.linspace(0.0, 1.0, 5)
 
-    def positions():
+    def positions(*, often: bool = False):
+        llvm_executor._made.cache_clear()  # as another process
         mechanism = four_bar()
         driver, point = mechanism.drivers[0].name, mechanism.points[0].name
         model = compile_model(mechanism, Request((driver,), (point,)))
+        if often and model._code.walked:
+            model._code.count(10**9)
         return sweep(model, Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
 
     fresh = positions()
+    walked = {*(tmp_path / "kincheck").iterdir()}
+    assert len(walked) == 4  # what was traced, its tables, what goes through them and the loops
+    np.testing.assert_array_equal(positions(often=True), fresh)
     entries = [*(tmp_path / "kincheck").iterdir()]
-    assert len(entries) == 2  # what was traced, and its machine code
-    monkeypatch.setattr(tracing, "_trace", None)
-    monkeypatch.setattr(LlvmCode, "_text", None)
+    assert len(entries) == 5  # and its machine code
+    for name in ("_trace", "walk", "_text"):
+        owner = {"_trace": tracing, "walk": llvm_executor.walk, "_text": LlvmCode}[name]
+        monkeypatch.setattr(owner, name, None)
     np.testing.assert_array_equal(positions(), fresh)
     monkeypatch.undo()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    for entry, other in (entries, entries[::-1]):
+    (code,) = {*entries} - walked
+    for entry, other in zip(entries, [*entries[1:], entries[0]], strict=True):
         kept = entry.read_bytes()
         for damage in (b"", kept[:100], kept[:-1] + bytes([kept[-1] ^ 1]), b"\0" * len(kept), other.read_bytes()):
             entry.write_bytes(damage)
-            np.testing.assert_array_equal(positions(), fresh)
+            if entry != code:
+                code.unlink()  # where there is code, neither tables nor what goes through them is looked for
+            np.testing.assert_array_equal(positions(often=True), fresh)
             assert entry.read_bytes() == kept
 
 

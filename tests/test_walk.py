@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from threading import Barrier, Thread
+from time import sleep
 
 import numpy as np
 import pytest
@@ -221,3 +223,26 @@ def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
     made.count(10**9)
     assert not made.walked
     np.testing.assert_array_equal(every_slot(made, "newton"), wanted)
+
+
+def test_threads_that_come_at_once_compile_once(monkeypatch):
+    """The code of the first would be gone while it runs."""
+    made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
+    load, loaded, meet = code.load, list[str](), Barrier(4)
+
+    def slowly(*given):
+        loaded.append("once")
+        sleep(0.2)
+        return load(*given)
+
+    def count() -> None:
+        meet.wait()
+        made.count(10**9)
+
+    monkeypatch.setattr(code, "load", slowly)
+    threads = [Thread(target=count) for _ in range(4)]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    assert loaded == ["once"]

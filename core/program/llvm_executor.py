@@ -50,6 +50,7 @@ class LlvmCode:
     def __init__(self, plan: Plan) -> None:
         self.width, self.plan = compiled.vector_width(), plan
         # what determines the code; writing its text takes longer than loading it
+        self._lock = Lock()
         self._content = repr([plan.programs, self.width, _sources()])
         code = compiled.find(self._content)
         self.walked, tables = code is None, {} if code else self._tables()
@@ -70,8 +71,10 @@ class LlvmCode:
         """Said by whoever has run programs for so many groups of lanes."""
         self._left -= groups
         if self._left <= 0:
-            self._take(compiled.load(self._content, self._text))
-            self.walked = False
+            with self._lock:  # what one thread compiled is not taken away from others that run it
+                if self.walked:
+                    self._take(compiled.load(self._content, self._text))
+                    self.walked = False
 
     def _take(self, code: compiled.Code) -> None:
         self._code = code
