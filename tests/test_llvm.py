@@ -25,6 +25,7 @@ from kincheck.core.program import (
     Tape,
     absolute,
     cos,
+    llvm_executor,
     maximum,
     minimum,
     program,
@@ -33,7 +34,6 @@ from kincheck.core.program import (
     where_larger,
 )
 from kincheck.core.program import compiled as code
-from kincheck.core.program import llvm_executor
 
 from .mechanisms import four_bar, mcpherson
 from .test_chain import chain

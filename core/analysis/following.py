@@ -46,6 +46,18 @@ def carried(tracer: Tracer) -> list[tuple[int, int]]:
     return pairs
 
 
+def continued(tracer: Tracer) -> list[tuple[int, int]]:
+    """What of that is carried where the lanes after are continued through those before: tests need it, predictions do not.
+
+    Where they are predicted after all there is no step behind, and nothing is made of what it lacked.
+    """
+    time, unknowns = tracer.layout.scalar(TIME), tracer.unknowns
+    ahead = [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[FROM + PREDICTED + name]]
+    ahead += [slot for name in (RATE, RATE_T) for slot in tracer.layout.vector(FROM + name, unknowns)]
+    (_, earlier), *pairs = carried(tracer)
+    return [(time, earlier), *(pair for pair in pairs if pair[1] not in ahead)]
+
+
 def predict(tracer: Tracer) -> Program:
     """The state at the time by a Taylor step of second order, and what the last such step lacked.
 

@@ -93,6 +93,7 @@ class Model:
             remembered=[slot for name in self.state for slot in self.vectors[name]] if fans else (),
             past=self.vectors[following.PAST][0] if fans else 0,
             carried=tracing.carried,
+            continued=tracing.continued,
             kept=[*kept, *(self.slots[name] for name in self._tests)],
             largest=[self.slots["closure"], self.slots["leftover"]],
             smallest=[self.slots[SIGMA]],

@@ -1,10 +1,10 @@
 """How a mechanism is solved is chosen by its size: as one program, component by component, or as one sparse system.
 
-The answers are the same to round-off. One program costs least for each sample, and more to trace: it grows faster than what it ties
-together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large for one
-program is a sparse system. Measured on chains of four-bars, one program against components, both walked: 17 bodies 6 and 97 us a
-sample, made ready in 0.3 and 0.1 s; 33 bodies 15 and 165 us, 0.6 and 0.1 s; 65 bodies 23 and 300 us, 0.9 and 0.1 s. On rings of
-loops, one program against a sparse system: 31 bodies 18 and 1,100 us, 39 bodies 43 and 1,350 us, made ready in 1.2 and 2 s.
+The answers are the same to round-off. One program costs least for each sample, and more to trace: it grows faster than what it
+ties together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large
+for one program is a sparse system. Measured on chains of four-bars, one program against components, both walked: 17 bodies 6 and 97
+us a sample, made ready in 0.3 and 0.1 s; 33 bodies 15 and 165 us, 0.6 and 0.1 s; 65 bodies 23 and 300 us, 0.9 and 0.1 s. On rings
+of loops, one program against a sparse system: 31 bodies 18 and 1,100 us, 39 bodies 43 and 1,350 us, made ready in 1.2 and 2 s.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class Tracing:
         state: name of a vector of the state -> its value at design.
         geometry: the values of all varied places at design.
         given: name of a vector that tells how a given body moves -> its value at rest at design.
-        carried: slots of a solved lane, and of what the lanes after it are predicted from.
+        carried, continued: slots of a solved lane, and of what the lanes after it are predicted from, or continued.
         prepared: slots of what depends on the geometry alone.
     """
 
@@ -48,6 +48,7 @@ class Tracing:
     geometry: Mapping[str, Sequence[float]]
     given: Mapping[str, Sequence[float]]
     carried: Sequence[tuple[int, int]]
+    continued: Sequence[tuple[int, int]]
     prepared: Sequence[int]
     selection: Selection
     frame: Frames
@@ -99,7 +100,7 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> T
         programs.append(tracer.prepared.program())
         if not request.state:
             programs.append(following.extend(tracer))
-    carried = following.carried(tracer)
+    carried, continued = following.carried(tracer), following.continued(tracer)
     tracer.layout.scalar(ITERATIONS)
     return Tracing(
         programs,
@@ -109,6 +110,7 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> T
         tracer.geometry,
         tracer.at_rest,
         carried,
+        continued,
         tracer.prepared.slots,
         tracer.selection,
         tracer.frame,

@@ -79,7 +79,7 @@ def find(content: str) -> Code | None:
     """What the content meant before, if it is in the cache."""
     _, identity = _target()
     code = _read(_entry(f"{identity}\n{content}".encode()))
-    return code and Code(code, {})
+    return None if code is None else Code(code, {})
 
 
 def kept(content: bytes, make: Callable[[], bytes]) -> bytes:

@@ -193,9 +193,9 @@ class _Core:
 
     @property
     def least_stretch(self) -> Scalar:
-        """One over the largest column sum of the inverse of U, or of that of its comparison matrix, which is no less: it is the largest
-        that its entries allow whatever their signs (Higham, Accuracy and Stability of Numerical Algorithms, 8.3). Of a large core
-        that may be thousands of times as much.
+        """One over the largest column sum of the inverse of U, or of that of its comparison matrix, which is no less: it is the
+        largest that its entries allow whatever their signs (Higham, Accuracy and Stability of Numerical Algorithms, 8.3). Of a
+        large core that may be thousands of times as much.
         """
         reach = self._column_sums() if len(self.rows) > COMPARED else self._bounds_of_column_sums()
         return 1.0 / reduce(maximum, reach)

@@ -45,6 +45,7 @@ class Plan:
         remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for `extend`.
         past: the slot it begins to keep them at: those of sample k are at place k modulo `NODES`.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
+        continued: the same where those after it are not predicted by `predict`; all of `carried` where nothing is said.
         kept: slots that are stored of every sample.
         largest, smallest: slots of which `follow` finds the largest and the smallest over the samples it keeps.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
@@ -63,6 +64,7 @@ class Plan:
     remembered: Sequence[int] = ()
     past: int = 0
     carried: Sequence[tuple[int, int]] = ()
+    continued: Sequence[tuple[int, int]] = ()
     kept: Sequence[int] = ()
     largest: Sequence[int] = ()
     smallest: Sequence[int] = ()
@@ -72,31 +74,26 @@ class Plan:
     most: int = 0
 
     @property
-    def moves(self) -> list[tuple[int, int]]:
-        """What is carried, in an order in which no slot is read soon after one was written that is a page away, or several.
-
-        Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that move by up to half a page go
-        upwards, the others downwards. What stays where it is is left out, and a slot that is read and written is read first.
-        """
-        targets = {target for _, target in self.carried}
-        first = [pair for pair in self.carried if pair[0] in targets and pair[0] != pair[1]]
-        rest = [pair for pair in self.carried if pair not in first and pair[0] != pair[1]]
-        up = [pair for pair in rest if (pair[0] - pair[1]) % PAGE < PAGE // 2]
-        return first + up + [pair for pair in reversed(rest) if pair not in up]
-
-    @property
     def remaining(self) -> list[str]:
         """Names of the programs that make a lane ready to be predicted from once its attempt has ended."""
         return [name for name in self.onward if name not in self.after]
 
-    @property
-    def rates(self) -> set[int]:
-        """Slots of what makes a solved lane ready to be predicted from."""
-        return {slot for name in self.onward for slot in self.programs[name].outputs}
-
     def extrapolates(self, lanes: int) -> bool:
         """Whether a group of that many lanes is followed by extrapolation."""
         return "extrapolate" in self.programs and lanes >= NODES
+
+
+def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Slots that are carried, in an order in which no slot is read soon after one was written that is a page away, or several.
+
+    Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that move by up to half a page go
+    upwards, the others downwards. What stays where it is is left out, and a slot that is read and written is read first.
+    """
+    targets = {target for _, target in pairs}
+    first = [pair for pair in pairs if pair[0] in targets and pair[0] != pair[1]]
+    rest = [pair for pair in pairs if pair not in first and pair[0] != pair[1]]
+    up = [pair for pair in rest if (pair[0] - pair[1]) % PAGE < PAGE // 2]
+    return first + up + [pair for pair in reversed(rest) if pair not in up]
 
 
 @dataclass(frozen=True, eq=False)

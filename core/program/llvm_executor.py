@@ -33,8 +33,8 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
 }
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
 OFTEN, OPERATIONS = 64, 3000
-"""Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more. Whoever
-comes back after that comes many times: a sweep of 161 samples is 21 groups."""
+"""Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more.
+Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups."""
 
 
 class LlvmCode:

@@ -6,7 +6,7 @@ import math
 
 from .executor import LINE
 from .llvm_code import Lines
-from .llvm_plan import Rows, call, function, over
+from .llvm_plan import TOGETHER, Rows, call, function, over
 from .trace import NODES
 
 
@@ -68,18 +68,20 @@ keep:
   {over("keep_alive", "kept", "ptr %out_here", "i64 %plane", f"{mask} %still")}
   %next = add i64 %k, 1
   %enough = icmp uge i64 %next, {NODES}
-  br i1 %enough, label %carry, label %onward
+  br i1 %enough, label %continue, label %onward
+continue:
+  {over("copy", "continued")}
+  br label %carry
 onward:
   {over("calls", "remaining")}
-  {over("copy", "rates")}
+  {over("copy", "carried")}
   br label %carry
 carry:
   %turn = urem i64 %k, {NODES}
-  %turned = mul i64 %turn, %plan_remembered_count
+  %turned = mul i64 %turn, %plan_state
   %past_slot = add i64 %plan_past, %turned
   %past = mul i64 %past_slot, {8 * width}
   {over("remember", "remembered", "i64 %past")}
-  {over("copy", "extended")}
   %more = icmp slt i64 %next, %wanted
   br i1 %more, label %sample, label %end_group
 end_group:
@@ -96,13 +98,15 @@ end:
 
 def _kept(width: int) -> str:
     """Functions that put out a sample, NaN where a motion has ended, and remember it."""
-    keep, remember = Rows(width), Rows(width)
+    keep, remember = Rows(width), Rows(width, TOGETHER)
     # whole cache lines go straight to memory: to have each fetched first, only to be overwritten, takes a third of all time
     past_caches = ", !nontemporal !{i32 1}" if width == LINE else ""
     place = keep.number("%numbers", keep.product("%stride", "%row"))
     value = keep.choose("%still", keep.read(keep.entry()), keep.constant(math.nan))
     keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
-    to = remember.sum("%past", remember.product("%row", 8 * width))
-    remember.write(to, remember.read(remember.entry()))
+    for k in range(TOGETHER):
+        remember.at = remember.sum("%row", k)
+        to = remember.sum("%past", remember.entry(1, 2))
+        remember.write(to, remember.anew(f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"))
     kept = keep.function("keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still")
     return kept + remember.function("remember", "i64 %past")

@@ -10,19 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .executor import DONE, ITERATIONS, MARGIN, Plan
+from .executor import DONE, ITERATIONS, MARGIN, Plan, in_order
 from .llvm_code import Lines
 
-NUMBERS = ("stride", "residual", "iterations", "done", "margin", "tolerance", "most", "extrapolates", "quick", "past")
-"""Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the next."""
+NUMBERS = ("stride", "residual", "iterations", "done", "margin", "tolerance", "most", "extrapolates", "quick", "past", "state")
+"""Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the next,
+and "state" how many of them are remembered."""
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
 """Each the address of a call: that of a function of lanes and a table, and that of the table."""
 CALLS = ("after", "alone", "joined", "onward", "remaining")
-PAIRS = ("carried", "returned", "moves", "extended", "rates")
+PAIRS = ("carried", "returned", "moves", "continued", "remembered")
 TABLES: Mapping[str, int] = {
     **dict.fromkeys(CALLS, 1),
     **dict.fromkeys(PAIRS, 2),
-    **dict.fromkeys(("targets", "sampled", "kept", "fixed", "taken", "remembered"), 1),
+    **dict.fromkeys(("targets", "sampled", "kept", "fixed", "taken"), 1),
     "worst": 3,  # a slot, 1 or -1 where the smallest is wanted, and where to begin
 }
 """Columns of each. A table takes two numbers of the plan: its address, and how many rows it has."""
@@ -140,26 +141,25 @@ class PlanInMemory:
         self.calls: Mapping[str, int] = {name: k for k, name in enumerate(names)}
         self.entries = np.zeros((len(names), 2), np.int64)
         extrapolates = plan.extrapolates(width)
-        rates = plan.rates
-        extended = [pair for pair in plan.moves if pair[0] not in rates]
-        pairs = {
+        continued = plan.continued or plan.carried
+        pairs: dict[str, Sequence[tuple[int, ...]]] = {
             "carried": plan.carried,
             "returned": [pair[::-1] for pair in reversed(plan.carried)],
-            "moves": extended if extrapolates else plan.moves,
-            "extended": extended,
-            "rates": [pair for pair in plan.carried if pair[0] in rates],
+            "moves": in_order(continued if extrapolates else plan.carried),
+            "continued": in_order(continued),
+            "remembered": [(slot, k) for k, slot in enumerate(plan.remembered)],
         }
         vector, worst = 8 * width, [(plan.largest, 1.0, 0.0), (plan.smallest, -1.0, -np.inf)]
         self._tables: dict[str, NDArray[np.int64]] = {
             **{name: _table([self.entry(each) for each in getattr(plan, name)], 1) for name in CALLS},
-            **{name: vector * _table([*each, *each[-1:] * (-len(each) % TOGETHER)], 2) for name, each in pairs.items()},
+            **{name: vector * _table([*each, *[*each[-1:]] * (-len(each) % TOGETHER)], 2) for name, each in pairs.items()},
             "targets": vector * _table([target for _, target in plan.carried], 1),
-            **{name: vector * _table(getattr(plan, name), 1) for name in ("sampled", "kept", "fixed", "taken", "remembered")},
+            **{name: vector * _table(getattr(plan, name), 1) for name in ("sampled", "kept", "fixed", "taken")},
             "worst": _table([(vector * x, _bits(sign), _bits(start)) for slots, sign, start in worst for x in slots], 3),
         }
         slots = {name: plan.slots.get(slot, 0) for name, slot in SLOTS.items()}
         numbers = [stride, *slots.values(), _bits(plan.tolerance), plan.most]
-        numbers += [extrapolates, extrapolates or not plan.remaining, plan.past]
+        numbers += [extrapolates, extrapolates or not plan.remaining, plan.past, len(plan.remembered)]
         programs = [self.entry(name) if name in self.calls else 0 for name in PROGRAMS]
         tables = [x for name in TABLES for x in (self._tables[name].ctypes.data, len(self._tables[name]))]
         self._words = np.array([*numbers, *programs, *tables], np.int64)

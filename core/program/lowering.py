@@ -1,14 +1,14 @@
 """Programs in the operations of a processor: a product and a sum are one, and rounded once.
 
-It is decided here, and not by the compiler, so that a program gives the same numbers to the last bit whether it is compiled or walked.
+It is decided here, and not by the compiler: a program gives the same numbers, to the last bit, whether it is compiled or walked.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Iterable
 
 from .straight_line import Program
-from .trace import LEAVES, Node
+from .trace import LEAVES, Node, operands
 
 FUSED = frozenset({"fma", "fnma", "fms"})
 """a b + c, c - a b and a b - c, of operands a, b, c."""
@@ -21,32 +21,41 @@ SIZES = frozenset({"abs", "umax"})
 def lowered(program: Program) -> Program:
     """The same program, in which a product that goes into nothing but one sum or difference is part of it."""
     nodes = program.nodes
-    uses = Counter(k for node in nodes if node[0] not in LEAVES for k in node[1:])
-    uses.update(program.outputs.values())
+    operated = [operands(node) for node in nodes]
+    uses = counts(len(nodes), *operated, program.outputs.values())
     taken: dict[int, int] = {}
-    for k, (op, *rest) in enumerate(nodes):
-        if op in SUMS:
+    for k, node in enumerate(nodes):
+        if node[0] in SUMS:
             # of two products the later: the other has been there for longer
-            products = [int(x) for x in rest if nodes[int(x)][0] == "*" and uses[x] == 1]
+            products = [x for x in operated[k] if nodes[x][0] == "*" and uses[x] == 1]
             if products:
                 taken[k] = max(products)
-    parts, sizes, place = set(taken.values()), set[float](), [0] * len(nodes)
+    parts, sizes, place = set(taken.values()), set[int](), [0] * len(nodes)
     found = list[Node]()
     for k, node in enumerate(nodes):
-        op, *rest = node
         if k in parts:
             continue
+        op, read = node[0], operated[k]
         if k in taken:
-            product, (a, b) = taken[k], rest
+            product, (a, b) = taken[k], read
             op, last = (SUMS[op][0], a) if b == product else (SUMS[op][1], b)
-            rest = [*nodes[product][1:], last]
-        elif op == "max" and sizes.issuperset(rest):
+            read = (*operated[product], last)
+        elif op == "max" and sizes.issuperset(read):
             op = "umax"
         if op in SIZES:
             sizes.add(k)
         place[k] = len(found)
-        found.append(node if op in LEAVES else (op, *[place[int(x)] for x in rest]))
+        found.append(node if op in LEAVES else (op, *[place[x] for x in read]))
     return Program(program.name, tuple(found), {slot: place[k] for slot, k in program.outputs.items()}, program.times)
+
+
+def counts(size: int, *uses: Iterable[int]) -> list[int]:
+    """How often each of so many numbers occurs."""
+    found = [0] * size
+    for each in uses:
+        for k in each:
+            found[k] += 1
+    return found
 
 
 def unrolled(program: Program) -> Program:

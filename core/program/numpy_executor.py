@@ -136,7 +136,7 @@ class NumpyExecutor:
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
         plan, block = self.plan, self.block
-        source, target = np.array(plan.carried).T
+        carried, continued = (np.array(each).T for each in (plan.carried, plan.continued or plan.carried))
         kept, remembered = list(plan.kept), list(plan.remembered)
         past = block[plan.past : plan.past + NODES * len(remembered)].reshape(NODES, -1, self.lanes)
         alive = np.ones(self.lanes, dtype=np.bool_)
@@ -145,13 +145,14 @@ class NumpyExecutor:
             if (alive & ~accepted).any():
                 if k >= NODES:
                     self.go_back(samples[:, k - 1, None])
-                    block[target] = block[source]
+                    block[carried[1]] = block[carried[0]]
                 accepted = self._accepted("predict", sample)
             alive &= accepted
             out[:, first + step * k] = np.where(alive, block[kept], np.nan)
             past[k % NODES] = block[remembered]
             for name in plan.remaining if k + 1 < NODES else ():
                 self.run(name)
+            source, target = continued if k + 1 >= NODES else carried
             block[target] = block[source]
 
     def _accepted(self, start: str, sample: Array) -> NDArray[np.bool_]:

@@ -71,9 +71,9 @@ class NumpyTrack:
         """See `Track`."""
         executor, samples = self._executor, self._sides[side].samples
         plan, block, lanes = executor.plan, executor.block, executor.lanes
-        source, target = np.array(plan.carried).T
+        carried, continued = (np.array(each).T for each in (plan.carried, plan.continued or plan.carried))
         sampled, smooth, whole = list(plan.sampled), False, False
-        block[target] = (self._start if anew else self.anchors[side])[:, None]
+        block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
             # what is extrapolated begins at a multiple of the lanes: on to there as soon as a group is accepted whole
             count = min(lanes - at % lanes if whole and plan.extrapolates(lanes) else lanes, stop - at)
@@ -91,9 +91,10 @@ class NumpyTrack:
             smooth = plan.extrapolates(lanes) and whole and at % lanes == 0 and at + accepted < stop
             for name in () if smooth or not accepted else plan.remaining:
                 executor.run(name)
+            source, target = continued if smooth else carried
             block[target] = block[source, max(accepted - 1, 0), None]
             at += accepted
-        self.anchors[side] = block[target, 0]
+        self.anchors[side] = block[carried[1], 0]
         return at
 
     def _keep(self, side: Side, at: int, found: Array) -> None:

@@ -1,7 +1,7 @@
 """Programs as tables of whole numbers, which `llvm_walk` goes through: nothing has to be compiled before they can be run.
 
-A table is a list of stretches: the kind of an operation, how many bytes its rows take, and the rows: where the result goes and where
-the operands stand, in bytes from the lanes. Stretches are long: of what can be done next, all that is of one kind comes first.
+A table is a list of stretches: the kind of an operation, how many bytes its rows take, and the rows: where the result goes and
+where the operands stand, in bytes from the lanes. Stretches are long: of what can be done next, all of one kind comes first.
 """
 
 from __future__ import annotations
@@ -13,12 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .lowering import lowered, unrolled
+from .lowering import counts, lowered, unrolled
 from .straight_line import Program
-from .trace import LEAVES, Node, place_of
+from .trace import Node, operands, place_of
 
-ARITY = {"const": 2, "node": 1, "copy": 1, "before": 2, "larger": 2, "where": 3, "+": 2, "-": 2, "*": 2, "/": 2, "min": 2, "max": 2}
-ARITY |= {"fma": 3, "fnma": 3, "fms": 3, "umax": 2, "neg": 1, "abs": 1, "sqrt": 1, "sin": 1, "cos": 1}
+ARITY = {
+    **dict.fromkeys(("copy", "node", "neg", "abs", "sqrt", "sin", "cos"), 1),
+    **dict.fromkeys(("+", "-", "*", "/", "min", "max", "umax", "larger", "before", "const"), 2),
+    **dict.fromkeys(("fma", "fnma", "fms", "where"), 3),
+}
 """How many numbers a row of an operation holds beside its result. Those of "const" are the two halves of a number."""
 KINDS = {op: kind for kind, op in enumerate(ARITY, 1)}
 """The number of each; 0 ends a table."""
@@ -38,75 +41,73 @@ class Walk:
 
 
 def walk(program: Program, slots: int, width: int) -> Walk:
-    """A program as a table, for lanes of so many slots and of that width."""
+    """A program as a table, for lanes of so many slots and of that width.
+
+    Every value has a place: the slot it goes to, where nobody reads that, or a cell, which is free again after its last reader.
+    """
     program = lowered(unrolled(program))
     nodes, vector = [*program.nodes], 8 * width
     # an input that is put out elsewhere must survive the output that overwrites its slot
-    copied = {k: len(nodes) + i for i, k in enumerate({k for k in program.outputs.values() if nodes[k][0] == "input"})}
-    nodes += [("copy", k) for k in copied]
-    outputs = {slot: copied.get(k, k) for slot, k in program.outputs.items()}
-    read = {node[1] for node in nodes if node[0] in ("input", "node")}
-    goes = {k: slot * vector for slot, k in outputs.items() if slot not in read}
-    left = [(slot * vector, k) for slot, k in outputs.items() if goes.get(k) != slot * vector]
-    uses = [0] * len(nodes)
-    for node in nodes:
-        if node[0] not in LEAVES:
-            for k in node[1:]:
-                uses[k] += 1  # type: ignore[index]
-    for k in outputs.values():
-        uses[k] += 1  # its place is never free
+    inputs = {k for k in program.outputs.values() if nodes[k][0] == "input"}
+    copied = {k: len(nodes) + at for at, k in enumerate(inputs)}
+    nodes += [("copy", k) for k in inputs]
+    outputs = {slot * vector: copied.get(k, k) for slot, k in program.outputs.items()}
+    read = {int(node[1]) * vector for node in nodes if node[0] in ("input", "node")}
+    goes = {k: at for at, k in outputs.items() if at not in read}
+    operated = [operands(node) for node in nodes]
+    uses = counts(len(nodes), *operated, outputs.values())  # the places of what is put out are never free
     place = [int(node[1]) * vector if node[0] == "input" else 0 for node in nodes]
     words, free, cells = list[int](), list[int](), slots
-    for op, stretch in _stretches(nodes):
-        words += (KINDS[op], 4 * (ARITY[op] + 1) * len(stretch))
+    for op, stretch in _stretches(nodes, operated):
+        words += (KINDS[op], _bytes(op, stretch))
         for k in stretch:
-            node = nodes[k]
             if op == "const":
-                numbers: Sequence[int] = _HALVES.unpack(_NUMBER.pack(node[1]))
+                numbers: Sequence[int] = _HALVES.unpack(_NUMBER.pack(nodes[k][1]))
             elif op == "node":
-                numbers = (int(node[1]) * vector + 8 * place_of(int(node[2]), width),)
+                numbers = (int(nodes[k][1]) * vector + 8 * place_of(int(nodes[k][2]), width),)
             else:
-                numbers = [place[x] for x in node[1:]]  # type: ignore[index]
-                for x in node[1:]:
-                    uses[x] -= 1  # type: ignore[index]
-                    if not uses[x] and nodes[x][0] != "input":  # type: ignore[index]
-                        free.append(place[x])  # type: ignore[index]
+                numbers = [place[x] for x in operated[k]]
+                for x in operated[k]:
+                    uses[x] -= 1
+                    if not uses[x] and nodes[x][0] != "input":
+                        free.append(place[x])
             if k in goes:
-                at = goes[k]
+                place[k] = goes[k]
             elif free:
-                at = free.pop()
+                place[k] = free.pop()
             else:
-                at, cells = cells * vector, cells + 1
-            place[k] = at
-            words.append(at)
+                place[k], cells = cells * vector, cells + 1
+            words.append(place[k])
             words += numbers
+    left = [(at, k) for at, k in outputs.items() if goes.get(k) != at]
     if left:
-        words += (KINDS["copy"], 8 * len(left))
-        for slot, k in left:
-            words += (slot, place[k])
+        words += (KINDS["copy"], _bytes("copy", left))
+        for at, k in left:
+            words += (at, place[k])
     return Walk(np.array([*words, 0, 0], np.uint32), cells - slots)
 
 
 _NUMBER, _HALVES = struct.Struct("<d"), struct.Struct("<II")
 
 
-def _stretches(nodes: Sequence[Node]) -> Iterator[tuple[str, Sequence[int]]]:
+def _bytes(op: str, stretch: Sequence[object]) -> int:
+    """That the rows of a stretch take."""
+    return 4 * (1 + ARITY[op]) * len(stretch)
+
+
+def _stretches(nodes: Sequence[Node], operated: Sequence[Sequence[int]]) -> Iterator[tuple[str, Sequence[int]]]:
     """The operations, in an order in which those of one kind stand together where they can."""
     readers: list[list[int]] = [[] for _ in nodes]
     missing = [0] * len(nodes)
     ready: dict[str, list[int]] = {}
-    for k, node in enumerate(nodes):
-        op = node[0]
+    for k, (op, *_) in enumerate(nodes):
         if op == "input":
             continue
-        count = 0
-        if op not in LEAVES:
-            for x in node[1:]:
-                if nodes[x][0] != "input":  # type: ignore[index]
-                    readers[x].append(k)  # type: ignore[index]
-                    count += 1
-        missing[k] = count
-        if not count:
+        for x in operated[k]:
+            if nodes[x][0] != "input":
+                readers[x].append(k)
+                missing[k] += 1
+        if not missing[k]:
             ready.setdefault(op, []).append(k)
     while ready:
         kind = max(ready, key=lambda op: len(ready[op]))
@@ -116,8 +117,5 @@ def _stretches(nodes: Sequence[Node]) -> Iterator[tuple[str, Sequence[int]]]:
                 missing[x] -= 1
                 if not missing[x]:
                     op = nodes[x][0]
-                    if op == kind:
-                        stretch.append(x)
-                    else:
-                        ready.setdefault(op, []).append(x)
+                    (stretch if op == kind else ready.setdefault(op, [])).append(x)
         yield kind, stretch
