@@ -111,8 +111,9 @@ def processes(found: Bench) -> Section:
         for each in found.processes
     ]
     notes = (
-        "Seconds of fresh processes, files warm; stages are medians, beyond numpy: those after it, to the first solution. Memory: "
-        "the most a process held; runs are of the first case, and in one process with their engine (--jobs 0).",
+        "Seconds of fresh processes, files warm; stages are medians, beyond numpy: those after it, to the first solution. In "
+        "the course of ten more solves programs are compiled that are not in the cache; until then they are walked. Memory: the "
+        "most a process held; runs are of the first case, and in one process with their engine (--jobs 0).",
     )
     headings = (
         "process",
