@@ -18,6 +18,7 @@ from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program
 from kincheck.core.program.compiled import available
 from kincheck.core.program.executor import in_order
+from kincheck.core.program.llvm_plan import TOGETHER, PlanInMemory
 
 from .mechanisms import four_bar, mcpherson
 
@@ -131,6 +132,18 @@ def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written()
     assert moved != [pair for pair in pairs if pair != (9, 9)]
     one, other = list(range(300)), list(range(300))
     for slots, moves in ((one, pairs), (other, moved)):
+        for source, target in moves:
+            slots[target] = slots[source]
+    assert one == other
+
+
+@pytest.mark.parametrize("count", range(1, 10))
+def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
+    pairs, width = [(k, k + 1) for k in reversed(range(count))], 8
+    table = PlanInMemory(Plan({}, {}, carried=pairs), width, 20)._tables["carried"]
+    assert len(table) % TOGETHER == 0
+    one, other = list(range(20)), list(range(20))
+    for slots, moves in ((one, pairs), (other, table // (8 * width))):
         for source, target in moves:
             slots[target] = slots[source]
     assert one == other

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ MAX_ITERATIONS = 12
 RECENT = 8
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
+Made = TypeVar("Made")
 TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
 TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
@@ -52,6 +53,20 @@ def recent_model(mechanism: Mechanism, request: Request) -> Model:
     return _recent(mechanism, request) if ours(mechanism) else compile_model(mechanism, request)
 
 
+class Bound:
+    """What is made of something, by key and thread: made once, and kept."""
+
+    def __init__(self) -> None:
+        self._found: dict[Any, Any] = {}
+
+    def __call__(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """What was made under this key for this thread before; or is made now."""
+        key = threading.get_ident(), key
+        if key not in self._found:
+            self._found[key] = make()
+        return self._found[key]
+
+
 class Model:
     """The programs of a mechanism and the lanes they run on.
 
@@ -63,6 +78,7 @@ class Model:
         geometry: the places of the numbers of all varied places.
         given: name of a vector that tells how a given body moves -> its value at rest at design.
         design: all slots of a lane that stands at the design position.
+        bound: what is made of it for a thread.
         rows: name of a motion or test -> its rows among what is kept of a sample.
         kept: how many rows there are.
     """
@@ -104,7 +120,7 @@ class Model:
         )
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self._plan) if compiled else None
-        self._executors: dict[tuple[int, int], Executor] = {}
+        self.bound = Bound()
         self.design = self._solve_design()
 
     def _wanted(self) -> list[str]:
@@ -177,10 +193,7 @@ class Model:
 
     def executor(self, lanes: int) -> Executor:
         """The programs bound to that many lanes of this thread; kept, because binding costs as much as running."""
-        key = threading.get_ident(), lanes
-        if key not in self._executors:
-            self._executors[key] = LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes)
-        return self._executors[key]
+        return self.bound(lanes, lambda: LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes))
 
     def samples(self, times: Array, drive: Array) -> Array:
         """What `sampled` holds at the times, shape (sampled, n).

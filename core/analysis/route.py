@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +12,12 @@ from ..motions import Path
 from ..program import Side
 from ..trajectory import Array
 from .following import weights_of_groups, weights_of_samples
-from .model import Model
+from .model import Bound, Model
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
 # Samples that are in the order of their times.
 AS_THEY_ARE = slice(None)
-
-Bound = TypeVar("Bound")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,17 +97,10 @@ class Route:
         """How many samples are tried at once."""
         return min(LANES, max(1, len(self.path.times)))
 
-    def bound(self, key: Hashable, make: Callable[[], Bound]) -> Bound:
-        """What was made of it under this key and for this thread before; or is made now, and kept with it."""
-        found: dict[Any, Bound] = self._bound
-        key = threading.get_ident(), key
-        if key not in found:
-            found[key] = make()
-        return found[key]
-
     @cached_property
-    def _bound(self) -> dict[Any, Any]:
-        return {}
+    def bound(self) -> Bound:
+        """What is made of it."""
+        return Bound()
 
     def sampled(self, times: Array) -> Array:
         """What is given at the times, shape (sampled, n)."""
