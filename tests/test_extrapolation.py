@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kincheck.core.analysis.following import weights_of_groups, weights_of_samples
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.request import EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, Request
 from kincheck.core.analysis.sweep import sweep
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import NODES, place_of
@@ -55,6 +55,19 @@ def test_lanes_are_extrapolated_to_one_iteration(order):
     by_rates = positions(fine[::8], order)  # all that is left of the lanes before are rates
     assert (by_rates.iterations[1:-1] > 1).any()
     assert np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max() <= 4e-16
+
+
+@pytest.mark.parametrize("order", [0, 2])
+def test_what_is_continued_is_all_that_tests_need_and_no_step_behind(order):
+    """Neither rates, nor what was predicted: where lanes are predicted after all, the step before is none."""
+    found = compile_model(mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=False))
+    slots, vectors, plan = found.slots, found.vectors, found.plan
+    ahead = [RATE, RATE_T, *(PREDICTED + name for name in found.state)]
+    left_out = {slot for name in ahead for slot in vectors[FROM + name]}
+    assert {target for _, target in plan.continued} == {target for _, target in plan.carried} - left_out
+    now = {slots[TIME]: slots[FROM + TIME], slots[FROM + TIME]: slots[EARLIER + TIME]}
+    assert {*now.items()} <= {*plan.carried}
+    assert {(slots[TIME], slots[FROM + TIME]), (slots[TIME], slots[EARLIER + TIME])} <= {*plan.continued}
 
 
 GRIDS = {

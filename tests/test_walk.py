@@ -12,10 +12,15 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve, solve_designs
 from kincheck.core.analysis import model as models
+from kincheck.core.analysis.cascade import Cascade
+from kincheck.core.analysis.cascade_sweep import CascadeSweep
+from kincheck.core.analysis.components import components
+from kincheck.core.analysis.equations import frames
 from kincheck.core.analysis.model import Model, compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
+from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, program
 from kincheck.core.program import compiled as code
@@ -186,6 +191,27 @@ def test_designs_and_components_are_the_same_before_and_after(way, monkeypatch):
     monkeypatch.setattr(llvm, "OFTEN", 0)
     for a, b in zip(walked, run(), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_many_designs_compile_their_programs():
+    mechanism, place = mcpherson(), "joints.tie_rod.points.0"
+    request = Request(("stroke",), ("wheel",), varied=(place,))
+    route = Route(compile_model(mechanism, request), Path({"stroke": Ramp(1.0)}, np.linspace(-0.05, 0.05, 41)))
+    rod = np.array([[1.115], [0.665], [0.118]]) + np.linspace(0.0, 0.01, 17)
+    assert route.model._code.walked
+    for _ in range(2):
+        solve_variants(route, rod, 1e-12)
+    assert not route.model._code.walked
+
+
+def test_many_components_compile_their_programs():
+    mechanism = chain(15)
+    parts = components(mechanism, frames(mechanism))
+    cascade = Cascade(mechanism, Request(("turn",), ()), parts)
+    solver = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 65)))
+    assert all(kind.model._code.walked for kind in cascade.kinds)
+    solver.solve(1e-12)
+    assert not any(kind.model._code.walked for kind in cascade.kinds if len(kind.members) > 1)
 
 
 def test_long_programs_are_walked_for_longer():
