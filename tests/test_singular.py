@@ -224,6 +224,14 @@ def estimated(matrices):
     return block[n * n], np.abs(block[n * n + 1 :]).min(axis=0)
 
 
+def test_beside_a_singular_pose_accelerations_keep_their_digits():
+    """There sigma is 6e-4: solved only as any other sample they are off by 1e-8."""
+    turn = BRANCH + np.array([-0.2, -0.1, -0.05, -0.002])
+    found = solve(chain(1), "turn", turn)
+    assert found.details["retried_samples"] == 1
+    assert np.abs(found.points["end"].acceleration - chain_end(1, turn)[2]).max() <= 1e-9
+
+
 @pytest.mark.parametrize("n", [2, 4, 6, 10, 20, 30])
 @pytest.mark.parametrize("sigma", [1.0, 1e-3, 1e-9])
 def test_sigma_is_about_the_smallest_singular_value(n, sigma):

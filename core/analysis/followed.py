@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .bridge import bridge, onward
-from .continuity import WORSE, doubtful
+from .continuity import doubtful
 from .march import End, March, arrived, march
 from .request import FROM, LARGEST_SIGMA, SIGMA, TIME
 from .route import Route
@@ -64,7 +64,6 @@ class Followed:
 
     Attributes:
         system: the equations.
-        known: samples of which sigma is no estimate, shape (n,).
         found: the samples; those beyond ends are put in as they are reached.
         parts: the first is the route asked for.
         part_of: the part of each sample, shape (n,).
@@ -76,7 +75,6 @@ class Followed:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
         # tracing it anew takes longer than all else here
         self.system = route.model.bound("system", lambda: System(route.model))
-        self.known = np.zeros(len(self.times), dtype=np.bool_)
         self.parts = [Part(route, np.arange(len(self.times)))]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []
@@ -88,7 +86,7 @@ class Followed:
     def doubtful(self) -> NDArray[np.bool_]:
         """Samples that were reached and may be wrong, shape (n,)."""
         closure, sigma = (self.found.kept[self.route.model.rows[name].start] for name in ("closure", SIGMA))
-        return self.found.solved & doubtful(sigma, closure, self.tol, np.where(self.known, 1.0, WORSE))
+        return self.found.solved & doubtful(sigma, closure, self.tol)
 
     def go_on(self) -> None:
         """Pass the singular poses at ends, one after the other, where the motion passes them."""

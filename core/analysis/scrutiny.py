@@ -114,7 +114,6 @@ class _Scrutiny:
         state, sample = self.system.state(lanes), self.route.sampled(self.times[indices])
         # the estimate says too little of many unknowns: most of their samples are beyond doubt by sigma itself
         self.found.kept[self.model.rows[SIGMA].start, indices] = smallest_singular_values(self.system, state, sample)
-        self.followed.known[indices] = True
         left = np.flatnonzero(self.followed.doubtful[indices])
         if not len(left):
             return
