@@ -70,16 +70,26 @@ class Code:
 
 def load(content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None) -> Code:
     """Compile the text, or fetch from the cache what the content meant before."""
-    machine, identity = _target()
-    code = kept(f"{identity}\n{content}".encode(), lambda: machine.emit_object(_llvm().parse_assembly(text())))
+    machine, _ = _target()
+    code = kept(_told(content), lambda: machine.emit_object(_llvm().parse_assembly(text())))
     return Code(code, signatures or {})
 
 
 def find(content: str) -> Code | None:
     """What the content meant before, if it is in the cache."""
-    _, identity = _target()
-    code = _read(_entry(f"{identity}\n{content}".encode()))
+    code = _read(_entry(_told(content)))
     return None if code is None else Code(code, {})
+
+
+def known(content: str) -> bool:
+    """Whether there is something in the cache that the content meant before."""
+    return _entry(_told(content)).exists()
+
+
+def _told(content: str) -> bytes:
+    """What determines machine code."""
+    _, identity = _target()
+    return f"{identity}\n{content}".encode()
 
 
 def kept(content: bytes, make: Callable[[], bytes]) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import inspect
 import math
 import pickle
@@ -96,8 +97,14 @@ class LlvmCode:
 
 @cache
 def begin() -> None:
-    """Make ready what is needed first, while programs are traced: the compiler does not wait for Python's lock."""
-    Thread(target=lambda: [_loop(name, compiled.vector_width()) for name in ("walk", "follow")]).start()
+    """Compile what is needed first, if it never was, while programs are traced: the compiler does not wait for Python's lock.
+
+    To import and to read files does: in a thread, beside whatever else Python does, that would take three times as long.
+    """
+    width = compiled.vector_width()
+    missing = [name for name in ("walk", "follow") if not compiled.known(_content(name, width))]
+    if missing:
+        Thread(target=lambda: [_loop(name, width) for name in missing]).start()
 
 
 def _loop(name: str, width: int) -> compiled.Code:
@@ -113,12 +120,17 @@ def _made(name: str, width: int) -> compiled.Code:
     """Functions that run any plan."""
     writers, signatures = LOOPS[name]
     text = partial("\n".join, [*(write(width) for write in writers), llvm_code.declarations(width)])
-    return compiled.load(repr([name, width, _sources()]), text, signatures)
+    return compiled.load(_content(name, width), text, signatures)
+
+
+def _content(name: str, width: int) -> str:
+    return repr([name, width, _sources()])
 
 
 @cache
-def _sources() -> list[str]:
-    return [inspect.getsource(each) for each in SOURCES]
+def _sources() -> str:
+    """A digest of all that writes text or tables."""
+    return hashlib.sha256("".join(inspect.getsource(each) for each in SOURCES).encode()).hexdigest()
 
 
 class LlvmExecutor:
