@@ -149,7 +149,7 @@ def sweeps(mechanism, driver: str, values: np.ndarray, **asked) -> tuple[Model, 
     def positions() -> np.ndarray:
         return np.array([each.position for each in follow(route, 1e-12).points.values()])
 
-    return model, [positions() for _ in range(8)]
+    return model, [positions() for _ in range(10)]
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

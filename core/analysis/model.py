@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, begin
+from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
 from ..program.compiled import available
 from ..trajectory import Array
 from . import following
@@ -39,7 +39,7 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     if request.compiled and available():
-        begin()
+        make_loops_ready()
     return Model(mechanism, request, traced(mechanism, request, section))
 
 

@@ -2,7 +2,7 @@
 
 from .elimination import Elimination
 from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
-from .llvm_executor import LlvmCode, LlvmExecutor, begin
+from .llvm_executor import LlvmCode, LlvmExecutor, make_loops_ready
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
 from .trace import NODES, Tape, Traced, absolute, before, cos, maximum, minimum, place_of, sin, sqrt, where_larger
@@ -27,8 +27,8 @@ __all__ = [
     "Track",
     "absolute",
     "before",
-    "begin",
     "cos",
+    "make_loops_ready",
     "maximum",
     "minimum",
     "place_of",

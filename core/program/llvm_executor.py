@@ -33,9 +33,9 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
     "parts": ([*_NEEDED, llvm_loops.parts], {"parts": 11}),
 }
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
-OFTEN, OPERATIONS = 64, 3000
+OFTEN, OPERATIONS = 150, 3000
 """Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more.
-Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups."""
+Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups, of which `kincheck run` makes six."""
 
 
 class LlvmCode:
@@ -96,7 +96,7 @@ class LlvmCode:
 
 
 @cache
-def begin() -> None:
+def make_loops_ready() -> None:
     """Compile what is needed first, if it never was, while programs are traced: the compiler does not wait for Python's lock.
 
     To import and to read files does: in a thread, beside whatever else Python does, that would take three times as long.
