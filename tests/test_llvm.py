@@ -25,7 +25,7 @@ from kincheck.core.program import (
     Tape,
     absolute,
     cos,
-    llvm_executor,
+    machine_code,
     maximum,
     minimum,
     program,
@@ -136,7 +136,7 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
     wanted = np.linspace(0.0, 1.0, 5)
 
     def positions(*, often: bool = False):
-        llvm_executor._made.cache_clear()  # as another process
+        machine_code._made.cache_clear()  # as another process
         mechanism = four_bar()
         driver, point = mechanism.drivers[0].name, mechanism.points[0].name
         model = compile_model(mechanism, Request((driver,), (point,)))
@@ -151,7 +151,7 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
     entries = [*(tmp_path / "kincheck").iterdir()]
     assert len(entries) == 5  # and its machine code
     for name in ("_trace", "walk", "_text"):
-        owner = {"_trace": tracing, "walk": llvm_executor.walk, "_text": LlvmCode}[name]
+        owner = {"_trace": tracing, "walk": machine_code.walk, "_text": LlvmCode}[name]
         monkeypatch.setattr(owner, name, None)
     np.testing.assert_array_equal(positions(), fresh)
     monkeypatch.undo()

@@ -24,7 +24,7 @@ from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, program
 from kincheck.core.program import compiled as code
-from kincheck.core.program import llvm_executor as llvm
+from kincheck.core.program import machine_code as llvm
 from kincheck.core.program.lowering import lowered, unrolled
 from kincheck.core.program.walk import walk
 

@@ -2,7 +2,8 @@
 
 from .elimination import Elimination
 from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
-from .llvm_executor import LlvmCode, LlvmExecutor, make_loops_ready
+from .llvm_executor import LlvmExecutor
+from .machine_code import LlvmCode, make_loops_ready
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
 from .trace import NODES, Tape, Traced, absolute, before, cos, maximum, minimum, place_of, sin, sqrt, where_larger

@@ -1,4 +1,4 @@
-"""LLVM code over a vector of lanes, line by line; what is written of it is in llvm_programs, llvm_loops and llvm_follow.
+"""LLVM code over a vector of lanes, line by line; what is written of it is in the modules whose names begin alike.
 
 The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are reduced and summed in place. The W
 lanes of a vector stand together in memory, slot by slot: what a program touches is one stretch of a few kilobytes.

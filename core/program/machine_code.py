@@ -1,0 +1,134 @@
+"""A plan that this processor can run: loops that are the same for all plans, and programs, walked or compiled."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
+from threading import Lock, Thread
+
+from . import (
+    compiled,
+    executor,
+    llvm_code,
+    llvm_fan,
+    llvm_follow,
+    llvm_loops,
+    llvm_plan,
+    llvm_programs,
+    llvm_walk,
+    lowering,
+    trace,
+    walk,
+)
+from .executor import Plan
+
+SOURCES = executor, llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_plan, llvm_programs, llvm_walk, lowering, trace, walk
+"""Modules that write text or tables, and what they take from others."""
+_NEEDED = llvm_plan.rows, llvm_loops.settle
+LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {
+    "walk": ([llvm_walk.walker], {"walk": 2}),
+    "follow": ([*_NEEDED, llvm_loops.run, llvm_follow.follow], {"run_program": 4, "attempt": 3, "follow": 6, "run": 3}),
+    "fan": ([*_NEEDED, llvm_fan.fan], {"fan": 11}),
+    "parts": ([*_NEEDED, llvm_loops.parts], {"parts": 11}),
+}
+"""What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
+OFTEN, OPERATIONS = 150, 3000
+"""Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more.
+Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups, of which `kincheck run` makes six."""
+
+
+class LlvmCode:
+    """A plan that this processor can run: its programs are walked at first, and compiled where they are run often.
+
+    Raises ImportError where llvmlite is missing.
+
+    Attributes:
+        stride: slots of a lane, with those after `Plan.slots` that programs keep their values in.
+        walked: whether programs are not compiled yet.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.width, self.plan, self._lock = compiled.vector_width(), plan, Lock()
+        # what determines the code; writing its text takes longer than loading it
+        self._content = repr([plan.programs, self.width, _sources()])
+        code = compiled.find(self._content)
+        self.walked, tables = code is None, {} if code else self._tables()
+        self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
+        self.memory = llvm_plan.PlanInMemory(plan, self.width, self.stride)
+        if code:
+            self._take(code)
+        for name, table in tables.items():
+            self.memory.entries[self.memory.calls[name]] = _loop("walk", self.width).address("walk"), table.words.ctypes.data
+        operations = sum(len(each.nodes) for each in plan.programs.values())
+        self._alive, self._left = tables, OFTEN * max(OPERATIONS, operations) // OPERATIONS
+
+    def call(self, loop: str, name: str) -> Callable[..., int]:
+        """A function of a loop, for this plan."""
+        return partial(_loop(loop, self.width).calls[name], self.memory.address)
+
+    def count(self, groups: int) -> None:
+        """Said by whoever has run programs for so many groups of lanes."""
+        self._left -= groups
+        if self._left <= 0:
+            with self._lock:  # what one thread compiled is not taken away from others that run it
+                if self.walked:
+                    self._take(compiled.load(self._content, self._text))
+                    self.walked = False
+
+    def _take(self, code: compiled.Code) -> None:
+        self._code = code
+        for name, at in self.memory.calls.items():
+            self.memory.entries[at, 0] = code.address(name)  # a function that is compiled needs no table
+
+    def _tables(self) -> dict[str, walk.Walk]:
+        slots = len(self.plan.slots)
+
+        def made() -> bytes:
+            return pickle.dumps({name: walk.walk(each, slots, self.width) for name, each in self.plan.programs.items()})
+
+        return pickle.loads(compiled.kept(f"{slots} {self._content}".encode(), made))
+
+    def _text(self) -> str:
+        programs = (llvm_programs.function(program, self.width) for program in self.plan.programs.values())
+        return "\n".join([*programs, llvm_code.declarations(self.width)])
+
+
+@cache
+def make_loops_ready() -> None:
+    """Compile what is needed first, if it never was, while programs are traced: the compiler does not wait for Python's lock.
+
+    To import and to read files does: in a thread, beside whatever else Python does, that would take three times as long.
+    """
+    width = compiled.vector_width()
+    missing = [name for name in ("walk", "follow") if not compiled.known(_content(name, width))]
+    if missing:
+        Thread(target=lambda: [_loop(name, width) for name in missing]).start()
+
+
+def _loop(name: str, width: int) -> compiled.Code:
+    with _LOCK:
+        return _made(name, width)
+
+
+_LOCK = Lock()
+
+
+@cache
+def _made(name: str, width: int) -> compiled.Code:
+    """Functions that run any plan."""
+    writers, signatures = LOOPS[name]
+    text = partial("\n".join, [*(write(width) for write in writers), llvm_code.declarations(width)])
+    return compiled.load(_content(name, width), text, signatures)
+
+
+def _content(name: str, width: int) -> str:
+    return repr([name, width, _sources()])
+
+
+@cache
+def _sources() -> str:
+    """A digest of all that writes text or tables."""
+    return hashlib.sha256("".join(inspect.getsource(each) for each in SOURCES).encode()).hexdigest()
