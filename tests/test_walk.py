@@ -227,6 +227,15 @@ def test_long_programs_are_walked_for_longer():
     assert not made.walked
 
 
+def test_programs_that_another_process_walked_are_compiled_in_the_first_sweep():
+    plan = compile_model(mcpherson(), Request(("stroke",), ())).plan  # its tables are in the cache now
+    made = LlvmCode(plan)
+    made.count(llvm.AGAIN - 1)
+    assert made.walked
+    made.count(1)
+    assert not made.walked
+
+
 def test_what_was_compiled_is_found_by_the_next_process():
     plan = compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan
     assert LlvmCode(plan).walked

@@ -71,23 +71,23 @@ class Code:
 def load(content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None) -> Code:
     """Compile the text, or fetch from the cache what the content meant before."""
     machine, _ = _target()
-    code = kept(_told(content), lambda: machine.emit_object(_llvm().parse_assembly(text())))
+    code = kept(told(content), lambda: machine.emit_object(_llvm().parse_assembly(text())))
     return Code(code, signatures or {})
 
 
 def find(content: str) -> Code | None:
     """What the content meant before, if it is in the cache."""
-    code = _read(_entry(_told(content)))
+    code = _read(_entry(told(content)))
     return None if code is None else Code(code, {})
 
 
-def known(content: str) -> bool:
+def known(content: bytes) -> bool:
     """Whether there is something in the cache that the content meant before."""
-    return _entry(_told(content)).exists()
+    return _entry(content).exists()
 
 
-def _told(content: str) -> bytes:
-    """What determines machine code."""
+def told(content: str) -> bytes:
+    """What determines machine code: this for any processor and compiler, and both of them."""
     _, identity = _target()
     return f"{identity}\n{content}".encode()
 

@@ -35,9 +35,10 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
     "parts": ([*_NEEDED, llvm_loops.parts], {"parts": 11}),
 }
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
-OFTEN, OPERATIONS = 150, 3000
+OFTEN, AGAIN, OPERATIONS = 150, 20, 3000
 """Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more.
-Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups, of which `kincheck run` makes six."""
+Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups, of which `kincheck run` makes six. For those
+whose tables are in the cache somebody did come back: they are compiled after the second number, in the first sweep."""
 
 
 class LlvmCode:
@@ -55,6 +56,7 @@ class LlvmCode:
         # what determines the code; writing its text takes longer than loading it
         self._content = repr([plan.programs, self.width, _sources()])
         code = compiled.find(self._content)
+        again = code is None and compiled.known(self._of_tables)
         self.walked, tables = code is None, {} if code else self._tables()
         self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
         self.memory = llvm_plan.PlanInMemory(plan, self.width, self.stride)
@@ -63,7 +65,7 @@ class LlvmCode:
         for name, table in tables.items():
             self.memory.entries[self.memory.calls[name]] = _loop("walk", self.width).address("walk"), table.words.ctypes.data
         operations = sum(len(each.nodes) for each in plan.programs.values())
-        self._alive, self._left = tables, OFTEN * max(OPERATIONS, operations) // OPERATIONS
+        self._alive, self._left = tables, (AGAIN if again else OFTEN) * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:
         """A function of a loop, for this plan."""
@@ -89,7 +91,11 @@ class LlvmCode:
         def made() -> bytes:
             return pickle.dumps({name: walk.walk(each, slots, self.width) for name, each in self.plan.programs.items()})
 
-        return pickle.loads(compiled.kept(f"{slots} {self._content}".encode(), made))
+        return pickle.loads(compiled.kept(self._of_tables, made))
+
+    @property
+    def _of_tables(self) -> bytes:
+        return f"tables {len(self.plan.slots)} {self._content}".encode()
 
     def _text(self) -> str:
         programs = (llvm_programs.function(program, self.width) for program in self.plan.programs.values())
@@ -103,7 +109,7 @@ def make_loops_ready() -> None:
     To import and to read files does: in a thread, beside whatever else Python does, that would take three times as long.
     """
     width = compiled.vector_width()
-    missing = [name for name in ("walk", "follow") if not compiled.known(_content(name, width))]
+    missing = [name for name in ("walk", "follow") if not compiled.known(compiled.told(_content(name, width)))]
     if missing:
         Thread(target=lambda: [_loop(name, width) for name in missing]).start()
 
