@@ -45,7 +45,7 @@ class Plan:
         remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for `extend`.
         past: the slot it begins to keep them at: those of sample k are at place k modulo `NODES`.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
-        continued: the same where those after it are not predicted by `predict`; all of `carried` where nothing is said.
+        continued: the same where those after it are not predicted by `predict`; as `carried` where nothing is said.
         kept: slots that are stored of every sample.
         largest, smallest: slots of which `follow` finds the largest and the smallest over the samples it keeps.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
@@ -77,6 +77,11 @@ class Plan:
     def remaining(self) -> list[str]:
         """Names of the programs that make a lane ready to be predicted from once its attempt has ended."""
         return [name for name in self.onward if name not in self.after]
+
+    @property
+    def carried_on(self) -> Sequence[tuple[int, int]]:
+        """What is carried where those after it are not predicted by `predict`."""
+        return self.continued or self.carried
 
     def extrapolates(self, lanes: int) -> bool:
         """Whether a group of that many lanes is followed by extrapolation."""

@@ -23,7 +23,7 @@ REACHED = SIDE.index("i64 reached")
 
 
 class LlvmExecutor:
-    """Compiled code bound to lanes: groups of a vector's width W, memory of shape (groups, slots, W).
+    """A plan bound to lanes: groups of a vector's width W, memory of shape (groups, slots, W).
 
     The last group is filled up with copies of the last lane.
     """
@@ -66,12 +66,12 @@ class LlvmExecutor:
         """See `Executor`."""
         code = self._code
         code.call("follow", "run_program")(self._address, self._groups, code.memory.entry(name))
-        self._count(self._groups)
+        self._code.count(self._groups)
 
     def attempt(self) -> None:
         """See `Executor`."""
         self._code.call("follow", "attempt")(self._address, self._groups)
-        self._count(self._groups)
+        self._code.count(self._groups)
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> LlvmTrack:
         """See `Executor`."""
@@ -92,7 +92,7 @@ class LlvmExecutor:
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
         given = self._address, self._groups, samples.ctypes.data, stride, wanted
         self._code.call("fan", "fan")(*given, out.ctypes.data, *out.shape[1:], first, step)
-        self._count(self._groups * wanted)
+        self._code.count(self._groups * wanted)
 
     def groups(self, lanes: int) -> int:
         """See `Executor`."""
@@ -106,13 +106,9 @@ class LlvmExecutor:
 
         def count(groups: int) -> None:
             call(groups)
-            self._count(groups * len(parts.members))
+            self._code.count(groups * len(parts.members))
 
         return count
-
-    def _count(self, groups: int) -> None:
-        if self._code.walked:
-            self._code.count(groups)
 
 
 class LlvmTrack:
@@ -156,8 +152,7 @@ class LlvmTrack:
     def run(self) -> Sequence[int]:
         """See `Track`."""
         early = self._run()
-        if self._code.walked:
-            self._code.count(self._groups)
+        self._code.count(self._groups)
         return self._sides[: len(self._counts), REACHED].tolist() if early else self._counts
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:

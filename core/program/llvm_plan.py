@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from .executor import DONE, ITERATIONS, MARGIN, Plan, in_order
 from .llvm_code import Lines
 
-NUMBERS = ("stride", "residual", "iterations", "done", "margin", "tolerance", "most", "extrapolates", "quick", "past", "state")
-"""Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the next,
-and "state" how many of them are remembered."""
+SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
+"""Slots that loops read and write, by their names in the plan."""
+NUMBERS = ("stride", *SLOTS, "tolerance", "most", "extrapolates", "quick", "past", "state")
+"""Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the next, and "state" is how many slots
+are remembered."""
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
 """Each the address of a call: that of a function of lanes and a table, and that of the table."""
 CALLS = ("after", "alone", "joined", "onward", "remaining")
@@ -27,6 +29,8 @@ TABLES: Mapping[str, int] = {
     "worst": 3,  # a slot, 1 or -1 where the smallest is wanted, and where to begin
 }
 """Columns of each. A table takes two numbers of the plan: its address, and how many rows it has."""
+TOGETHER = 4
+"""Pairs of slots that are copied at a time; the last of a table is repeated until it has so many."""
 FIELDS = [*NUMBERS, *PROGRAMS, *(field for name in TABLES for field in (name, f"{name}_count"))]
 
 
@@ -124,16 +128,13 @@ def rows(width: int) -> str:
     )
 
 
-TOGETHER = 4
-"""Pairs of slots that are copied at a time; the last of a table is repeated until it has so many."""
-
-
 class PlanInMemory:
-    """What `fields` reads.
+    """A plan as functions read it: see `function`.
 
     Attributes:
         address: where it stands.
-        calls: by program, its row: the addresses of a function of lanes and a table, and of the table. They may be changed.
+        calls: by program, its row of `entries`.
+        entries: the addresses of a function of lanes and a table, and of the table; they may be changed while programs run.
     """
 
     def __init__(self, plan: Plan, width: int, stride: int) -> None:
@@ -141,12 +142,11 @@ class PlanInMemory:
         self.calls: Mapping[str, int] = {name: k for k, name in enumerate(names)}
         self.entries = np.zeros((len(names), 2), np.int64)
         extrapolates = plan.extrapolates(width)
-        continued = plan.continued or plan.carried
         pairs: dict[str, Sequence[tuple[int, ...]]] = {
             "carried": plan.carried,
             "returned": [pair[::-1] for pair in reversed(plan.carried)],
-            "moves": in_order(continued if extrapolates else plan.carried),
-            "continued": in_order(continued),
+            "moves": in_order(plan.carried_on if extrapolates else plan.carried),
+            "continued": in_order(plan.carried_on),
             "remembered": [(slot, k) for k, slot in enumerate(plan.remembered)],
         }
         vector, worst = 8 * width, [(plan.largest, 1.0, 0.0), (plan.smallest, -1.0, -np.inf)]
@@ -157,20 +157,25 @@ class PlanInMemory:
             **{name: vector * _table(getattr(plan, name), 1) for name in ("sampled", "kept", "fixed", "taken")},
             "worst": _table([(vector * x, _bits(sign), _bits(start)) for slots, sign, start in worst for x in slots], 3),
         }
-        slots = {name: plan.slots.get(slot, 0) for name, slot in SLOTS.items()}
-        numbers = [stride, *slots.values(), _bits(plan.tolerance), plan.most]
-        numbers += [extrapolates, extrapolates or not plan.remaining, plan.past, len(plan.remembered)]
-        programs = [self.entry(name) if name in self.calls else 0 for name in PROGRAMS]
-        tables = [x for name in TABLES for x in (self._tables[name].ctypes.data, len(self._tables[name]))]
-        self._words = np.array([*numbers, *programs, *tables], np.int64)
+        found = {
+            "stride": stride,
+            **{name: plan.slots.get(slot, 0) for name, slot in SLOTS.items()},
+            "tolerance": _bits(plan.tolerance),
+            "most": plan.most,
+            "extrapolates": extrapolates,
+            "quick": extrapolates or not plan.remaining,
+            "past": plan.past,
+            "state": len(plan.remembered),
+            **{name: self.entry(name) if name in self.calls else 0 for name in PROGRAMS},
+            **{name: table.ctypes.data for name, table in self._tables.items()},
+            **{f"{name}_count": len(table) for name, table in self._tables.items()},
+        }
+        self._words = np.array([found[name] for name in FIELDS], np.int64)
         self.address: int = self._words.ctypes.data
 
     def entry(self, name: str) -> int:
         """The address of the call of a program."""
         return self.entries.ctypes.data + 16 * self.calls[name]
-
-
-SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
 
 
 def _bits(x: float) -> int:

@@ -48,6 +48,7 @@ class LlvmCode:
 
     Attributes:
         stride: slots of a lane, with those after `Plan.slots` that programs keep their values in.
+        memory: the plan, as loops read it.
         walked: whether programs are not compiled yet.
     """
 
@@ -73,6 +74,8 @@ class LlvmCode:
 
     def count(self, groups: int) -> None:
         """Said by whoever has run programs for so many groups of lanes."""
+        if not self.walked:
+            return
         self._left -= groups
         if self._left <= 0:
             with self._lock:  # what one thread compiled is not taken away from others that run it

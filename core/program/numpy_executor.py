@@ -136,7 +136,7 @@ class NumpyExecutor:
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
         plan, block = self.plan, self.block
-        carried, continued = (np.array(each).T for each in (plan.carried, plan.continued or plan.carried))
+        carried, continued = (np.array(each).T for each in (plan.carried, plan.carried_on))
         kept, remembered = list(plan.kept), list(plan.remembered)
         past = block[plan.past : plan.past + NODES * len(remembered)].reshape(NODES, -1, self.lanes)
         alive = np.ones(self.lanes, dtype=np.bool_)

@@ -71,7 +71,7 @@ class NumpyTrack:
         """See `Track`."""
         executor, samples = self._executor, self._sides[side].samples
         plan, block, lanes = executor.plan, executor.block, executor.lanes
-        carried, continued = (np.array(each).T for each in (plan.carried, plan.continued or plan.carried))
+        carried, continued = (np.array(each).T for each in (plan.carried, plan.carried_on))
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
