@@ -11,7 +11,7 @@ from typing import Any
 from ..core.analysis.prepare import Solver, prepare
 from ..core.analysis.request import LAST_ITERATION, Request
 from ..core.harness.case import Case
-from ..core.program.compiled import available
+from ..core.program.compiler import available
 from ..core.trajectory import Trajectory
 
 # Residuals from which Newton's last step starts, by effort: what that step leaves is about its square.

@@ -42,7 +42,7 @@ def positions(values, order=0, *, compiled=False):
 @pytest.fixture
 def eight_lanes(monkeypatch):
     monkeypatch.setattr("kincheck.core.analysis.route.LANES", 8)
-    monkeypatch.setattr("kincheck.core.program.compiled.vector_width", lambda: 8)  # whatever the processor's
+    monkeypatch.setattr("kincheck.core.program.compiler.vector_width", lambda: 8)  # whatever the processor's
 
 
 @pytest.mark.usefixtures("eight_lanes")

@@ -24,6 +24,7 @@ from kincheck.core.program import (
     Plan,
     Tape,
     absolute,
+    compiler,
     cos,
     machine_code,
     maximum,
@@ -33,7 +34,6 @@ from kincheck.core.program import (
     sqrt,
     where_larger,
 )
-from kincheck.core.program import compiled as code
 
 from .mechanisms import four_bar, mcpherson
 from .test_chain import chain
@@ -81,7 +81,7 @@ def test_operations_are_numpys(name, lanes):
 
 def test_all_lanes_may_read_a_few_of_their_group():
     """The first of them, the last, and some between; of machine code a group is a vector."""
-    lanes = code.vector_width()
+    lanes = compiler.vector_width()
     values = np.random.default_rng(0).normal(size=(1, lanes))
     read = values[0, [k * (lanes - 1) // (NODES - 1) for k in range(NODES)]]
     for executor in executors(lambda x: sum((10.0**k * x.tape.at(k, 0) for k in range(NODES)), 0.0), 1, lanes):
@@ -233,7 +233,7 @@ def test_without_llvmlite_numpy_takes_over(monkeypatch):
 
 
 def test_the_width_is_that_of_the_processor():
-    assert code.vector_width() in (2, 4, 8)
+    assert compiler.vector_width() in (2, 4, 8)
 
 
 WAYS = {
@@ -257,7 +257,7 @@ TIE_ROD = np.array([1.115, 0.665, 0.118])
 @pytest.mark.parametrize("way", WAYS)
 def test_vectors_of_every_width_give_the_same(way, width, monkeypatch):
     expected, asked = WAYS[way](), list[int]()
-    monkeypatch.setattr(code, "vector_width", lambda: asked.append(width) or width)
+    monkeypatch.setattr(compiler, "vector_width", lambda: asked.append(width) or width)
     model._recent.cache_clear()
     found = WAYS[way]()
     assert asked  # whatever was kept was made for other vectors

@@ -16,7 +16,7 @@ from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program
-from kincheck.core.program.compiled import available
+from kincheck.core.program.compiler import available
 from kincheck.core.program.executor import in_order
 from kincheck.core.program.llvm_plan import TOGETHER, PlanInMemory
 

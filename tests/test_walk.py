@@ -22,8 +22,7 @@ from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path, Ramp
-from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, program
-from kincheck.core.program import compiled as code
+from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, compiled, compiler, program
 from kincheck.core.program import machine_code as llvm
 from kincheck.core.program.lowering import lowered, unrolled
 from kincheck.core.program.walk import walk
@@ -65,9 +64,9 @@ def every_slot(made: LlvmCode, name: str, lanes: int = 19) -> np.ndarray:
 @pytest.mark.parametrize("width", [2, 4, 8])
 @pytest.mark.parametrize("mechanism", [mcpherson(), four_bar(), cases.load("delta_robot").mechanism], ids=lambda each: each.name)
 def test_programs_of_models(mechanism, width, monkeypatch):
-    if width > code.vector_width():
+    if width > compiler.vector_width():
         pytest.skip("no such vectors here")
-    monkeypatch.setattr(code, "vector_width", lambda: width)
+    monkeypatch.setattr(compiler, "vector_width", lambda: width)
     drivers = tuple(each.name for each in mechanism.drivers)
     places = ("joints.tie_rod.points.0",) if mechanism.name == mcpherson().name else ()
     request = Request(drivers, tuple(each.name for each in mechanism.points), varied=places)
@@ -251,7 +250,7 @@ def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(code, "load", interrupted)
+        patch.setattr(compiled, "load", interrupted)
         with pytest.raises(KeyboardInterrupt):
             made.count(10**9)
     assert made.walked
@@ -264,7 +263,7 @@ def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
 def test_threads_that_come_at_once_compile_once(monkeypatch):
     """The code of the first would be gone while it runs."""
     made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
-    load, loaded, meet = code.load, list[str](), Barrier(4)
+    load, loaded, meet = compiled.load, list[str](), Barrier(4)
 
     def slowly(*given):
         loaded.append("once")
@@ -275,7 +274,7 @@ def test_threads_that_come_at_once_compile_once(monkeypatch):
         meet.wait()
         made.count(10**9)
 
-    monkeypatch.setattr(code, "load", slowly)
+    monkeypatch.setattr(compiled, "load", slowly)
     threads = [Thread(target=count) for _ in range(4)]
     for each in threads:
         each.start()

@@ -19,7 +19,7 @@ from ..algebra import Scalar, Vec3, vec
 from ..mechanism import GROUND
 from ..primitives.base import Drive
 from ..program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, Tape, Traced, program
-from ..program.compiled import available
+from ..program.compiler import available
 from ..trajectory import Array
 from .cartesian import Cartesian
 from .equations import Constraint, Relation

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
-from ..program.compiled import available
+from ..program.compiler import available
 from ..trajectory import Array
 from . import following
 from .components import Section

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from ..mechanism import Mechanism
 from ..program import ITERATIONS, Program
-from ..program.compiled import available, kept
+from ..program.compiler import available
+from ..program.shelf import kept
 from . import following
 from .components import Section
 from .equations import Frames

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..algebra import Quat, Vec3, turned_by
 from ..program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, program, sqrt
-from ..program.compiled import available
+from ..program.compiler import available
 from ..trajectory import Array
 
 BY, TO = range(7), range(7, 11)

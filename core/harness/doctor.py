@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from ..program import compiled
+from ..program import compiler, shelf
 from .case import Case
 from .circumstances import circumstances
 from .console import how_to_install
@@ -107,9 +107,9 @@ def examine(case: Case, native: Engine, tol: float) -> Examination:
         about["platform"],
         about["processor"],
         os.cpu_count() or 1,
-        "machine code" if compiled.available() else "numpy: pip install llvmlite makes it some fifty times faster",
-        compiled.vector_width() if compiled.available() else None,
-        str(compiled.folder()),
+        "machine code" if compiler.available() else "numpy: pip install llvmlite makes it some fifty times faster",
+        compiler.vector_width() if compiler.available() else None,
+        str(shelf.folder()),
         _cache_problem(),
     )
     return Examination(SCHEMA, about["kincheck"], parts(), machine, _check(case, native, tol))
@@ -174,7 +174,7 @@ def _ended(importing: subprocess.Popen[str]) -> str:
 
 def _cache_problem() -> str:
     """Why compiled code cannot be kept; empty where it can."""
-    folder = compiled.folder()
+    folder = shelf.folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

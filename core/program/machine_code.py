@@ -11,6 +11,7 @@ from threading import Lock, Thread
 
 from . import (
     compiled,
+    compiler,
     executor,
     llvm_code,
     llvm_fan,
@@ -20,6 +21,7 @@ from . import (
     llvm_programs,
     llvm_walk,
     lowering,
+    shelf,
     trace,
     walk,
 )
@@ -53,11 +55,11 @@ class LlvmCode:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self.width, self.plan, self._lock = compiled.vector_width(), plan, Lock()
+        self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
         # what determines the code; writing its text takes longer than loading it
         self._content = repr([plan.programs, self.width, _sources()])
         code = compiled.find(self._content)
-        again = code is None and compiled.known(self._of_tables)
+        again = code is None and shelf.known(self._of_tables)
         self.walked, tables = code is None, {} if code else self._tables()
         self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
         self.memory = llvm_plan.PlanInMemory(plan, self.width, self.stride)
@@ -94,7 +96,7 @@ class LlvmCode:
         def made() -> bytes:
             return pickle.dumps({name: walk.walk(each, slots, self.width) for name, each in self.plan.programs.items()})
 
-        return pickle.loads(compiled.kept(self._of_tables, made))
+        return pickle.loads(shelf.kept(self._of_tables, made))
 
     @property
     def _of_tables(self) -> bytes:
@@ -111,9 +113,10 @@ def make_loops_ready() -> None:
 
     To import and to read files does: in a thread, beside whatever else Python does, that would take three times as long.
     """
-    width = compiled.vector_width()
-    missing = [name for name in ("walk", "follow") if not compiled.known(compiled.told(_content(name, width)))]
+    width = compiler.vector_width()
+    missing = [name for name in ("walk", "follow") if not shelf.known(compiled.told(_content(name, width)))]
     if missing:
+        compiler.llvm()
         Thread(target=lambda: [_loop(name, width) for name in missing]).start()
 
 

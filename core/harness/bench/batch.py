@@ -13,7 +13,7 @@ from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
 from ...analysis.route import Route
 from ...analysis.variants import Variants, solve_variants
-from ...program.compiled import available
+from ...program.compiler import available
 from ...trajectory import Array, PointMotion, Trajectory
 from ..case import Case
 from ..compare import output_series, size

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import msgspec
 
 from ...errors import KincheckError
-from ...program import compiled
+from ...program import compiler
 from ..case import Case
 from ..circumstances import circumstances
 from ..engine import Engine
@@ -106,7 +106,7 @@ def measure(
     def add(what: str, rows: Sequence[Any]) -> None:
         found.setdefault(what, []).extend(rows)
 
-    peak = prepare() if compiled.available() else None
+    peak = prepare() if compiler.available() else None
     true = {name: with_truth(case, tol) for name, case in cases.items()}
     if "work" in parts:
         for case in true.values():
@@ -151,7 +151,7 @@ def _measure_work(
         for each in contestants(case, levels.LEVELS, tol):
             entering["levels", each.entry.setting] = each
     work: dict[tuple[str, str], Work] = {key: each.work for key, each in entering.items() if each.work is not None}
-    if detailed and compiled.available():
+    if detailed and compiler.available():
         work["levels", levels.ALONE] = levels.loops_alone(case, tol)
     if peak is not None:
         work["peak", ""] = peak

@@ -14,7 +14,7 @@ from ...analysis.request import Request
 from ...analysis.route import Route
 from ...analysis.sweep import follow
 from ...errors import SolveError
-from ...program.compiled import available
+from ...program.compiler import available
 from ...trajectory import Trajectory
 from ..case import Case
 

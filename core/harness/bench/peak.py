@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...program import compiled
+from ...program import compiled, compiler
 from ...trajectory import Array
 from .rounds import Spread
 
@@ -47,7 +47,7 @@ class Peak:
 
 def prepare() -> Peak:
     """Compile the kernel. Raises ImportError where llvmlite is missing."""
-    width = compiled.vector_width()
+    width = compiler.vector_width()
     text = _text(width)
     code = compiled.load(text, lambda: text, {"peak": 2})
     # x <- 0.5 x + 1 stays near two: no overflow, no subnormal number

@@ -23,7 +23,7 @@ from ...analysis.request import Request
 from ...drivers import JointAngle
 from ...joints import Revolute, Spherical, Universal
 from ...mechanism import Body, Mechanism, Point
-from ...program.compiled import available
+from ...program.compiler import available
 from ...trajectory import Trajectory
 from ..case import Case, Output, Series, Sweep, Truth
 from ..engine import Engine

@@ -1,0 +1,127 @@
+"""Machine code as one piece of memory that runs wherever it stands: what an object file holds, put together once and for all.
+
+LLVM can load what it compiled, but importing it takes longer than everything else that a process does before its first sweep.
+An image needs no LLVM. It is read from an ELF object for x86-64 (System V ABI with its AMD64 supplement, chapter 4), whose parts
+refer to each other by distances only, for it calls nothing outside itself.
+"""
+
+from __future__ import annotations
+
+import mmap
+import sys
+from collections.abc import Callable, Mapping
+from ctypes import CDLL, addressof, c_char, c_size_t, c_void_p, get_errno
+from functools import cache
+from platform import machine
+from struct import Struct, pack_into, unpack_from
+from typing import NamedTuple
+
+SECTIONS_AT, SECTIONS = 0x28, 0x3C
+"""Places in the head of the file: where the list of sections stands, and how many there are."""
+PROGRAM, SYMBOLS, RELOCATIONS, ALLOCATED = 1, 2, 4, 2
+"""Types of sections, and the flag of those that are in memory when the code runs."""
+DISTANCES = 2, 4
+"""Types of relocations, R_X86_64_PC32 and R_X86_64_PLT32: a distance of 32 bits from where it stands."""
+
+
+class Image(NamedTuple):
+    """Machine code, and the place of each function in it."""
+
+    code: bytes
+    places: Mapping[str, int]
+
+
+class _Section(NamedTuple):
+    name: int
+    type: int
+    flags: int
+    address: int
+    offset: int
+    size: int
+    link: int
+    info: int
+    align: int
+    entry_size: int
+
+
+class _Symbol(NamedTuple):
+    name: int
+    info: int
+    other: int
+    section: int
+    value: int
+    size: int
+
+
+_SECTION, _SYMBOL, _RELOCATION = Struct("<IIQQQQIIQQ"), Struct("<IBBHQQ"), Struct("<QQq")
+
+
+@cache
+def possible() -> bool:
+    """Whether images run here: on x86-64 under Linux, where what was written may be run."""
+    if sys.platform != "linux" or machine() != "x86_64":
+        return False
+    try:
+        _runnable(b"\0")
+    except OSError:  # some systems let nobody do that
+        return False
+    return True
+
+
+def joined(file: bytes) -> Image:
+    """The image of an object file. Raises ValueError where its parts do not refer to each other by distances only."""
+    (at,), (count,) = unpack_from("<Q", file, SECTIONS_AT), unpack_from("<H", file, SECTIONS)
+    sections = [_Section(*_SECTION.unpack_from(file, at + k * _SECTION.size)) for k in range(count)]
+
+    def held(section: _Section) -> bytes:
+        return file[section.offset : section.offset + section.size]
+
+    code, begins = bytearray(), dict[int, int]()
+    for k, section in enumerate(sections):
+        if section.type == PROGRAM and section.flags & ALLOCATED:
+            code += bytes(-len(code) % section.align)
+            begins[k] = len(code)
+            code += held(section)
+    (table,) = (each for each in sections if each.type == SYMBOLS)
+    symbols, names = [_Symbol(*each) for each in _SYMBOL.iter_unpack(held(table))], held(sections[table.link])
+
+    def named(symbol: _Symbol) -> str:
+        return names[symbol.name : names.index(0, symbol.name)].decode()
+
+    for section in sections:
+        if section.type != RELOCATIONS or section.info not in begins:
+            continue
+        for offset, info, addend in _RELOCATION.iter_unpack(held(section)):
+            kind, symbol = info & 0xFFFFFFFF, symbols[info >> 32]
+            if kind not in DISTANCES or symbol.section not in begins:
+                raise ValueError(
+                    f"machine code refers to {named(symbol)!r} by relocation {kind}: no distance between parts of itself"
+                )
+            place = begins[section.info] + offset
+            pack_into("<i", code, place, begins[symbol.section] + symbol.value + addend - place)
+    places = {named(each): begins[each.section] + each.value for each in symbols if each.section in begins and each.name}
+    return Image(bytes(code), places)
+
+
+def placed(image: Image) -> Callable[[str], int]:
+    """Put it into memory, for as long as what is returned is kept: where each function stands."""
+    memory = _runnable(image.code)
+    start = _address(memory)
+
+    def address(name: str, _alive: object = memory) -> int:
+        return start + image.places[name]
+
+    return address
+
+
+def _runnable(code: bytes) -> mmap.mmap:
+    """Memory that holds the code, and is written no more."""
+    memory = mmap.mmap(-1, len(code), mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, mmap.PROT_READ | mmap.PROT_WRITE)
+    memory[:] = code
+    if CDLL(None, use_errno=True).mprotect(c_void_p(_address(memory)), c_size_t(len(code)), mmap.PROT_READ | mmap.PROT_EXEC):
+        raise OSError(get_errno(), "memory cannot be made to run")
+    return memory
+
+
+def _address(memory: mmap.mmap) -> int:
+    return addressof(c_char.from_buffer(memory))

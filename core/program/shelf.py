@@ -1,0 +1,65 @@
+"""What is kept on disk between processes: machine code, tables and traced programs, by all that determines them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+DIGEST = 32
+"""Bytes of the checksum at the head of what is kept."""
+
+
+def folder() -> Path:
+    """Where it is; below XDG_CACHE_HOME where that is set."""
+    home = os.environ.get("XDG_CACHE_HOME")
+    return (Path(home) if home else Path.home() / ".cache") / "kincheck"
+
+
+def kept(content: bytes, make: Callable[[], bytes]) -> bytes:
+    """What the content meant before; or made now, and kept."""
+    found = find(content)
+    if found is None:
+        found = make()
+        _write(_entry(content), found)
+    return found
+
+
+def find(content: bytes) -> bytes | None:
+    """What the content meant before, or None where there is nothing that is whole."""
+    entry = _entry(content)
+    try:
+        kept = entry.read_bytes()
+    except OSError:
+        return None
+    found = kept[DIGEST:]
+    return found if _checksum(entry, found) == kept[:DIGEST] else None
+
+
+def known(content: bytes) -> bool:
+    """Whether there is something that the content meant before."""
+    return _entry(content).exists()
+
+
+def _entry(content: bytes) -> Path:
+    return folder() / hashlib.sha256(content).hexdigest()
+
+
+def _write(entry: Path, made: bytes) -> None:
+    """Keep it; a place that cannot be written only costs the next process the time to make it."""
+    import tempfile  # slow to import, and what is kept already needs none
+
+    try:
+        entry.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=entry.parent) as folder:
+            whole = Path(folder) / entry.name
+            whole.write_bytes(_checksum(entry, made) + made)
+            whole.replace(entry)  # whole or not at all, whoever else is writing it
+    except OSError:
+        return
+
+
+def _checksum(entry: Path, made: bytes) -> bytes:
+    """Of an entry under its name: what was written for another is none."""
+    return hashlib.sha256(entry.name.encode() + made).digest()
