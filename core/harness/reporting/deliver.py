@@ -7,9 +7,12 @@ import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..record import Results, to_json
-from .measures import Effort, Past
+
+if TYPE_CHECKING:  # what draws is imported where a report is asked for
+    from .measures import Effort, Past
 
 
 def check_destinations(
