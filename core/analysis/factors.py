@@ -10,7 +10,7 @@ these, whose diagonals mean nothing: it took 1.6 s.
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,22 @@ Indices = NDArray[np.intp]
 NARROW = {"relax": 4, "panel_size": 4}
 # A pivot may be this much smaller than the largest of its column, so that rows stay in the order that was found.
 PIVOT_THRESHOLD = 0.1
+
+
+class Ordered(NamedTuple):
+    """A pattern in an order of elimination.
+
+    Attributes:
+        rows, columns: of the entries, in that order.
+        entries: their numbers among those given first.
+        row, column: for every row and column given its place.
+    """
+
+    rows: Indices
+    columns: Indices
+    entries: Indices
+    row: Indices
+    column: Indices
 
 
 class SingularError(ArithmeticError):
@@ -55,6 +71,13 @@ class Factors:
             if "singular" in str(error):
                 raise SingularError("exactly singular") from error
             raise
+
+    @property
+    def ordered(self) -> Ordered:
+        """The entries in the order that the last factorisation took them in."""
+        factors, by_place = self._factors, self._matrix.tocoo()
+        rows, columns = factors.perm_r[by_place.row], factors.perm_c[by_place.col]
+        return Ordered(rows, columns, self._order, factors.perm_r[self._row], factors.perm_c[self._column])
 
     def update(self, values: Array) -> None:
         """Give the matrix other values, in the order of the first; the factors stay."""

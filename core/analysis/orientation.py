@@ -38,17 +38,19 @@ class Blocks:
             at = (number[block[rows[entries]]] * size + place[rows[entries]]) * size + place[row_of[columns[entries]]]
             self._groups.append((size, entries, at))
 
-    def orientation(self, values: Array, whole: float) -> bytes:
-        """The sign of each block's determinant, each right at all values, or at none.
+    def orientation(self, values: Array, whole: Array) -> list[bytes]:
+        """Of several poses the sign of each block's determinant, each right at all values, or at none.
 
         Args:
-            values: of the entries, in the order of the pattern.
-            whole: of the sign of the whole determinant, from which that of the largest block follows.
+            values: of the entries, in the order of the pattern, shape (entries, poses).
+            whole: of the sign of the whole determinant, from which that of the largest block follows, shape (poses,).
         """
-        signs: list[Array] = []
+        poses = len(whole)
+        signs = [np.ones((poses, 1))]
         for size, entries, at in self._groups:
-            dense = np.zeros((at.max() // (size * size) + 1, size, size))
-            dense.ravel()[at] = values[entries]
+            dense = np.zeros((poses, at.max() // (size * size) + 1, size, size))
+            dense.reshape(poses, -1)[:, at] = values[entries].T
             signs.append(np.linalg.slogdet(dense)[0])
-        small = np.concatenate([*signs, [1.0]])
-        return np.append(small, np.sign(whole) * small.prod()).astype(np.int8).tobytes()
+        small = np.concatenate(signs, axis=1)
+        found = np.column_stack([small, np.sign(whole) * small.prod(axis=1)])
+        return [each.tobytes() for each in found.astype(np.int8)]

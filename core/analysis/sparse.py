@@ -10,7 +10,8 @@ not of the whole: that is what the entries of the matrix and the round-off of th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,53 +22,23 @@ from ..motions import Path
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
 from .driven import locked_drivers
-from .elements import Elements, Indices
+from .elements import Elements
 from .equations import constraints, measured
-from .factors import Factors, SingularError
+from .factors import Factors, Indices, SingularError
 from .following import ABOUT
 from .model import CLOSED, MAX_ITERATIONS
 from .orientation import Blocks
 from .redundancy import RANK_TOLERANCE
 from .request import CONSISTENT
 from .sparse_rows import Jacobian
+from .stand import CONTRACTS, SETTLED, STALLS, Stand, moved
+from .together import Together
 from .turning import Turn
 
-# An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.
-CONTRACTS = 1e-2
-# Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an iteration that gains less than
-# a digit though its factors are new shows that they are.
-SETTLED, STALLS = 1e-15, 0.1
 MOVES = 1e-6
 """A body that moves at least this much, in a motion whose largest component is one, is free."""
 FEW = 5
 """So many names are said in a message."""
-
-
-@dataclass(frozen=True, eq=False)
-class Stand:
-    """Where a motion stands.
-
-    Attributes:
-        time: of the pose; earlier: of the one before it, the same where there is none.
-        state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
-        rates, accelerations: of the unknowns.
-        closure, leftover, branch: largest residual of the rows solved and of the redundant ones, smallest branch test.
-        pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see `Blocks`.
-    """
-
-    time: float
-    earlier: float
-    state: Array
-    predicted: Array
-    rates: Array
-    accelerations: Array
-    iterations: int = 0
-    closure: float = 0.0
-    leftover: float = 0.0
-    branch: float = 1.0
-    pivot: float = 0.0
-    largest_pivot: float = 0.0
-    orientation: bytes = b""
 
 
 class FailedError(ArithmeticError):
@@ -79,7 +50,8 @@ class SparseModel:
 
     Attributes:
         extent: a power of two of metres near the mechanism's size; frame: what lengths are measured in.
-        kept, dropped: rows that are solved, and rows that repeat them.
+        kept, dropped: rows that are solved, and rows that repeat them; solved: the entries of those.
+        blocks, factors: of the matrix that these make.
         design: at the design position, with all drivers at rest.
 
     Raises:
@@ -122,10 +94,10 @@ class SparseModel:
                 "and the other drivers do already; remove it or free the mechanism"
             )
         among = jacobian.among(self.kept)
-        self._solved = np.flatnonzero(among >= 0)
+        self.solved = np.flatnonzero(among >= 0)
         try:
-            pattern = among[self._solved], jacobian.columns[self._solved]
-            self.factors, self._blocks = Factors(*pattern, jacobian.values[self._solved], unknowns), Blocks(*pattern, unknowns)
+            pattern = among[self.solved], jacobian.columns[self.solved]
+            self.factors, self.blocks = Factors(*pattern, jacobian.values[self.solved], unknowns), Blocks(*pattern, unknowns)
             pivot = abs(self.factors.signed_pivot)
         except SingularError:
             pivot = 0.0
@@ -161,16 +133,14 @@ class SparseModel:
                 found[k, 3], found[k, 4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
         return found.reshape(-1, len(times))
 
-    def moved(self, state: Array, step: Array) -> Array:
-        """The state after a step of the unknowns; the Euler parameters have length one again."""
-        n = self.bodies
-        q = self._turn(state[3 * n : 7 * n], step[3 * n : 6 * n])
-        return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])
+    def distance(self, change: Array) -> Array:
+        """The largest of a change of the state, lengths measured by the mechanism's size; of several poses of each."""
+        return np.abs(change.T * self._scale).max(axis=-1)
 
     def _evaluate(self, state: Array, drives: Array) -> float:
         """Evaluate all rows, and the largest residual of those that are solved."""
         self.elements.evaluate(state, drives)
-        self.factors.update(self.elements.entries[self._solved])
+        self.factors.update(self.elements.entries[self.solved])
         return float(np.abs(self.elements.phi[self.kept]).max())
 
     def _closed(self, state: Array) -> Stand:
@@ -184,7 +154,7 @@ class SparseModel:
                 self.factors.factor()
             except SingularError:
                 break
-            state = self.moved(state, -self.factors.solve(self.elements.phi[self.kept]))
+            state = moved(state, -self.factors.solve(self.elements.phi[self.kept]), self._turn)
         if not residual <= CLOSED or not self.elements.branch.min(initial=1.0) > 0.0:
             raise SolveError(
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual "
@@ -203,8 +173,8 @@ class SparseModel:
 
     def _pivots(self) -> tuple[float, bytes]:
         """The smallest in size, and the orientation, where all was last factored."""
-        pivot = self.factors.signed_pivot
-        return abs(pivot), self._blocks.orientation(self.elements.entries[self._solved], pivot)
+        pivot, entries = self.factors.signed_pivot, self.elements.entries[self.solved]
+        return abs(pivot), self.blocks.orientation(entries[:, None], np.array([pivot]))[0]
 
     def _factor(self) -> None:
         try:
@@ -231,14 +201,19 @@ class SparseModel:
             "factor_entries": self.factors.entries,
         }
 
+    @cached_property
+    def together(self) -> Together | None:
+        """Several samples at once, by machine code; None where there is none."""
+        return Together(self) if self.elements.compiled else None
+
     def _predicted(self, here: Stand, time: float) -> tuple[Array, Array]:
         """A Taylor step of second order, and that with what the last such step lacked, which grows by the cube of the step."""
         h, before = time - here.time, here.time - here.earlier
-        taylor = self.moved(here.state, h * (here.rates + (0.5 * h) * here.accelerations))
+        taylor = moved(here.state, h * (here.rates + (0.5 * h) * here.accelerations), self._turn)
         if not ABOUT * abs(before) > abs(h):
             return taylor, taylor
         corrected = taylor + (h / before) ** 3 * (here.state - here.predicted)
-        return taylor, self.moved(corrected, np.zeros_like(here.rates))
+        return taylor, moved(corrected, np.zeros_like(here.rates), self._turn)
 
     def reach(self, here: Stand, time: float, drives: Array, tol: float) -> Stand:
         """Go from where a motion stands to a time.
@@ -256,12 +231,12 @@ class SparseModel:
                 renewed = not rate <= CONTRACTS
                 if renewed:
                     self._factor()
-                state = self.moved(state, -self.factors.solve(self.elements.phi[self.kept]))
+                state = moved(state, -self.factors.solve(self.elements.phi[self.kept]), self._turn)
                 last, residual = residual, self._evaluate(state, drives)
                 rate, iterations = residual / last, iterations + 1
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
             closure, leftover, branch = self._tested(residual, tol, done=done)
-            gap, reach = (float((self._scale * np.abs(state - other)).max()) for other in (taylor, here.state))
+            gap, reach = (float(self.distance(state - other)) for other in (taylor, here.state))
             if not gap <= LARGEST_CORRECTION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
                 raise FailedError("Newton jumps to another assembly")
             rates, accelerations = self._motion()

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..trajectory import Array
-from .elements import Elements, Indices
-from .factors import NARROW
+from .elements import Elements
+from .factors import NARROW, Indices
 
 # Added to the squared length, one, of every row. A repeated row keeps this times the number of rows it repeats, well below the
 # pivots of independent ones, and far above round-off.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -45,7 +46,7 @@ def solve_sparse(
     return _Sweep(model, path, tol, _Wanted(model, points), _Wanted(model, bodies, frames=True)).solve(order)
 
 
-AT_ONCE = 16
+AT_ONCE = 64
 """Stands whose motions are computed together: each alone would cost a quarter of finding it."""
 
 
@@ -62,23 +63,19 @@ class _Wanted:
         self._arm = _columns([tuple(model.frame.arm(body, position)) for body, position in found], 3)
         self._frame = _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
 
-    def taken(self, at: Stand) -> Array:
-        """What their motion follows from: poses, rates and accelerations of their bodies, shape (19, names)."""
-        n = self._model.bodies
-        still = np.array([0.0] * 3 + [1.0] + [0.0] * 15)
-        parts = at.state[: 7 * n], at.rates[: 6 * n], at.accelerations[: 6 * n]
-        return np.column_stack([np.concatenate(parts).reshape(19, n), still])[:, self._body]
+    def _taken(self, at: Sequence[Stand]) -> list[Array]:
+        """What their motion follows from: poses, rates and accelerations of their bodies, shapes (7 or 6, stands, names)."""
+        n, found = self._model.bodies, list[Array]()
+        for rows, each in ((7, [k.state for k in at]), (6, [k.rates for k in at]), (6, [k.accelerations for k in at])):
+            whole = np.zeros((rows, len(at), n + 1))
+            whole[:, :, :n] = np.array(each)[:, : rows * n].reshape(len(at), rows, n).swapaxes(0, 1)
+            found.append(whole)
+        found[0][3, :, n] = 1.0
+        return [each[:, :, self._body] for each in found]
 
-    def motions(self, taken: Array) -> Array:
-        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot.
-
-        Args:
-            taken: of each stand, shape (stands, 19, names).
-
-        Returns:
-            Shape (stands, components, names).
-        """
-        metres, (poses, rates, accelerations) = self._model.frame.unit, np.split(taken.swapaxes(0, 1), [7, 13])
+    def motions(self, at: Sequence[Stand]) -> Array:
+        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape (stands, components, names)."""
+        metres, (poses, rates, accelerations) = self._model.frame.unit, self._taken(at)
         pose, motion = Pose.of(vec([*poses[:3]]), euler_parameters(poses[3:])), Motion(vec([*rates[:3]]), vec([*rates[3:]]))
         v_t, w_t = vec([*accelerations[:3]]), vec([*accelerations[3:]])
         arm = vec([*self._arm])
@@ -92,7 +89,7 @@ class _Wanted:
             p = pose.q * euler_parameters(self._frame)
             to_body = rotation_less_identity(p).T
             found += [p, motion.w + to_body @ motion.w, w_t + to_body @ w_t]
-        shape = len(taken), len(self.names)
+        shape = len(at), len(self.names)
         return np.stack([np.broadcast_to(component, shape) for each in found for component in each], axis=1)
 
 
@@ -132,7 +129,7 @@ class _Sweep:
                     values[reached] = [getattr(at, name) for at, _ in some]
                 for into, each in zip(found, wanted, strict=True):
                     if each.names:
-                        into[reached] = each.motions(np.array([each.taken(at) for at, _ in some]))
+                        into[reached] = each.motions([at for at, _ in some])
         return self._trajectory(found, stands, order)
 
     def _departure(self, start: float) -> Stand | None:
@@ -154,23 +151,38 @@ class _Sweep:
 
     def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
         """Where the motion stands at each of the times, outwards, until it ends; then there is a message."""
-        drives = self.model.drives(path, times)
-        for k, time in enumerate(times.tolist()):
-            for _ in range(MAX_ROUNDS):
+        drives, together = self.model.drives(path, times), self.model.together
+        before = deque([here], together.width if together else 1)
+        k = alone = 0
+        while k < len(times):
+            found = together.reach(before, times[k:], drives[:, k:], self.tol) if together and k >= alone else []
+            if not found:
+                if together and k >= alone:  # from here on with pivots that are chosen
+                    alone = k + together.width
+                    here = self.model.moving(here, here.time, self.model.drives(path, np.array([here.time]))[:, 0])
                 try:
-                    here = self.model.reach(here, time, drives[:, k], self.tol)
-                    break
-                except FailedError:
-                    try:
-                        here = self._part(here, path, time)
-                    except FailedError as error:
-                        self._end(here, path, times, k, str(error))
-                        return
-            else:
-                self._end(here, path, times, k, "the parts of the step get smaller and smaller")
-                return
-            self.smallest_pivot = min(self.smallest_pivot, here.pivot)
-            yield here
+                    found = [self._reach(here, path, float(times[k]), drives[:, k])]
+                except FailedError as error:
+                    self._end(here, path, times, k, str(error))
+                    return
+                if together and together.outgrown:
+                    together.order()
+            for here in found:
+                if here.time == before[-1].time:
+                    before.pop()
+                before.append(here)
+                self.smallest_pivot = min(self.smallest_pivot, here.pivot)
+                yield here
+            k += len(found)
+
+    def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> Stand:
+        """Go to a time, in parts where need be. Raises FailedError."""
+        for _ in range(MAX_ROUNDS):
+            try:
+                return self.model.reach(here, time, drives, self.tol)
+            except FailedError:
+                here = self._part(here, path, time)
+        raise FailedError("the parts of the step get smaller and smaller")
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
         """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..algebra import Quat, Vec3, turned_by
-from ..program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, program, sqrt
+from ..program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, Tape, program, sqrt
 from ..program.compiler import available
 from ..trajectory import Array
 
@@ -16,14 +16,22 @@ BY, TO = range(7), range(7, 11)
 """Slots of Euler parameters and a vector, and of what they are turned to."""
 
 
+def turned() -> Program:
+    """Euler parameters after a small global rotation, of length one."""
+    tape = Tape()
+    q, (x, y, z) = euler_parameters([tape.input(k) for k in BY[:4]]), (tape.input(k) for k in BY[4:])
+    return program("turned", tape, dict(zip(TO, turned_by(q, 0.5 * Vec3(x, y, z), sqrt), strict=True)))
+
+
 class Turn:
-    """Turns Euler parameters by small global rotations; to compute that with arrays took an eighth of a sparse sweep."""
+    """Turns Euler parameters by small global rotations; to compute that with arrays took an eighth of a sparse sweep.
+
+    Attributes:
+        bodies: how many.
+    """
 
     def __init__(self, bodies: int, *, compiled: bool) -> None:
-        tape = Tape()
-        q, (x, y, z) = euler_parameters([tape.input(k) for k in BY[:4]]), (tape.input(k) for k in BY[4:])
-        turned = program("turned", tape, dict(zip(TO, turned_by(q, 0.5 * Vec3(x, y, z), sqrt), strict=True)))
-        plan = Plan({"turned": turned}, {str(k): k for k in range(TO.stop)})
+        self.bodies, plan = bodies, Plan({"turned": turned()}, {str(k): k for k in range(TO.stop)})
         compiled = compiled and available()
         self._executor: Executor = LlvmExecutor(LlvmCode(plan), bodies) if compiled else NumpyExecutor(plan, bodies)
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .executor import LINE, Parts, Side, Table
 from .llvm_follow import MOTION, SIDE
 from .machine_code import LlvmCode
+from .memory import BYTES, address, aligned
 
-BYTES = 8
-"""Of a number."""
 OUT, FORGET = (MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = SIDE.index("i64 reached")
 
@@ -31,9 +28,9 @@ class LlvmExecutor:
     def __init__(self, code: LlvmCode, lanes: int) -> None:
         self.lanes, self.group, self.margin, self._code = lanes, code.width, code.width, code
         self._groups = self.groups(lanes)
-        self._memory = _aligned(self._groups * code.stride * code.width).reshape(self._groups, code.stride, code.width)
+        self._memory = aligned(self._groups * code.stride * code.width).reshape(self._groups, code.stride, code.width)
         self.clear()
-        self._address = _address(self._memory)
+        self._address = address(self._memory)
 
     def clear(self) -> None:
         """See `Executor`."""
@@ -85,7 +82,7 @@ class LlvmExecutor:
     def table(self, columns: int) -> Array:
         """See `Executor`."""
         shape = len(self._code.plan.kept), columns, self.room
-        return _aligned(math.prod(shape)).reshape(shape)
+        return aligned(math.prod(shape)).reshape(shape)
 
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
@@ -124,18 +121,18 @@ class LlvmTrack:
         row += -row % LINE
         self._shape, self._strides, self._margin = (len(plan.kept), n), (row * BYTES, BYTES), margin * BYTES
         self._room = len(plan.kept) * row + LINE
-        start_at, anchors = _address(self._start), [_address(anchor) for anchor in self.anchors]
+        start_at, anchors = address(self._start), [address(anchor) for anchor in self.anchors]
         # in the order of MOTION and SIDE
-        self._motion = np.array([_address(memory), start_at, _address(self.worst), 0, row, 1, len(sides)], np.int64)
+        self._motion = np.array([address(memory), start_at, address(self.worst), 0, row, 1, len(sides)], np.int64)
         told = [
-            (_address(side.samples), side.samples.shape[1], margin + side.first, side.step, side.count, anchor, 0)
+            (address(side.samples), side.samples.shape[1], margin + side.first, side.step, side.count, anchor, 0)
             for side, anchor in zip(sides, anchors, strict=True)
         ]
         self._sides = np.array([*told, (0,) * len(SIDE)], np.int64)  # never empty: that has no address
-        self._counts, motion = [side.count for side in sides], _address(self._motion)
-        self._run = partial(code.call("follow", "run"), motion, _address(self._sides))
+        self._counts, motion = [side.count for side in sides], address(self._motion)
+        self._run = partial(code.call("follow", "run"), motion, address(self._sides))
         follow = partial(code.call("follow", "follow"), motion)
-        places = [(_address(each), anchor) for each, anchor in zip(self._sides, anchors, strict=False)]
+        places = [(address(each), anchor) for each, anchor in zip(self._sides, anchors, strict=False)]
         self._follow = [{True: partial(follow, at, start_at), False: partial(follow, at, anchor)} for at, anchor in places]
         self._code, self._groups = code, sum(-(-side.count // width) for side in sides)
         self._alive = memory, sides  # their addresses are held
@@ -143,9 +140,9 @@ class LlvmTrack:
     def begin(self) -> Array:
         """See `Track`."""
         room = np.empty(self._room)
-        address = _address(room)
-        skip = -address % (LINE * BYTES)
-        self._motion[OUT] = address + skip
+        start = address(room)
+        skip = -start % (LINE * BYTES)
+        self._motion[OUT] = start + skip
         self._motion[FORGET] = 1
         return np.ndarray(self._shape, np.float64, room, skip + self._margin, self._strides)
 
@@ -163,15 +160,3 @@ class LlvmTrack:
 def _places(slots: Sequence[int]) -> Sequence[int] | slice:
     """Slots as an index; numpy would make an array of a range each time."""
     return slice(slots.start, slots.stop) if isinstance(slots, range) and slots.step == 1 else slots
-
-
-def _aligned(count: int) -> Array:
-    """Room for numbers that begins with a cache line, so that no vector is in two of them."""
-    room = np.empty(count + LINE)
-    start = -(_address(room) // BYTES) % LINE
-    return room[start : start + count]
-
-
-def _address(array: NDArray[Any]) -> int:
-    """Of a contiguous array; four times as quick as its own `ctypes`."""
-    return ctypes.addressof(ctypes.c_char.from_buffer(array.data))

@@ -120,6 +120,11 @@ def make_loops_ready() -> None:
         Thread(target=lambda: [_loop(name, width) for name in missing]).start()
 
 
+def walker(width: int) -> Callable[..., int]:
+    """A function that goes through a table: of the addresses of lanes and table."""
+    return _loop("walk", width).calls["walk"]
+
+
 def _loop(name: str, width: int) -> compiled.Code:
     with _LOCK:
         return _made(name, width)

@@ -1,0 +1,50 @@
+"""Where a motion of a sparse system stands, and when Newton's iteration for the next pose may end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..trajectory import Array
+from .turning import Turn
+
+# An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.
+CONTRACTS = 1e-2
+# Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an iteration that gains less than
+# a digit though its factors are new shows that they are.
+SETTLED, STALLS = 1e-15, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """Where a motion stands.
+
+    Attributes:
+        time: of the pose; earlier: of the one before it, the same where there is none.
+        state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
+        rates, accelerations: of the unknowns.
+        closure, leftover, branch: largest residual of the rows solved and of the redundant ones, smallest branch test.
+        pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see `Blocks`.
+    """
+
+    time: float
+    earlier: float
+    state: Array
+    predicted: Array
+    rates: Array
+    accelerations: Array
+    iterations: int = 0
+    closure: float = 0.0
+    leftover: float = 0.0
+    branch: float = 1.0
+    pivot: float = 0.0
+    largest_pivot: float = 0.0
+    orientation: bytes = b""
+
+
+def moved(state: Array, step: Array, turn: Turn) -> Array:
+    """The state after a step of the unknowns, of several poses of each; the Euler parameters have length one again."""
+    n = turn.bodies
+    q = turn(state[3 * n : 7 * n], step[3 * n : 6 * n])
+    return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])

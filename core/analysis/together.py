@@ -1,0 +1,134 @@
+"""Several samples of a sparse system at once, each in a lane of vectors.
+
+A group of samples is predicted by the polynomial through as many that came before it, at first by a Taylor step, and solved by
+Newton's iteration with factors in the order that served one pose. What is believed is what `SparseModel.reach` believes, and less
+near a singular pose: no pivot was chosen here. Samples are accepted up to the first that is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..trajectory import Array
+from .continuity import EPSILON, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
+from .factors import PIVOT_THRESHOLD
+from .request import CONSISTENT
+from .sparse_tables import SparseTables
+from .stand import CONTRACTS, SETTLED, STALLS, Stand
+
+if TYPE_CHECKING:
+    from .sparse import SparseModel
+
+ITERATIONS = 6
+"""At most: what needs more is better predicted from the samples before it."""
+GROWTH = 10.0 / PIVOT_THRESHOLD
+"""The largest entry of L that is believed. SuperLU allows a tenth of it: a digit of the rates may be lost."""
+
+
+class Together:
+    """Samples of a model, as many as a vector has lanes.
+
+    Attributes:
+        width: how many.
+        outgrown: whether a sample was refused for what the order made of its factors: another would serve it.
+    """
+
+    def __init__(self, model: SparseModel) -> None:
+        self._model, self._tables = model, SparseTables(model.elements, model.bodies)
+        self.width = self._tables.width
+        self.order()
+
+    def order(self) -> None:
+        """Eliminate from now on in the order that serves the pose where the model was last evaluated."""
+        model, tables, self.outgrown = self._model, self._tables, False
+        model.factors.factor()
+        found = model.factors.ordered
+        tables.order(found, model.solved[found.entries], model.kept[np.argsort(found.row)])
+        tables.results[:] = model.elements.results[:, None]
+        tables.factor()
+        # the sign of the determinant is that of the model's factors, or always the opposite
+        self._sign = np.sign(model.factors.signed_pivot) * np.sign(tables.pivots).prod(axis=0)
+
+    def reach(self, before: Sequence[Stand], times: Array, drives: Array, tol: float) -> list[Stand]:
+        """Follow a motion to the next samples, as far as can be believed.
+
+        Args:
+            before: where it stood, at different times, up to where it stands.
+            times, drives: of the samples, one or more; those beyond a group are left out.
+            tol: largest accepted residual.
+        """
+        count, here, model, tables = min(len(times), self.width), before[-1], self._model, self._tables
+        lanes = np.minimum(np.arange(self.width), count - 1)
+        times, tables.drives[:] = times[lanes], drives[:, lanes]
+        earlier = np.append(here.time, times[:-1])
+        with np.errstate(all="ignore"):  # lanes that diverge are found by their residuals
+            self._predict(before, times)
+            closure, iterations, sure = self._solved(tol)
+            tables.motion()
+            leftover, branch = (
+                np.abs(tables.part("phi")[model.dropped]).max(axis=0, initial=0.0),
+                tables.part("branch").min(axis=0, initial=1.0),
+            )
+            pivots = tables.pivots
+            pivot, sign = np.abs(pivots).min(axis=0), self._sign * np.sign(pivots).prod(axis=0)
+            orientation = model.blocks.orientation(tables.part("entries")[model.solved], sign)
+            now = [each.copy() for each in (tables.state, tables.rates, tables.accelerations)]
+            stood = here.state, here.rates, here.accelerations
+            past = [np.column_stack([first, each[:, :-1]]) for first, each in zip(stood, now, strict=True)]
+            taylor = self._taylor(*past, times - earlier).copy()
+            gap, step = (model.distance(now[0] - other) for other in (taylor, past[0]))
+            limit = WORSE_BY_PIVOTS * np.maximum(pivot, here.largest_pivot) * np.maximum(closure, EPSILON)
+            sure &= (closure <= tol) & (leftover <= max(CONSISTENT, tol)) & (branch > 0.0)
+            sure &= (gap <= LARGEST_CORRECTION * step + NEGLIGIBLE) & (step <= LONGEST_STEP)
+            sure &= (TURNED * pivot**2 > limit) & np.array([each == here.orientation for each in orientation])
+            small = tables.growth <= GROWTH
+        accepted = int(np.cumprod((sure & small)[:count]).sum())
+        self.outgrown = accepted < count and bool(sure[accepted])
+        vectors = zip(*(each.T for each in (now[0], taylor, now[1], now[2])), strict=True)
+        numbers = zip(*(each.tolist() for each in (times, earlier, closure, leftover, branch, pivot)), strict=True)
+        return [
+            Stand(*at[:2], *each, iterations, *at[2:], here.largest_pivot, here.orientation)
+            for _, each, at in zip(range(accepted), vectors, numbers, strict=False)
+        ]
+
+    def _predict(self, before: Sequence[Stand], times: Array) -> None:
+        """By the polynomial through a group of samples, or by a Taylor step and what the last such step lacked."""
+        here, width = before[-1], self.width
+        if len(before) == width:
+            known, others = np.array([each.time for each in before]), ~np.eye(width, dtype=bool)
+            parts = [(times[:, None] - known[other]) / (t - known[other]) for t, other in zip(known, others, strict=True)]
+            state = np.column_stack([each.state for each in before]) @ np.prod(parts, axis=2)
+        else:
+            h, last = times - here.time, here.time - here.earlier
+            state = self._taylor(here.state[:, None], here.rates[:, None], here.accelerations[:, None], h)
+            if last:
+                state = state + (h / last) ** 3 * (here.state - here.predicted)[:, None]
+        self._taylor(state, np.zeros(1), np.zeros(1), times)
+
+    def _taylor(self, state: Array, rates: Array, accelerations: Array, h: Array) -> Array:
+        tables = self._tables
+        tables.state[:], tables.step[:] = state, h * (rates + (0.5 * h) * accelerations)
+        tables.move()
+        return tables.state
+
+    def _solved(self, tol: float) -> tuple[Array, int, NDArray[np.bool_]]:
+        """Newton's iteration from the state there is: residuals, how many iterations, and of which lanes it ended."""
+        residual, iterations = self._evaluated(), 0
+        rate, done = np.full(self.width, np.inf), residual <= SETTLED
+        while iterations < ITERATIONS and not done.all():
+            renewed = not (rate[~done] <= CONTRACTS).all()
+            if renewed:
+                self._tables.factor()
+            self._tables.newton()
+            last, residual = residual, self._evaluated()
+            rate, iterations = residual / last, iterations + 1
+            done |= (residual <= SETTLED) | (renewed & (residual <= tol) & (rate > STALLS))
+        return residual, iterations, done
+
+    def _evaluated(self) -> Array:
+        self._tables.evaluate()
+        return np.abs(self._tables.part("phi")[self._model.kept]).max(axis=0)

@@ -1,0 +1,85 @@
+"""Programs linked into one table (see `walk`): many lanes of them, and what is done in between, gone through in one call.
+
+All numbers stand in one memory of rows, a vector each. What a program reads and writes are rows of it, for every lane its own:
+nothing is gathered before and scattered after. A vector holds the same number of several cases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .straight_line import Program
+from .walk import ARITY, KINDS, walk
+
+Rows = NDArray[np.intp]
+Words = NDArray[np.uint32]
+ABREAST = 8
+"""Lanes of which each operation is done before the next: none waits for the one before it."""
+
+
+class Memory:
+    """Rows to be given out."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def take(self, count: int) -> slice:
+        """So many more."""
+        first, self.count = self.count, self.count + count
+        return slice(first, self.count)
+
+
+class Linker:
+    """Makes tables over rows of vectors of so many numbers."""
+
+    def __init__(self, width: int) -> None:
+        self._vector = 8 * width
+
+    def operations(self, op: str, *rows: Rows | int) -> Words:
+        """One operation, done for each of the rows: those of results and then of operands, one after the other."""
+        found = np.stack(np.broadcast_arrays(*rows), axis=-1)
+        return np.append(_head(op, found.size) if found.size else [], self._vector * found.ravel()).astype(np.uint32)
+
+    def lanes(self, program: Program, slots: Rows, memory: Memory) -> Words:
+        """A program for many lanes.
+
+        Args:
+            slots: where the slots of each lane are, shape (slots, lanes).
+            memory: gives the rows in between.
+        """
+        count, lanes = slots.shape
+        table = walk(program, count, 1)  # bytes of a vector of one are as good as any
+        abreast = min(ABREAST, lanes)
+        # the last group is filled up with the last lane, which gives the same once more
+        groups = np.minimum(np.arange(-(-lanes // abreast) * abreast), lanes - 1).reshape(-1, abreast)
+        cells = memory.take(table.cells * abreast).start + np.arange(table.cells * abreast).reshape(-1, 1, abreast)
+        where = self._vector * np.concatenate([slots[:, groups], np.broadcast_to(cells, (table.cells, *groups.shape))])
+        found: list[Rows] = []
+        words, at = table.words.astype(np.intp), 0
+        while words[at]:
+            op, size = _OPS[int(words[at])], int(words[at + 1]) // 4
+            rows = words[at + 2 : at + 2 + size].reshape(-1, 1 + ARITY[op])
+            placed = np.empty((len(groups), len(rows), abreast, rows.shape[1]), np.intp)
+            named = 1 if op == "const" else rows.shape[1]  # of a constant the operands are the number itself
+            placed[..., :named] = where[rows[:, :named] // 8].transpose(2, 0, 3, 1)
+            placed[..., named:] = rows[:, None, named:]
+            placed = placed.reshape(len(groups), -1)
+            found += [np.broadcast_to(_head(op, placed.shape[1]), (len(groups), 2)), placed]
+            at += 2 + size
+        return np.concatenate(found, axis=1).ravel().astype(np.uint32)
+
+
+def joined(parts: Iterable[Words]) -> Words:
+    """One table of several, one after the other."""
+    return np.concatenate([*parts, np.zeros(2, np.uint32)])
+
+
+_OPS = {kind: op for op, kind in KINDS.items()}
+
+
+def _head(op: str, numbers: int) -> Rows:
+    """What a stretch of so many numbers begins with."""
+    return np.array([KINDS[op], 4 * numbers])
