@@ -50,6 +50,10 @@ AT_ONCE = 64
 """Stands whose motions are computed together: each alone would cost a quarter of finding it."""
 
 
+WORTH = 4
+"""Samples on one side of the start that are worth making ready to solve several at once."""
+
+
 class _Wanted:
     """Points whose motion is wanted: of bodies the origins, and how their frames turn."""
 
@@ -151,20 +155,22 @@ class _Sweep:
 
     def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
         """Where the motion stands at each of the times, outwards, until it ends; then there is a message."""
-        drives, together = self.model.drives(path, times), self.model.together
-        before = deque([here], together.width if together else 1)
+        drives, together = self.model.drives(path, times), self.model.together if len(times) >= WORTH else None
+        before: deque[Stand] = deque([here], together.width if together else 1)
         k = alone = 0
         while k < len(times):
-            found = together.reach(before, times[k:], drives[:, k:], self.tol) if together and k >= alone else []
+            found: list[Stand] = []
+            if together and k >= alone:
+                found = together.reach(before, times[k:], drives[:, k:], self.tol)
             if not found:
-                if together and k >= alone:  # from here on with pivots that are chosen
+                if together and k >= alone:  # from here on by pivots that are chosen
                     alone = k + together.width
                     here = self.model.moving(here, here.time, self.model.drives(path, np.array([here.time]))[:, 0])
-                try:
-                    found = [self._reach(here, path, float(times[k]), drives[:, k])]
-                except FailedError as error:
-                    self._end(here, path, times, k, str(error))
+                here, why = self._reach(here, path, float(times[k]), drives[:, k])
+                if why:
+                    self._end(here, path, times, k, why)
                     return
+                found = [here]
                 if together and together.outgrown:
                     together.order()
             for here in found:
@@ -175,14 +181,17 @@ class _Sweep:
                 yield here
             k += len(found)
 
-    def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> Stand:
-        """Go to a time, in parts where need be. Raises FailedError."""
+    def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> tuple[Stand, str]:
+        """Go to a time, in parts where need be: where that ends, and why before that time."""
         for _ in range(MAX_ROUNDS):
             try:
-                return self.model.reach(here, time, drives, self.tol)
+                return self.model.reach(here, time, drives, self.tol), ""
             except FailedError:
-                here = self._part(here, path, time)
-        raise FailedError("the parts of the step get smaller and smaller")
+                try:
+                    here = self._part(here, path, time)
+                except FailedError as error:
+                    return here, str(error)
+        return here, "the parts of the step get smaller and smaller"
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
         """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).

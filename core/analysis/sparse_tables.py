@@ -6,7 +6,7 @@ import numpy as np
 
 from ..program.compiler import vector_width
 from ..program.fixed_order import FixedOrder
-from ..program.linked import Linker, Memory, Words, joined
+from ..program.linked import Linker, Memory, Words, joined, numbers
 from ..program.machine_code import walker
 from ..program.memory import address, aligned
 from ..trajectory import Array
@@ -45,8 +45,8 @@ class SparseTables:
         self._base = given.count
         self._memory = np.zeros((given.count, self.width))
         self._memory[self._one] = 1.0
-        for rows, numbers in geometry:
-            self._memory[rows] = numbers[:, None]
+        for rows, found in geometry:
+            self._memory[rows] = found[:, None]
 
     def _slots(self, kind: Kind, outputs: dict[str, Indices], geometry: slice) -> Indices:
         """Rows of the slots of each constraint of a kind."""
@@ -54,7 +54,7 @@ class SparseTables:
         found[kind.inputs[WHERE]] = self._state.start + kind.read[WHERE]
         found[kind.inputs[HOW]] = self._rates.start + kind.read[HOW]
         end = kind.geometry_at + len(kind.geometry)
-        found[kind.geometry_at : end] = np.arange(geometry.start, geometry.stop).reshape(-1, kind.lanes)
+        found[kind.geometry_at : end] = numbers(geometry).reshape(-1, kind.lanes)
         for name, places in outputs.items():
             found[kind.outputs[name]] = self._results.start + places
         return found
@@ -86,11 +86,11 @@ class SparseTables:
         factors, inverse, right = given.take(fixed.count), given.take(len(rows)), given.take(len(rows))
         matrix = self._results.start + parts["entries"].start + entries
         self._factor = joined(fixed.factor(link, matrix, factors, inverse, (self._zero, self._one)))
-        solve, into = fixed.solve(link, factors, inverse, right), np.arange(right.start, right.stop)
+        solve, into = fixed.solve(link, factors, inverse, right), numbers(right)
 
         def solved(quantity: str, op: str, found: slice) -> Words:
             given = self._results.start + parts[quantity].start + rows
-            put = link.operations(op, np.arange(found.start, found.stop), into[order.column])
+            put = link.operations(op, numbers(found), into[order.column])
             return joined([link.operations("copy", into, given), *solve, put])
 
         self._newton, self._velocity = solved("phi", "neg", self._step), solved("nu", "copy", self._rates)

@@ -69,31 +69,35 @@ class Together:
             self._predict(before, times)
             closure, iterations, sure = self._solved(tol)
             tables.motion()
-            leftover, branch = (
-                np.abs(tables.part("phi")[model.dropped]).max(axis=0, initial=0.0),
-                tables.part("branch").min(axis=0, initial=1.0),
-            )
-            pivots = tables.pivots
-            pivot, sign = np.abs(pivots).min(axis=0), self._sign * np.sign(pivots).prod(axis=0)
-            orientation = model.blocks.orientation(tables.part("entries")[model.solved], sign)
-            now = [each.copy() for each in (tables.state, tables.rates, tables.accelerations)]
-            stood = here.state, here.rates, here.accelerations
-            past = [np.column_stack([first, each[:, :-1]]) for first, each in zip(stood, now, strict=True)]
-            taylor = self._taylor(*past, times - earlier).copy()
-            gap, step = (model.distance(now[0] - other) for other in (taylor, past[0]))
+            state, rates, accelerations = tables.state.copy(), tables.rates.copy(), tables.accelerations.copy()
+            leftover: Array = np.abs(tables.part("phi")[model.dropped]).max(axis=0, initial=0.0)
+            branch: Array = tables.part("branch").min(axis=0, initial=1.0)
+            pivot, same = self._pivots(here)
             limit = WORSE_BY_PIVOTS * np.maximum(pivot, here.largest_pivot) * np.maximum(closure, EPSILON)
-            sure &= (closure <= tol) & (leftover <= max(CONSISTENT, tol)) & (branch > 0.0)
+            sure &= (closure <= tol) & (leftover <= max(CONSISTENT, tol)) & (branch > 0.0) & same & (TURNED * pivot**2 > limit)
+            past = _past(here.state, state)
+            taylor = self._taylor(past, _past(here.rates, rates), _past(here.accelerations, accelerations), times - earlier)
+            gap, step = model.distance(state - taylor), model.distance(state - past)
             sure &= (gap <= LARGEST_CORRECTION * step + NEGLIGIBLE) & (step <= LONGEST_STEP)
-            sure &= (TURNED * pivot**2 > limit) & np.array([each == here.orientation for each in orientation])
             small = tables.growth <= GROWTH
-        accepted = int(np.cumprod((sure & small)[:count]).sum())
+        accepted = int(np.logical_and.accumulate((sure & small)[:count]).sum())
         self.outgrown = accepted < count and bool(sure[accepted])
-        vectors = zip(*(each.T for each in (now[0], taylor, now[1], now[2])), strict=True)
-        numbers = zip(*(each.tolist() for each in (times, earlier, closure, leftover, branch, pivot)), strict=True)
         return [
-            Stand(*at[:2], *each, iterations, *at[2:], here.largest_pivot, here.orientation)
-            for _, each, at in zip(range(accepted), vectors, numbers, strict=False)
+            Stand(
+                *(float(times[k]), float(earlier[k])),
+                *(state[:, k], taylor[:, k], rates[:, k], accelerations[:, k]),
+                *(iterations, float(closure[k]), float(leftover[k]), float(branch[k])),
+                *(float(pivot[k]), here.largest_pivot, here.orientation),
+            )
+            for k in range(accepted)
         ]
+
+    def _pivots(self, here: Stand) -> tuple[Array, NDArray[np.bool_]]:
+        """Where all was last factored the smallest in size, and whether the orientation is that of where the motion stands."""
+        pivots = self._tables.pivots
+        entries = self._tables.part("entries")[self._model.solved]
+        orientation = self._model.blocks.orientation(entries, self._sign * np.sign(pivots).prod(axis=0))
+        return np.abs(pivots).min(axis=0), np.array([each == here.orientation for each in orientation])
 
     def _predict(self, before: Sequence[Stand], times: Array) -> None:
         """By the polynomial through a group of samples, or by a Taylor step and what the last such step lacked."""
@@ -113,7 +117,7 @@ class Together:
         tables = self._tables
         tables.state[:], tables.step[:] = state, h * (rates + (0.5 * h) * accelerations)
         tables.move()
-        return tables.state
+        return tables.state.copy()
 
     def _solved(self, tol: float) -> tuple[Array, int, NDArray[np.bool_]]:
         """Newton's iteration from the state there is: residuals, how many iterations, and of which lanes it ended."""
@@ -132,3 +136,8 @@ class Together:
     def _evaluated(self) -> Array:
         self._tables.evaluate()
         return np.abs(self._tables.part("phi")[self._model.kept]).max(axis=0)
+
+
+def _past(first: Array, each: Array) -> Array:
+    """Of each lane what the one before it has, of the first what was before all."""
+    return np.column_stack([first, each[:, :-1]])

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .linked import Linker, Rows, Words
+from .linked import Linker, Rows, Words, numbers
 
 
 class FixedOrder:
@@ -57,15 +57,15 @@ class FixedOrder:
                         holding[j].append(i)
                         self.count += 1
                     updates.append((k, at, multiplier, entry))
-        self._level, self.pivots = np.array(level), np.array(pivots)
-        # by the pivot they belong to: entries of L with their rows, those of U with theirs, and entries with what is taken from them
-        self._below, self._above = (np.array(each, np.intp).reshape(-1, 3) for each in (below, above))
-        self._updates = np.array(updates, np.intp).reshape(-1, 4)
+        self._level, self.pivots, self._last = np.array(level), np.array(pivots), max(level, default=0)
+        # with their pivots: entries of L and their rows, those of U and theirs, and entries and what is taken from them
+        self._below, self._above = (np.array(each, np.intp).reshape(-1, 3).T for each in (below, above))
+        self._updates: Rows = np.array(updates, np.intp).reshape(-1, 4).T
 
     @property
     def multipliers(self) -> Rows:
         """Places of the entries of L among all."""
-        return self._below[:, 2]
+        return self._below[2]
 
     def factor(self, link: Linker, matrix: Rows, entries: slice, inverse: slice, constants: tuple[int, int]) -> list[Words]:
         """Factor a matrix.
@@ -75,36 +75,26 @@ class FixedOrder:
             entries, inverse: rows for those of the factors, and for the pivots' inverses.
             constants: a row of zeros, and one of ones.
         """
-        at, (zero, one) = np.arange(entries.start, entries.stop), constants
-        found = [link.operations("copy", at[: self._given], matrix), link.operations("copy", at[self._given :], zero)]
-        every = self._levels(np.arange(len(self.pivots))), self._levels(self._below[:, 0]), self._levels(self._updates[:, 0])
-        for pivots, below, updates in zip(*every, strict=True):
-            found.append(link.operations("/", inverse.start + pivots, one, at[self.pivots[pivots]]))
-            pivot, _, multiplier = self._below[below].T
-            found.append(link.operations("*", at[multiplier], at[multiplier], inverse.start + pivot))
-            _, updated, multiplier, other = self._updates[updates].T
-            found.append(link.operations("fnma", at[updated], at[multiplier], at[other], at[updated]))
-        return found
+        at, inverses, (zero, one) = numbers(entries), numbers(inverse), constants
+        (pivot, _, multiplier), (by, updated, factor, other) = self._below, self._updates
+        elimination = link.staged(
+            self._last + 1,
+            ("/", self._level, (inverses, one, at[self.pivots])),
+            ("*", self._level[pivot], (at[multiplier], at[multiplier], inverses[pivot])),
+            ("fnma", self._level[by], (at[updated], at[factor], at[other], at[updated])),
+        )
+        return [link.operations("copy", at[: self._given], matrix), link.operations("copy", at[self._given :], zero), elimination]
 
     def solve(self, link: Linker, entries: slice, inverse: slice, right: slice) -> list[Words]:
         """Solve for what stands in the rows `right`, in the order of elimination."""
-        found: list[Words] = []
+        at, inverses = numbers(right), numbers(inverse)
 
-        def less(of: Rows) -> None:
-            pivot, row, at = of.T
-            found.append(link.operations("fnma", right.start + row, entries.start + at, right.start + pivot, right.start + row))
+        def less(of: Rows) -> tuple[Rows, Rows, Rows, Rows]:
+            pivot, row, entry = of
+            return at[row], entries.start + entry, at[pivot], at[row]
 
-        for below in self._levels(self._below[:, 0]):
-            less(self._below[below])
-        for pivots, above in reversed(
-            [*zip(self._levels(np.arange(len(self.pivots))), self._levels(self._above[:, 0]), strict=True)]
-        ):
-            found.append(link.operations("*", right.start + pivots, right.start + pivots, inverse.start + pivots))
-            less(self._above[above])
-        return found
-
-    def _levels(self, pivots: Rows) -> list[Rows]:
-        """Which belong to pivots of each level, in order."""
-        level = self._level[pivots]
-        order = np.argsort(level, kind="stable")
-        return np.split(order, np.searchsorted(level[order], np.arange(1, self._level.max(initial=0) + 1)))
+        stages, back = self._last + 1, self._last - self._level
+        return [
+            link.staged(stages, ("fnma", self._level[self._below[0]], less(self._below))),
+            link.staged(stages, ("*", back, (at, at, inverses)), ("fnma", back[self._above[0]], less(self._above))),
+        ]

@@ -83,7 +83,8 @@ def joined(file: bytes) -> Image:
             begins[k] = len(code)
             code += held(section)
     (table,) = (each for each in sections if each.type == SYMBOLS)
-    symbols, names = [_Symbol(*each) for each in _SYMBOL.iter_unpack(held(table))], held(sections[table.link])
+    symbols: list[_Symbol] = [_Symbol(*each) for each in _SYMBOL.iter_unpack(held(table))]
+    names = held(sections[table.link])
 
     def named(symbol: _Symbol) -> str:
         return names[symbol.name : names.index(0, symbol.name)].decode()
@@ -92,7 +93,7 @@ def joined(file: bytes) -> Image:
         if section.type != RELOCATIONS or section.info not in begins:
             continue
         for offset, info, addend in _RELOCATION.iter_unpack(held(section)):
-            kind, symbol = info & 0xFFFFFFFF, symbols[info >> 32]
+            kind, symbol = info & 0xFFFFFFFF, symbols[int(info) >> 32]
             if kind not in DISTANCES or symbol.section not in begins:
                 raise ValueError(
                     f"machine code refers to {named(symbol)!r} by relocation {kind}: no distance between parts of itself"

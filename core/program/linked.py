@@ -6,7 +6,7 @@ nothing is gathered before and scattered after. A vector holds the same number o
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,28 @@ class Linker:
 
     def operations(self, op: str, *rows: Rows | int) -> Words:
         """One operation, done for each of the rows: those of results and then of operands, one after the other."""
-        found = np.stack(np.broadcast_arrays(*rows), axis=-1)
-        return np.append(_head(op, found.size) if found.size else [], self._vector * found.ravel()).astype(np.uint32)
+        every = np.broadcast_arrays(*rows)
+        return self.staged(1, (op, np.zeros(len(every[0]), np.intp), every))
+
+    def staged(self, stages: int, *parts: tuple[str, Rows, Sequence[Rows | int]]) -> Words:
+        """Operations in so many stages, in each first all of the first part.
+
+        Args:
+            parts: an operation, the stages it is done at, and rows as of `operations`.
+        """
+        counts = [np.bincount(stage, minlength=stages) for _, stage, _ in parts]
+        takes = [np.where(count > 0, 2 + count * (1 + ARITY[op]), 0) for count, (op, *_) in zip(counts, parts, strict=True)]
+        sizes = np.stack(takes, axis=1)
+        starts = (np.cumsum(sizes) - sizes.ravel()).reshape(sizes.shape)
+        words = np.empty(sizes.sum(), np.uint32)
+        for count, start, (op, stage, rows) in zip(counts, starts.T, parts, strict=True):
+            some, size, order = np.flatnonzero(count), 1 + ARITY[op], np.argsort(stage, kind="stable")
+            words[start[some]], words[start[some] + 1] = KINDS[op], 4 * size * count[some]
+            # of each row how many are before it at its stage
+            before = np.arange(len(stage)) - (np.cumsum(count) - count)[stage[order]]
+            at = start[stage[order]] + 2 + size * before
+            words[at[:, None] + np.arange(size)] = self._vector * np.stack(np.broadcast_arrays(*rows), axis=-1)[order]
+        return words
 
     def lanes(self, program: Program, slots: Rows, memory: Memory) -> Words:
         """A program for many lanes.
@@ -50,7 +70,7 @@ class Linker:
             slots: where the slots of each lane are, shape (slots, lanes).
             memory: gives the rows in between.
         """
-        count, lanes = slots.shape
+        count, lanes = len(slots), len(slots.T)
         table = walk(program, count, 1)  # bytes of a vector of one are as good as any
         abreast = min(ABREAST, lanes)
         # the last group is filled up with the last lane, which gives the same once more
@@ -58,7 +78,8 @@ class Linker:
         cells = memory.take(table.cells * abreast).start + np.arange(table.cells * abreast).reshape(-1, 1, abreast)
         where = self._vector * np.concatenate([slots[:, groups], np.broadcast_to(cells, (table.cells, *groups.shape))])
         found: list[Rows] = []
-        words, at = table.words.astype(np.intp), 0
+        words: Rows = table.words.astype(np.intp)
+        at = 0
         while words[at]:
             op, size = _OPS[int(words[at])], int(words[at + 1]) // 4
             rows = words[at + 2 : at + 2 + size].reshape(-1, 1 + ARITY[op])
@@ -70,6 +91,11 @@ class Linker:
             found += [np.broadcast_to(_head(op, placed.shape[1]), (len(groups), 2)), placed]
             at += 2 + size
         return np.concatenate(found, axis=1).ravel().astype(np.uint32)
+
+
+def numbers(rows: slice) -> Rows:
+    """Of rows that were given out."""
+    return np.arange(rows.start, rows.stop, dtype=np.intp)
 
 
 def joined(parts: Iterable[Words]) -> Words:
