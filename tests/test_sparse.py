@@ -39,31 +39,35 @@ from kincheck.core.motions import Path, Ramp, Sine
 from .mechanisms import four_bar, mcpherson, slider_crank
 from .test_cascade import assert_alike
 from .test_chain import chain
-from .test_corners import loop
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+WAYS = pytest.mark.parametrize("compiled", [False, True], ids=["one by one", "together"])
 
 
 def turning(*values, rate=1.0):
     return Path({"turn": Ramp(rate)}, np.array(values))
 
 
-def both(mechanism, path, points, *, compiled=False):
+def both(mechanism, path, points, compiled=False):
     bodies = tuple(body.name for body in mechanism.moving)
     expected = follow(Route(compile_model(mechanism, Request(tuple(path.motions), points, bodies)), path), 1e-12)
     return solve_sparse(SparseModel(mechanism, compiled=compiled), path, points, bodies), expected
 
 
 # several drivers, redundant rows, all kinds of joints, a sweep that does not start at the design
+@WAYS
 @pytest.mark.parametrize(
     "name", ["mcpherson_strut", "mcpherson_steered", "four_bar", "andrews_squeezer", "delta_robot", "bricard", "double_cardan"]
 )
-def test_it_gives_what_one_program_gives(name):
+def test_it_gives_what_one_program_gives(name, compiled):
     case = cases.load(name)
-    assert_alike(*both(case.mechanism, case.sweep.path, case.points))
+    assert_alike(*both(case.mechanism, case.sweep.path, case.points, compiled))
 
 
-def test_couplers_and_their_coordinates():
+@WAYS
+def test_couplers_and_their_coordinates(compiled):
     mechanism = Mechanism(
         "gears",
         [Body("wheel"), Body("pinion", (1.0, 0.0, 0.0)), Body("rack"), Body("nut", (1.0, 0.0, 0.5))],
@@ -78,25 +82,29 @@ def test_couplers_and_their_coordinates():
         [JointAngle("turn", "first")],
         [Gear("mesh", ("first", "second"), -2.0), RackPinion("rolls", ("second", "guide"), 0.3)],
     )
-    found, expected = both(mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"))
+    found, expected = both(mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"), compiled)
     assert_alike(found, expected)
     # the pinion makes half the turns, the nut a lead for each
     assert np.ptp(found.points["top"].position[:, 2]) == pytest.approx(6.0 / 2.0 * 0.02 / (2.0 * np.pi), rel=1e-12)
 
 
+@WAYS
 @pytest.mark.parametrize(
     "times", [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 30)[::-1], np.zeros(1), np.array([0.5, 0.5, -0.5])]
 )
-def test_any_samples(times):
+def test_any_samples(times, compiled):
     for mechanism in (slider_crank(1.01), four_bar()):
-        assert_alike(*both(mechanism, turning(*times, rate=2.0), tuple(point.name for point in mechanism.points)))
+        assert_alike(*both(mechanism, turning(*times, rate=2.0), tuple(point.name for point in mechanism.points), compiled))
 
 
-def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample():
+@WAYS
+def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample(compiled):
     for times in (np.linspace(0.0, 3.0, 31), np.linspace(2.0, 1.0, 7)):
-        assert_alike(*both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",)))
+        assert_alike(*both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",), compiled))
     steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))  # begins beyond the travel
-    assert solve_sparse(mcpherson(), steep).message.startswith("on the way to the first sample: cannot be followed beyond")
+    assert solve_sparse(SparseModel(mcpherson(), compiled=compiled), steep).message.startswith(
+        "on the way to the first sample: cannot be followed beyond"
+    )
 
 
 def test_small_steps_take_one_iteration_each():
@@ -258,25 +266,6 @@ def test_the_sign_of_the_determinant(n):
         products.add(float(np.sign(factors.signed_pivot) * sign))
     assert len(products) == 1
     assert len(signs) == 2
-
-
-def test_a_singular_pose_is_not_stepped_over():
-    found = solve_sparse(SparseModel(chain(3), compiled=False), turning(*np.linspace(0.0, 2.4, 7)), ["end"])
-    assert found.solved.tolist() == [True] * 5 + [False] * 2
-    assert "cannot be followed beyond turn = 1.8707" in found.message
-    assert "there is a singular pose ahead" in found.message
-
-
-@pytest.mark.parametrize("loops", [1, 2])
-@pytest.mark.parametrize("count", [2, 9, 50])
-@pytest.mark.parametrize("short", [1e-3, 1e-8])
-def test_a_gap_is_the_end_also_of_two_loops_at_once(short, count, loops):
-    """Their determinants change their signs together, and that of the whole keeps it."""
-    turn = np.linspace(0.0, 2.0, count)
-    found = solve_sparse(
-        SparseModel(loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops), compiled=False), turning(*turn)
-    )
-    assert (found.solved == (turn < 1.0 - np.pi + 2.0 * np.arcsin(1.0 - 0.5 * short))).all()
 
 
 def test_orientation_tells_the_sign_of_every_block():
