@@ -1,10 +1,11 @@
 """A large mechanism as one sparse system: for what cannot be solved part by part and is too large for a program of its own.
 
-Everything is done for one sample after the other: constraints in bulk (see `elements`), SuperLU in a fixed order (see `factors`).
-A sample is predicted by a Taylor step and takes two factorisations: at the predicted pose for Newton's iterations, as long as they
-converge fast with it, and at the solution for velocities and accelerations. With one for all, and refinement for the last two, a
-ring of 3,000 cranks takes a third longer, a chain of 5,000 loops a tenth less. Lengths are measured near the size of the bodies,
-not of the whole: that is what the entries of the matrix and the round-off of the rows depend on.
+With machine code several samples are solved at once (see `together`). What these cannot follow, and all where there is none, is
+solved here, one sample after the other: constraints in bulk (see `elements`), SuperLU in a fixed order (see `factors`). A sample is
+predicted by a Taylor step and takes two factorisations: at the predicted pose for Newton's iterations, as long as they converge
+fast with it, and at the solution for velocities and accelerations. With one for all, and refinement for the last two, a ring of
+3,000 cranks takes a third longer, a chain of 5,000 loops a tenth less. Lengths are measured near the size of the bodies, not of the
+whole: that is what the entries of the matrix and the round-off of the rows depend on.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Sweep a large mechanism as one sparse system, outwards from the design position, sample after sample."""
+"""Sweep a large mechanism as one sparse system, outwards from the design position."""
 
 from __future__ import annotations
 
