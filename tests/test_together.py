@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck.core.analysis import factors
 from kincheck.core.analysis import together as module
 from kincheck.core.analysis.sparse import SparseModel
 from kincheck.core.analysis.sparse_sweep import solve_sparse
@@ -17,7 +18,7 @@ from .mechanisms import four_bar
 from .test_cascade import assert_alike
 from .test_chain import chain
 from .test_corners import loop
-from .test_sparse import WAYS, turning
+from .test_sparse import CRANK, WAYS, turning
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 POINTS = tuple(point.name for point in ring(9).points)
@@ -54,6 +55,11 @@ def test_samples_in_any_order_at_any_distance_and_twice():
     assert_alike(solve_sparse(SparseModel(ring(9)), turning(*times), POINTS), one_by_one(ring(9), turning(*times)))
 
 
+def test_samples_that_come_twice_are_solved_together_too(alone):
+    solve_sparse(SparseModel(ring(9)), turning(*np.repeat(np.linspace(0.0, 0.4, 20), 2)))
+    assert not alone
+
+
 def test_few_samples_are_not_worth_making_it_ready():
     model = SparseModel(ring(9))
     solve_sparse(model, turning(0.1, 0.2, 0.3))
@@ -63,14 +69,15 @@ def test_few_samples_are_not_worth_making_it_ready():
 
 
 def test_an_order_that_serves_no_longer_is_renewed(monkeypatch, alone):
-    """Pivots as large as any multiplier may be are found anew at every pose."""
+    monkeypatch.setattr(factors, "PIVOT_THRESHOLD", 1.0)  # rows are exchanged, and not kept for as long as they may
     ordered, order = list[float](), Together.order
-    monkeypatch.setattr(Together, "order", lambda self: ordered.append(0.0) or order(self))
+    monkeypatch.setattr(Together, "order", lambda self: order(self) or ordered.append(self._sign[0]))
     monkeypatch.setattr(module, "GROWTH", 1.5)
     path = turning(*np.linspace(0.0, 1.5, 100))
-    assert_alike(solve_sparse(SparseModel(ring(12)), path, POINTS), one_by_one(ring(12), path))
-    assert len(ordered) > 1
-    assert alone
+    found = solve_sparse(SparseModel(ring(12)), path, POINTS)
+    assert {*ordered} == {-1.0, 1.0}
+    assert len(alone) < 35
+    assert_alike(found, one_by_one(ring(12), path))
 
 
 def stood(model: SparseModel, turn: float = 0.0) -> Stand:
@@ -95,6 +102,12 @@ def test_what_cannot_be_believed_is_refused():
     # the way is not what the rates say
     assert reached(model, replace(here, rates=2.0 * here.rates), times) == 0
     assert reached(model, here, times) == 3
+
+
+def test_a_step_that_is_longer_than_can_be_told_from_another_is_refused():
+    model = SparseModel(CRANK)
+    assert reached(model, stood(model), [1.03]) == 1
+    assert reached(model, stood(model), [1.06]) == 0  # half of it is more than 0.5 in Euler parameters
 
 
 def test_rows_that_contradict_the_others_are_refused():

@@ -34,7 +34,7 @@ from .ring import pivot, ring
 from .rounds import Spread, take_turns
 
 LOOPS = (1, 2, 4, 8, 16)
-CRANKS = (4, 8, 16)
+CRANKS = (4, 8, 16, 24, 48)
 MANY = (16, 100, 1000, 5000)
 """For what solves a chain loop by loop."""
 # Of the cranks at design [rad]; a quarter turn from upright the links are in line and the motion branches.
