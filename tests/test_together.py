@@ -71,7 +71,7 @@ def test_few_samples_are_not_worth_making_it_ready():
 def test_an_order_that_serves_no_longer_is_renewed(monkeypatch, alone):
     monkeypatch.setattr(factors, "PIVOT_THRESHOLD", 1.0)  # rows are exchanged, and not kept for as long as they may
     ordered, order = list[float](), Together.order
-    monkeypatch.setattr(Together, "order", lambda self: order(self) or ordered.append(self._sign[0]))
+    monkeypatch.setattr(Together, "order", lambda self, model: order(self, model) or ordered.append(self._sign[0]))
     monkeypatch.setattr(module, "GROWTH", 1.5)
     path = turning(*np.linspace(0.0, 1.5, 100))
     found = solve_sparse(SparseModel(ring(12)), path, POINTS)

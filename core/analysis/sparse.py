@@ -32,7 +32,7 @@ from .orientation import Blocks
 from .redundancy import RANK_TOLERANCE
 from .request import CONSISTENT
 from .sparse_rows import Jacobian
-from .stand import CONTRACTS, SETTLED, STALLS, Stand, moved
+from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance, moved
 from .together import Together
 from .turning import Turn
 
@@ -53,6 +53,7 @@ class SparseModel:
         extent: a power of two of metres near the mechanism's size; frame: what lengths are measured in.
         kept, dropped: rows that are solved, and rows that repeat them; solved: the entries of those.
         blocks, factors: of the matrix that these make.
+        scale: see `distance`.
         design: at the design position, with all drivers at rest.
 
     Raises:
@@ -72,7 +73,7 @@ class SparseModel:
         # what a change of the state is measured by: lengths by the mechanism's size
         length = self.frame.unit / self.extent
         coordinates = [length if name.endswith(".translation") else 1.0 for name in numbering.coordinates]
-        self._scale = np.concatenate([np.full(3 * n, length), np.ones(4 * n), coordinates])
+        self.scale = np.concatenate([np.full(3 * n, length), np.ones(4 * n), coordinates])
         state = np.zeros(numbering.state)
         state[3 * n : 4 * n] = 1.0
         self._turn = Turn(n, compiled=compiled)
@@ -133,10 +134,6 @@ class SparseModel:
                 found[k, :3] = drive[:, k] * (1.0 if driver.type == "joint_angle" else 1.0 / self.frame.unit)
                 found[k, 3], found[k, 4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
         return found.reshape(-1, len(times))
-
-    def distance(self, change: Array) -> Array:
-        """The largest of a change of the state, lengths measured by the mechanism's size; of several poses of each."""
-        return np.abs(change.T * self._scale).max(axis=-1)
 
     def _evaluate(self, state: Array, drives: Array) -> float:
         """Evaluate all rows, and the largest residual of those that are solved."""
@@ -237,7 +234,7 @@ class SparseModel:
                 rate, iterations = residual / last, iterations + 1
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
             closure, leftover, branch = self._tested(residual, tol, done=done)
-            gap, reach = (float(self.distance(state - other)) for other in (taylor, here.state))
+            gap, reach = (float(distance(state - other, self.scale)) for other in (taylor, here.state))
             if not gap <= LARGEST_CORRECTION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
                 raise FailedError("Newton jumps to another assembly")
             rates, accelerations = self._motion()

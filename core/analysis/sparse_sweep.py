@@ -172,7 +172,7 @@ class _Sweep:
                     return
                 found = [here]
                 if together and together.outgrown:
-                    together.order()
+                    together.order(self.model)
             for here in found:
                 if here.time == before[-1].time:
                     before.pop()

@@ -48,3 +48,8 @@ def moved(state: Array, step: Array, turn: Turn) -> Array:
     n = turn.bodies
     q = turn(state[3 * n : 7 * n], step[3 * n : 6 * n])
     return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])
+
+
+def distance(change: Array, scale: Array) -> Array:
+    """The largest of a change of the state, each number measured by its scale; of several poses of each."""
+    return np.abs(change.T * scale).max(axis=-1)

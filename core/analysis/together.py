@@ -18,7 +18,7 @@ from .continuity import EPSILON, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, T
 from .factors import PIVOT_THRESHOLD
 from .request import CONSISTENT
 from .sparse_tables import SparseTables
-from .stand import CONTRACTS, SETTLED, STALLS, Stand
+from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
 
 if TYPE_CHECKING:
     from .sparse import SparseModel
@@ -38,13 +38,15 @@ class Together:
     """
 
     def __init__(self, model: SparseModel) -> None:
-        self._model, self._tables = model, SparseTables(model.elements, model.bodies)
+        # not the model, which keeps this: what refers to each other stays in memory until somebody looks for it
+        self._kept, self._dropped, self._solved = model.kept, model.dropped, model.solved
+        self._blocks, self._scale, self._tables = model.blocks, model.scale, SparseTables(model.elements, model.bodies)
         self.width = self._tables.width
-        self.order()
+        self.order(model)
 
-    def order(self) -> None:
+    def order(self, model: SparseModel) -> None:
         """Eliminate from now on in the order that serves the pose where the model was last evaluated."""
-        model, tables, self.outgrown = self._model, self._tables, False
+        tables, self.outgrown = self._tables, False
         model.factors.factor()
         found = model.factors.ordered
         tables.order(found, model.solved[found.entries], model.kept[np.argsort(found.row)])
@@ -61,23 +63,23 @@ class Together:
             times, drives: of the samples, one or more; those beyond a group are left out.
             tol: largest accepted residual.
         """
-        count, here, model, tables = min(len(times), self.width), before[-1], self._model, self._tables
+        count, here, tables = min(len(times), self.width), before[-1], self._tables
         lanes = np.minimum(np.arange(self.width), count - 1)
         times, tables.drives[:] = times[lanes], drives[:, lanes]
         earlier = np.append(here.time, times[:-1])
         with np.errstate(all="ignore"):  # lanes that diverge are found by their residuals
             self._predict(before, times)
-            closure, iterations, sure = self._solved(tol)
+            closure, iterations, sure = self._iterated(tol)
             tables.motion()
             state, rates, accelerations = tables.state.copy(), tables.rates.copy(), tables.accelerations.copy()
-            leftover: Array = np.abs(tables.part("phi")[model.dropped]).max(axis=0, initial=0.0)
+            leftover: Array = np.abs(tables.part("phi")[self._dropped]).max(axis=0, initial=0.0)
             branch: Array = tables.part("branch").min(axis=0, initial=1.0)
             pivot, same = self._pivots(here)
             limit = WORSE_BY_PIVOTS * np.maximum(pivot, here.largest_pivot) * np.maximum(closure, EPSILON)
             sure &= (closure <= tol) & (leftover <= max(CONSISTENT, tol)) & (branch > 0.0) & same & (TURNED * pivot**2 > limit)
             past = _past(here.state, state)
             taylor = self._taylor(past, _past(here.rates, rates), _past(here.accelerations, accelerations), times - earlier)
-            gap, step = model.distance(state - taylor), model.distance(state - past)
+            gap, step = distance(state - taylor, self._scale), distance(state - past, self._scale)
             sure &= (gap <= LARGEST_CORRECTION * step + NEGLIGIBLE) & (step <= LONGEST_STEP)
             small = tables.growth <= GROWTH
         accepted = int(np.logical_and.accumulate((sure & small)[:count]).sum())
@@ -95,8 +97,8 @@ class Together:
     def _pivots(self, here: Stand) -> tuple[Array, NDArray[np.bool_]]:
         """Where all was last factored the smallest in size, and whether the orientation is that of where the motion stands."""
         pivots = self._tables.pivots
-        entries = self._tables.part("entries")[self._model.solved]
-        orientation = self._model.blocks.orientation(entries, self._sign * np.sign(pivots).prod(axis=0))
+        entries = self._tables.part("entries")[self._solved]
+        orientation = self._blocks.orientation(entries, self._sign * np.sign(pivots).prod(axis=0))
         return np.abs(pivots).min(axis=0), np.array([each == here.orientation for each in orientation])
 
     def _predict(self, before: Sequence[Stand], times: Array) -> None:
@@ -119,7 +121,7 @@ class Together:
         tables.move()
         return tables.state.copy()
 
-    def _solved(self, tol: float) -> tuple[Array, int, NDArray[np.bool_]]:
+    def _iterated(self, tol: float) -> tuple[Array, int, NDArray[np.bool_]]:
         """Newton's iteration from the state there is: residuals, how many iterations, and of which lanes it ended."""
         residual, iterations = self._evaluated(), 0
         rate, done = np.full(self.width, np.inf), residual <= SETTLED
@@ -135,7 +137,7 @@ class Together:
 
     def _evaluated(self) -> Array:
         self._tables.evaluate()
-        return np.abs(self._tables.part("phi")[self._model.kept]).max(axis=0)
+        return np.abs(self._tables.part("phi")[self._kept]).max(axis=0)
 
 
 def _past(first: Array, each: Array) -> Array:
