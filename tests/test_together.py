@@ -10,6 +10,7 @@ from kincheck.core.analysis import factors
 from kincheck.core.analysis import together as module
 from kincheck.core.analysis.sparse import SparseModel
 from kincheck.core.analysis.sparse_sweep import solve_sparse
+from kincheck.core.analysis.sparse_tables import SparseTables
 from kincheck.core.analysis.stand import Stand
 from kincheck.core.analysis.together import Together
 from kincheck.core.harness.bench.ring import ring
@@ -110,30 +111,35 @@ def test_a_step_that_is_longer_than_can_be_told_from_another_is_refused():
     assert reached(model, stood(model), [1.06]) == 0  # half of it is more than 0.5 in Euler parameters
 
 
-def test_rows_that_contradict_the_others_are_refused():
-    model = SparseModel(four_bar())
-    here, together = stood(model), model.together
-    assert together is not None
-    assert len(model.dropped)
-    phi, part = together._tables.part, together._tables.part
+def changed(monkeypatch, quantity: str, change) -> None:
+    """All poses have other numbers than they have."""
+    get = SparseTables.__getitem__
 
-    def contradicting(quantity: str):
-        found = part(quantity).copy()
-        if quantity == "phi":
-            found[model.dropped[0], 1] = 1e-6
+    def got(self: SparseTables, name: str):
+        return change(get(self, name)) if name == quantity else get(self, name)
+
+    monkeypatch.setattr(SparseTables, "__getitem__", got)
+
+
+def test_rows_that_contradict_the_others_are_refused(monkeypatch):
+    model = SparseModel(four_bar())
+    here = stood(model)
+    assert len(model.dropped)
+
+    def contradicting(phi):
+        found = phi.copy()
+        found[model.dropped[0], 1] = 1e-6
         return found
 
-    together._tables.part = contradicting
+    changed(monkeypatch, "phi", contradicting)
     assert reached(model, here, [0.01, 0.02, 0.03]) == 1
-    together._tables.part = phi
 
 
-def test_another_branch_is_refused():
+def test_another_branch_is_refused(monkeypatch):
     model = SparseModel(four_bar())
-    here, together = stood(model), model.together
-    assert together is not None
-    part = together._tables.part
-    together._tables.part = lambda quantity: -part(quantity) if quantity == "branch" else part(quantity)
+    here = stood(model)
+    assert reached(model, here, [0.01, 0.02, 0.03]) == 3
+    changed(monkeypatch, "branch", np.negative)
     assert reached(model, here, [0.01, 0.02, 0.03]) == 0
 
 

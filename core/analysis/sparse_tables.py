@@ -19,6 +19,9 @@ from .turning import BY, TO, turned
 class SparseTables:
     """Numbers of as many poses as a vector has lanes, a row for each, and what is done with them.
 
+    There are the state (see `Numbering`) and then the drives, rates, accelerations and a step of the unknowns, and the results of
+    all elements with their parts.
+
     Attributes:
         width: how many poses.
     """
@@ -28,9 +31,11 @@ class SparseTables:
         self._elements, self._link, self._walk = elements, Linker(self.width), walker(self.width)
         numbering, given = elements.numbering, Memory()
         self._zero, self._one = (given.take(1).start for _ in range(2))
-        self._state, self._drives = given.take(numbering.state), given.take(5 * elements.drivers)
-        self._rates, self._accelerations, self._step = (given.take(numbering.unknowns) for _ in range(3))
-        self._results = given.take(len(elements.results))
+        sizes = {"state": numbering.state, "drives": 5 * elements.drivers, "results": len(elements.results)}
+        sizes |= dict.fromkeys(("rates", "accelerations", "step"), numbering.unknowns)
+        self._rows = {name: given.take(size) for name, size in sizes.items()}
+        results = self._rows["results"].start
+        self._rows |= {name: slice(results + part.start, results + part.stop) for name, part in elements.parts.items()}
         geometry: list[tuple[slice, Array]] = []
         programs: dict[str, list[Words]] = {WHERE: [], HOW: []}
         for kind, starts in zip(elements.kinds, elements.starts, strict=True):
@@ -51,27 +56,25 @@ class SparseTables:
     def _slots(self, kind: Kind, outputs: dict[str, Indices], geometry: slice) -> Indices:
         """Rows of the slots of each constraint of a kind."""
         found = np.zeros((len(kind.plan.slots), kind.lanes), np.intp)
-        found[kind.inputs[WHERE]] = self._state.start + kind.read[WHERE]
-        found[kind.inputs[HOW]] = self._rates.start + kind.read[HOW]
+        found[kind.inputs[WHERE]] = self._rows["state"].start + kind.read[WHERE]  # the drives come next
+        found[kind.inputs[HOW]] = self._rows["rates"].start + kind.read[HOW]
         end = kind.geometry_at + len(kind.geometry)
         found[kind.geometry_at : end] = numbers(geometry).reshape(-1, kind.lanes)
         for name, places in outputs.items():
-            found[kind.outputs[name]] = self._results.start + places
+            found[kind.outputs[name]] = self._rows["results"].start + places
         return found
 
     def _moves(self, n: int, given: Memory) -> list[Words]:
         """The state by the step: see `stand.moved`."""
-        state, step, free = self._state.start, self._step.start, given.take(4 * n).start
-        q, pi, new = state + 3 * n + np.arange(4 * n), step + 3 * n + np.arange(3 * n), free + np.arange(4 * n)
+        state, step, new = self._at("state"), self._at("step"), numbers(given.take(4 * n))
+        q, pi = state[3 * n : 7 * n], step[3 * n : 6 * n]
         slots = np.zeros((TO.stop, n), np.intp)
         slots[BY], slots[TO] = np.concatenate([q, pi]).reshape(-1, n), new.reshape(-1, n)
-        count = self._elements.numbering.unknowns - 6 * n
-        added = np.concatenate([np.arange(3 * n), 7 * n + np.arange(count)])
-        by = np.concatenate([np.arange(3 * n), 6 * n + np.arange(count)])
+        added, by = np.append(state[: 3 * n], state[7 * n :]), np.append(step[: 3 * n], step[6 * n :])
         return [
             self._link.lanes(turned(), slots, given),
             self._link.operations("copy", q, new),
-            self._link.operations("+", state + added, state + added, step + by),
+            self._link.operations("+", added, added, by),
         ]
 
     def order(self, order: Ordered, entries: Indices, rows: Indices) -> None:
@@ -80,59 +83,30 @@ class SparseTables:
         Args:
             entries, rows: of the matrix in that order, their places among those of all constraints.
         """
-        given, link, parts = Memory(), self._link, self._elements.parts
+        given, link = Memory(), self._link
         given.take(self._base)
         fixed = FixedOrder(order.rows.tolist(), order.columns.tolist(), len(rows))
         factors, inverse, right = given.take(fixed.count), given.take(len(rows)), given.take(len(rows))
-        matrix = self._results.start + parts["entries"].start + entries
-        self._factor = joined(fixed.factor(link, matrix, factors, inverse, (self._zero, self._one)))
+        self._factor = joined(fixed.factor(link, self._at("entries")[entries], factors, inverse, (self._zero, self._one)))
         solve, into = fixed.solve(link, factors, inverse, right), numbers(right)
 
-        def solved(quantity: str, op: str, found: slice) -> Words:
-            given = self._results.start + parts[quantity].start + rows
-            put = link.operations(op, numbers(found), into[order.column])
-            return joined([link.operations("copy", into, given), *solve, put])
+        def solved(quantity: str, op: str, found: str) -> Words:
+            taken = link.operations("copy", into, self._at(quantity)[rows])
+            return joined([taken, *solve, link.operations(op, self._at(found), into[order.column])])
 
-        self._newton, self._velocity = solved("phi", "neg", self._step), solved("nu", "copy", self._rates)
-        self._acceleration = solved("gamma", "copy", self._accelerations)
+        self._newton, self._velocity = solved("phi", "neg", "step"), solved("nu", "copy", "rates")
+        self._acceleration = solved("gamma", "copy", "accelerations")
         self._pivots, self._multipliers = factors.start + fixed.pivots, factors.start + fixed.multipliers
         memory = aligned(given.count * self.width).reshape(-1, self.width)
         memory[: self._base] = self._memory[: self._base]
         self._memory = memory
 
-    @property
-    def state(self) -> Array:
-        """See `Numbering`; as all that follows, shape (numbers, width), and to be written."""
-        return self._memory[self._state]
+    def _at(self, name: str) -> Indices:
+        return numbers(self._rows[name])
 
-    @property
-    def drives(self) -> Array:
-        """As of `Elements.evaluate`."""
-        return self._memory[self._drives]
-
-    @property
-    def step(self) -> Array:
-        """Of the unknowns."""
-        return self._memory[self._step]
-
-    @property
-    def rates(self) -> Array:
-        """Of the unknowns."""
-        return self._memory[self._rates]
-
-    @property
-    def accelerations(self) -> Array:
-        """Of the unknowns."""
-        return self._memory[self._accelerations]
-
-    @property
-    def results(self) -> Array:
-        """Of `Elements`, constants and all."""
-        return self._memory[self._results]
-
-    def part(self, quantity: str) -> Array:
-        """One of the quantities."""
-        return self.results[self._elements.parts[quantity]]
+    def __getitem__(self, name: str) -> Array:
+        """Numbers of all poses, shape (numbers, width), to be read and written: of the state and what else has rows."""
+        return self._memory[self._rows[name]]
 
     @property
     def pivots(self) -> Array:

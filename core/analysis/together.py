@@ -50,7 +50,7 @@ class Together:
         model.factors.factor()
         found = model.factors.ordered
         tables.order(found, model.solved[found.entries], model.kept[np.argsort(found.row)])
-        tables.results[:] = model.elements.results[:, None]
+        tables["results"][:] = model.elements.results[:, None]
         tables.factor()
         # the sign of the determinant is that of the model's factors, or always the opposite
         self._sign = np.sign(model.factors.signed_pivot) * np.sign(tables.pivots).prod(axis=0)
@@ -65,15 +65,15 @@ class Together:
         """
         count, here, tables = min(len(times), self.width), before[-1], self._tables
         lanes = np.minimum(np.arange(self.width), count - 1)
-        times, tables.drives[:] = times[lanes], drives[:, lanes]
+        times, tables["drives"][:] = times[lanes], drives[:, lanes]
         earlier = np.append(here.time, times[:-1])
         with np.errstate(all="ignore"):  # lanes that diverge are found by their residuals
             self._predict(before, times)
             closure, iterations, sure = self._iterated(tol)
             tables.motion()
-            state, rates, accelerations = tables.state.copy(), tables.rates.copy(), tables.accelerations.copy()
-            leftover: Array = np.abs(tables.part("phi")[self._dropped]).max(axis=0, initial=0.0)
-            branch: Array = tables.part("branch").min(axis=0, initial=1.0)
+            state, rates, accelerations = tables["state"].copy(), tables["rates"].copy(), tables["accelerations"].copy()
+            leftover: Array = np.abs(tables["phi"][self._dropped]).max(axis=0, initial=0.0)
+            branch: Array = tables["branch"].min(axis=0, initial=1.0)
             pivot, same = self._pivots(here)
             limit = WORSE_BY_PIVOTS * np.maximum(pivot, here.largest_pivot) * np.maximum(closure, EPSILON)
             sure &= (closure <= tol) & (leftover <= max(CONSISTENT, tol)) & (branch > 0.0) & same & (TURNED * pivot**2 > limit)
@@ -97,7 +97,7 @@ class Together:
     def _pivots(self, here: Stand) -> tuple[Array, NDArray[np.bool_]]:
         """Where all was last factored the smallest in size, and whether the orientation is that of where the motion stands."""
         pivots = self._tables.pivots
-        entries = self._tables.part("entries")[self._solved]
+        entries = self._tables["entries"][self._solved]
         orientation = self._blocks.orientation(entries, self._sign * np.sign(pivots).prod(axis=0))
         return np.abs(pivots).min(axis=0), np.array([each == here.orientation for each in orientation])
 
@@ -117,9 +117,9 @@ class Together:
 
     def _taylor(self, state: Array, rates: Array, accelerations: Array, h: Array) -> Array:
         tables = self._tables
-        tables.state[:], tables.step[:] = state, h * (rates + (0.5 * h) * accelerations)
+        tables["state"][:], tables["step"][:] = state, h * (rates + (0.5 * h) * accelerations)
         tables.move()
-        return tables.state.copy()
+        return tables["state"].copy()
 
     def _iterated(self, tol: float) -> tuple[Array, int, NDArray[np.bool_]]:
         """Newton's iteration from the state there is: residuals, how many iterations, and of which lanes it ended."""
@@ -137,7 +137,7 @@ class Together:
 
     def _evaluated(self) -> Array:
         self._tables.evaluate()
-        return np.abs(self._tables.part("phi")[self._kept]).max(axis=0)
+        return np.abs(self._tables["phi"][self._kept]).max(axis=0)
 
 
 def _past(first: Array, each: Array) -> Array:
