@@ -7,7 +7,7 @@ import pytest
 from kincheck.core.program import NumpyExecutor, Plan, Tape, cos, program, sqrt, where_larger
 from kincheck.core.program.compiler import available, vector_width
 from kincheck.core.program.fixed_order import FixedOrder
-from kincheck.core.program.linked import Linker, Memory, joined, numbers
+from kincheck.core.program.linked import MOST, Linker, Memory, joined, numbers
 from kincheck.core.program.memory import address, aligned
 
 if not available():
@@ -98,3 +98,10 @@ def test_factors_in_a_given_order_solve_what_dense_ones_do(n):
 def test_a_pivot_that_cannot_be_anything_but_zero_is_refused():
     with pytest.raises(ValueError, match="pivot 1 of 2"):
         FixedOrder([0, 0], [0, 1], 2)
+
+
+def test_rows_that_words_cannot_name_are_refused():
+    memory = Memory()
+    assert memory.take(MOST).stop == MOST
+    with pytest.raises(MemoryError, match=f"{MOST + 1} rows"):
+        memory.take(1)

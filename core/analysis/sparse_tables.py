@@ -28,7 +28,7 @@ class SparseTables:
 
     def __init__(self, elements: Elements, bodies: int) -> None:
         self.width = vector_width()
-        self._elements, self._link, self._walk = elements, Linker(self.width), walker(self.width)
+        self._link, self._walk = Linker(self.width), walker(self.width)
         numbering, given = elements.numbering, Memory()
         self._zero, self._one = (given.take(1).start for _ in range(2))
         sizes = {"state": numbering.state, "drives": 5 * elements.drivers, "results": len(elements.results)}

@@ -20,6 +20,10 @@ ABREAST = 8
 """Lanes of which each operation is done before the next: none waits for the one before it."""
 
 
+MOST = 2**26
+"""Rows that words of 32 bits can name, of vectors of eight numbers."""
+
+
 class Memory:
     """Rows to be given out."""
 
@@ -27,8 +31,10 @@ class Memory:
         self.count = 0
 
     def take(self, count: int) -> slice:
-        """So many more."""
+        """So many more. Raises MemoryError where a table could not name them."""
         first, self.count = self.count, self.count + count
+        if self.count > MOST:
+            raise MemoryError(f"{self.count} rows of numbers are asked for, a table names {MOST} at most")
         return slice(first, self.count)
 
 
