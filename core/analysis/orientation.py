@@ -49,8 +49,9 @@ class Blocks:
         signs = [np.ones((poses, 1))]
         for size, entries, at in self._groups:
             dense = np.zeros((poses, at.max() // (size * size) + 1, size, size))
-            dense.reshape(poses, -1)[:, at] = values[entries].T
-            signs.append(np.linalg.slogdet(dense)[0])
+            dense.reshape(poses, -1)[:, at] = values.take(entries, axis=0).T
+            # most blocks are of one row
+            signs.append(np.sign(dense[..., 0, 0]) if size == 1 else np.linalg.slogdet(dense)[0])
         small = np.concatenate(signs, axis=1)
         found = np.column_stack([small, np.sign(whole) * small.prod(axis=1)])
         return [each.tobytes() for each in found.astype(np.int8)]

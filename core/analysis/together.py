@@ -72,7 +72,7 @@ class Together:
             closure, iterations, sure = self._iterated(tol)
             tables.motion()
             state, rates, accelerations = tables["state"].copy(), tables["rates"].copy(), tables["accelerations"].copy()
-            leftover: Array = np.abs(tables["phi"][self._dropped]).max(axis=0, initial=0.0)
+            leftover: Array = np.abs(tables["phi"].take(self._dropped, axis=0)).max(axis=0, initial=0.0)
             branch: Array = tables["branch"].min(axis=0, initial=1.0)
             pivot, same = self._pivots(here)
             limit = WORSE_BY_PIVOTS * np.maximum(pivot, here.largest_pivot) * np.maximum(closure, EPSILON)
@@ -97,7 +97,7 @@ class Together:
     def _pivots(self, here: Stand) -> tuple[Array, NDArray[np.bool_]]:
         """Where all was last factored the smallest in size, and whether the orientation is that of where the motion stands."""
         pivots = self._tables.pivots
-        entries = self._tables["entries"][self._solved]
+        entries = self._tables["entries"].take(self._solved, axis=0)
         orientation = self._blocks.orientation(entries, self._sign * np.sign(pivots).prod(axis=0))
         return np.abs(pivots).min(axis=0), np.array([each == here.orientation for each in orientation])
 
@@ -137,7 +137,7 @@ class Together:
 
     def _evaluated(self) -> Array:
         self._tables.evaluate()
-        return np.abs(self._tables["phi"][self._kept]).max(axis=0)
+        return np.abs(self._tables["phi"].take(self._kept, axis=0)).max(axis=0)
 
 
 def _past(first: Array, each: Array) -> Array:
