@@ -4,8 +4,8 @@ The answers are the same to round-off. One program costs least for each sample, 
 ties together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large
 for one program is a sparse system. Measured on chains of four-bars, one program against components, both walked: 17 bodies 6 and 97
 us a sample, made ready in 0.3 and 0.1 s; 33 bodies 15 and 165 us, 0.6 and 0.1 s; 65 bodies 23 and 300 us, 0.9 and 0.1 s. On rings
-of loops, one program against a sparse system: 31 bodies 21 and 180 us, made ready in 1.3 and 0.04 s; 39 bodies 42 and 275 us, 2.2 and
-0.06 s. Near singular poses the one knows sigma, the other pivots only, and refuses more of what could be solved.
+of loops, one program against a sparse system: 31 bodies 21 and 180 us, made ready in 1.3 and 0.04 s; 39 bodies 42 and 275 us, 2.2
+and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and refuses more of what could be solved.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from .sweep import follow
 
 # Up to as many bodies one program is made ready in a third of a second.
 ONE_PROGRAM = 20
-# An irreducible mechanism is worth two seconds, once: as one program it is six times as fast as a sparse system. Larger rings are so
-# near to singular that the estimate of sigma leaves all their samples in doubt.
+# An irreducible mechanism is worth two seconds, once: as one program it is six times as fast as a sparse system. Larger rings are
+# so near to singular that the estimate of sigma leaves all their samples in doubt.
 IRREDUCIBLE = 40
 
 Solver = Callable[[float], Trajectory]

@@ -13,6 +13,8 @@ import numpy as np
 
 # A turn is long against the clock's resolution and short against what interrupts a process: quick work is done several times.
 TURN = 2e-3
+# Programs are compiled in the eighth sweep of 161 samples at the latest, shorter ones later; what is slow is not called so often [s].
+FIRST, PATIENCE = 24, 0.5
 
 Key = TypeVar("Key")
 Work = Callable[[], object]
@@ -61,11 +63,20 @@ def take_turns(contestants: Mapping[Key, Work], rounds: int) -> dict[Key, Spread
 
 
 def _calls(work: Work) -> int:
-    """How often to call it in a turn; it has been called at least once then."""
-    seconds = _turn(work, 1)
-    if seconds < 10.0 * TURN:  # it may have been the first, which took longer than others will
-        seconds = _turn(work, 1)
-    return max(1, math.ceil(TURN / seconds))
+    """How often to call it in a turn, warm."""
+    return max(1, math.ceil(TURN / warmed(work)))
+
+
+def warmed(work: Work, clock: Callable[[], float] = perf_counter) -> float:
+    """Seconds of a call by that clock, the least of some: in any of the first, programs may be compiled, once for all."""
+    least, begin = math.inf, perf_counter()
+    for _ in range(FIRST):
+        before = clock()
+        work()
+        least = min(least, clock() - before)
+        if perf_counter() - begin > PATIENCE:
+            break
+    return least
 
 
 def _turn(work: Work, calls: int) -> float:

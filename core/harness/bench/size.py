@@ -31,7 +31,7 @@ from ..record import Outcome
 from ..run import NATIVE
 from .precision import Contestant, contestants
 from .ring import pivot, ring
-from .rounds import Spread, take_turns
+from .rounds import Spread, take_turns, warmed
 
 LOOPS = (1, 2, 4, 8, 16)
 CRANKS = (4, 8, 16, 24, 48)
@@ -172,10 +172,7 @@ def _solved(family: str, engine: Engine, ladder: Sequence[int], tol: float) -> I
         facts: dict[str, Any] = {"outcome": entry.outcome, "message": entry.message, "residual": entry.residual}
         yield msgspec.structs.replace(size, **facts, error=entry.errors.position), each
         if each.work is not None:
-            each.work()  # what is made once takes no part in the rounds
-            begin = process_time()  # on a busy machine no other engine drops out than on a quiet one
-            each.work()
-            seconds = process_time() - begin
+            seconds = warmed(each.work, process_time)  # on a busy machine no other engine drops out than on a quiet one
             slow = f"not tried: {loops} took {seconds:.2g} s for {SAMPLES} samples" if seconds > LONGEST else ""
 
 
