@@ -32,7 +32,7 @@ def test_contestants_take_turns(monkeypatch):
     monkeypatch.setattr(rounds, "TURN", 1e-12)  # one call a turn
     called = []
     found = rounds.take_turns({name: lambda name=name: called.append(name) for name in "ab"}, 3)
-    assert "".join(called) == "ab" + 3 * "ab"
+    assert "".join(called) == rounds.FIRST * "a" + rounds.FIRST * "b" + 3 * "ab"
     assert [each.rounds for each in found.values()] == [3, 3]
 
 
@@ -41,8 +41,22 @@ def test_quick_work_is_done_several_times_and_warmed(monkeypatch):
     monkeypatch.setattr(rounds, "perf_counter", lambda: 1e-3 * next(clock))  # every work seems to take a millisecond
     called = []
     found = rounds.take_turns({"a": lambda: called.append("a")}, 2)
-    assert len(called) == 2 + 2 * (1 + 2)  # a turn of 2 ms, and a call before each
+    assert len(called) == rounds.FIRST + 2 * (1 + 2)  # a turn of 2 ms, and a call before each
     assert found["a"].median == pytest.approx(0.5e-3)  # the clock goes on once in a turn, for two calls
+
+
+def test_work_that_is_slow_at_first_is_timed_by_what_it_takes_later(monkeypatch):
+    now, took = [0.0], iter([0.1, 0.2, *[0.001] * 100])
+    monkeypatch.setattr(rounds, "perf_counter", lambda: now[0])
+
+    def work() -> None:
+        now[0] += next(took)
+
+    assert rounds.warmed(work) == pytest.approx(0.001)
+    took = iter([0.3] * 100)
+    begin = now[0]
+    assert rounds.warmed(work) == pytest.approx(0.3)
+    assert now[0] - begin == pytest.approx(0.6)  # it is slow: twice is enough
 
 
 def test_spread():

@@ -111,12 +111,14 @@ class SparseTables:
     @property
     def pivots(self) -> Array:
         """Of the factors, in their order."""
-        return self._memory.take(self._pivots, axis=0)
+        found: Array = self._memory.take(self._pivots, axis=0)
+        return found
 
     @property
     def growth(self) -> Array:
         """The largest entry of L, shape (width,): by how much rounding errors may grow; NaN where there is one."""
-        return np.abs(self._memory.take(self._multipliers, axis=0)).max(axis=0, initial=0.0)
+        found: Array = self._memory.take(self._multipliers, axis=0)
+        return np.abs(found).max(axis=0, initial=0.0)
 
     def move(self) -> None:
         """Take the step from the state."""

@@ -13,7 +13,7 @@ import numpy as np
 
 # A turn is long against the clock's resolution and short against what interrupts a process: quick work is done several times.
 TURN = 2e-3
-# Programs are compiled in the eighth sweep of 161 samples at the latest, shorter ones later; what is slow is not called so often [s].
+# Programs are compiled in the eighth sweep of 161 samples at the latest, in shorter ones later. What is slow is called less [s].
 FIRST, PATIENCE = 24, 0.5
 
 Key = TypeVar("Key")
@@ -67,9 +67,9 @@ def _calls(work: Work) -> int:
     return max(1, math.ceil(TURN / warmed(work)))
 
 
-def warmed(work: Work, clock: Callable[[], float] = perf_counter) -> float:
-    """Seconds of a call by that clock, the least of some: in any of the first, programs may be compiled, once for all."""
-    least, begin = math.inf, perf_counter()
+def warmed(work: Work, clock: Callable[[], float] | None = None) -> float:
+    """Seconds of a call by a clock, the least of some: in any of the first, programs may be compiled, once for all."""
+    least, begin, clock = math.inf, perf_counter(), clock or perf_counter
     for _ in range(FIRST):
         before = clock()
         work()
