@@ -96,7 +96,8 @@ class SparseTables:
 
         self._newton, self._velocity = solved("phi", "neg", "step"), solved("nu", "copy", "rates")
         self._acceleration = solved("gamma", "copy", "accelerations")
-        self._pivots, self._multipliers = factors.start + fixed.pivots, factors.start + fixed.multipliers
+        self._pivots: Indices = factors.start + fixed.pivots
+        self._multipliers: Indices = factors.start + fixed.multipliers
         memory = aligned(given.count * self.width).reshape(-1, self.width)
         memory[: self._base] = self._memory[: self._base]
         self._memory = memory
