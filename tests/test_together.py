@@ -50,6 +50,11 @@ def test_a_smooth_sweep_needs_no_sample_alone(count, alone):
     assert_alike(found, one_by_one(ring(20), path))
 
 
+def test_samples_after_the_first_eight_take_one_iteration():
+    found = solve_sparse(SparseModel(ring(12)), turning(*np.linspace(0.0, 0.8, 33)))
+    assert (found.iterations[16:] == 1).all()  # none of the group that the eighth is in
+
+
 def test_samples_in_any_order_at_any_distance_and_twice():
     times = np.random.default_rng(3).uniform(-0.9, 0.9, 40)
     times = np.concatenate([times, times[:3], [0.0, 0.0]])

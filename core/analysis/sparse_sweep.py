@@ -17,6 +17,7 @@ from ..primitives.base import Motion, Pose
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .march import HALVINGS, MAX_ROUNDS
 from .sparse import FailedError, SparseModel, Stand
+from .together import REMEMBERED
 from .turning import euler_parameters
 
 
@@ -156,7 +157,7 @@ class _Sweep:
     def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
         """Where the motion stands at each of the times, outwards, until it ends; then there is a message."""
         drives, together = self.model.drives(path, times), self.model.together if len(times) >= WORTH else None
-        before: deque[Stand] = deque([here], together.width if together else 1)
+        before: deque[Stand] = deque([here], REMEMBERED)
         k = alone = 0
         while k < len(times):
             found: list[Stand] = []

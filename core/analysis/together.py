@@ -1,6 +1,6 @@
 """Several samples of a sparse system at once, each in a lane of vectors.
 
-A group of samples is predicted by the polynomial through as many that came before it, at first by a Taylor step, and solved by
+A group of samples is predicted by the polynomial through eight that came before it, at first by a Taylor step, and solved by
 Newton's iteration with factors in the order that served one pose. What is believed is what `SparseModel.reach` believes, and less
 near a singular pose: no pivot was chosen here. Samples are accepted up to the first that is not.
 """
@@ -23,6 +23,8 @@ from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
 if TYPE_CHECKING:
     from .sparse import SparseModel
 
+REMEMBERED = 8
+"""Samples that the next ones are predicted from: extrapolated by as many again, their rounding errors grow to 1e-12."""
 ITERATIONS = 6
 """At most: what needs more is better predicted from the samples before it."""
 GROWTH = 10.0 / PIVOT_THRESHOLD
@@ -59,7 +61,7 @@ class Together:
         """Follow a motion to the next samples, as far as can be believed.
 
         Args:
-            before: where it stood, at different times, up to where it stands.
+            before: where it stood, at different times, up to where it stands; `REMEMBERED` of them where there were as many.
             times, drives: of the samples, one or more; those beyond a group are left out.
             tol: largest accepted residual.
         """
@@ -102,10 +104,10 @@ class Together:
         return np.abs(pivots).min(axis=0), np.array([each == here.orientation for each in orientation])
 
     def _predict(self, before: Sequence[Stand], times: Array) -> None:
-        """By the polynomial through a group of samples, or by a Taylor step and what the last such step lacked."""
-        here, width = before[-1], self.width
-        if len(before) == width:
-            known, others = np.array([each.time for each in before]), ~np.eye(width, dtype=bool)
+        """By the polynomial through the samples before, or by a Taylor step and what the last such step lacked."""
+        here = before[-1]
+        if len(before) == REMEMBERED:
+            known, others = np.array([each.time for each in before]), ~np.eye(REMEMBERED, dtype=bool)
             parts = [(times[:, None] - known[other]) / (t - known[other]) for t, other in zip(known, others, strict=True)]
             state = np.column_stack([each.state for each in before]) @ np.prod(parts, axis=2)
         else:
