@@ -32,7 +32,7 @@ def available() -> bool:
 
 @cache
 def llvm() -> Any:
-    """Its binding. Importing it takes longer than all else before a first sweep: whoever has its products does without."""
+    """Its binding. Importing it takes three times as long as making a known model ready: whoever has its products does without."""
     found: Any = importlib.import_module("llvmlite.binding")
     found.initialize_native_target()
     found.initialize_native_asmprinter()

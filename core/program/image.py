@@ -1,8 +1,8 @@
 """Machine code as one piece of memory that runs wherever it stands: what an object file holds, put together once and for all.
 
-LLVM can load what it compiled, but importing it takes longer than everything else that a process does before its first sweep.
-An image needs no LLVM. It is read from an ELF object for x86-64 (System V ABI with its AMD64 supplement, chapter 4), whose parts
-refer to each other by distances only, for it calls nothing outside itself.
+LLVM can load what it compiled, but importing it takes three times as long as making ready a model that was known before. An image
+needs no LLVM. It is read from an ELF object for x86-64 (System V ABI with its AMD64 supplement, chapter 4), whose parts refer to
+each other by distances only, for it calls nothing outside itself.
 """
 
 from __future__ import annotations
