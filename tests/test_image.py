@@ -151,3 +151,9 @@ def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
     from llvmlite import __version__
 
     assert __version__.encode() in described
+
+
+def test_code_is_known_by_how_it_is_made(monkeypatch):
+    before = compiled.told(TEXT)
+    monkeypatch.setattr(compiled, "_sources", lambda: "another way")
+    assert compiled.told(TEXT) != before

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..program import Executor, LlvmExecutor, NumpyExecutor
+from ..program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor
 from ..program.compiler import available
 from ..trajectory import Array
 from .equations import Constraint, Relation
@@ -98,7 +98,7 @@ class _Bound:
     def __init__(self, kind: Kind, results: Array, starts: Mapping[str, int], *, compiled: bool) -> None:
         """Write what is constant, and prepare to write the rest, into an array where every quantity has its start."""
         self._results, lanes = results, kind.lanes
-        self._executor: Executor = LlvmExecutor(kind.code, lanes) if compiled else NumpyExecutor(kind.plan, lanes)
+        self._executor: Executor = LlvmExecutor(LlvmCode(kind.plan), lanes) if compiled else NumpyExecutor(kind.plan, lanes)
         for rows, value in kind.constants(starts):
             results[rows] = value
         # gathered and scattered by one call each: of some hundred bodies it is the calls that take the time

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
 from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..algebra import Scalar, Vec3, vec
 from ..mechanism import GROUND
 from ..primitives.base import Drive
-from ..program import LlvmCode, Plan, Program, Tape, Traced, program
+from ..program import Plan, Program, Tape, Traced, program
 from ..trajectory import Array
 from .cartesian import Cartesian
 from .equations import Constraint, Relation
+from .factors import Indices
 
-Indices = NDArray[np.intp]
 SIDES = ("i", "j")
 WHERE, HOW = "where", "how"
 """The programs of a kind: what follows from where its bodies are, and gamma, which needs to know how they move."""
@@ -193,11 +191,6 @@ class Kind:
         for _, quantity, rows, value in self._written():
             if not isinstance(value, Traced):
                 yield starts[quantity] + rows, value
-
-    @cached_property
-    def code(self) -> LlvmCode:
-        """Its programs, ready to be run."""
-        return LlvmCode(self.plan)
 
     @property
     def sizes(self) -> dict[str, int]:

@@ -32,7 +32,7 @@ from .orientation import Blocks
 from .redundancy import RANK_TOLERANCE
 from .request import CONSISTENT
 from .sparse_rows import Jacobian
-from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance, moved
+from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
 from .together import Together
 from .turning import Turn
 
@@ -135,6 +135,12 @@ class SparseModel:
                 found[k, 3], found[k, 4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
         return found.reshape(-1, len(times))
 
+    def moved(self, state: Array, step: Array) -> Array:
+        """The state after a step of the unknowns; the Euler parameters have length one again."""
+        n = self.bodies
+        q = self._turn(state[3 * n : 7 * n], step[3 * n : 6 * n])
+        return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])
+
     def _evaluate(self, state: Array, drives: Array) -> float:
         """Evaluate all rows, and the largest residual of those that are solved."""
         self.elements.evaluate(state, drives)
@@ -152,7 +158,7 @@ class SparseModel:
                 self.factors.factor()
             except SingularError:
                 break
-            state = moved(state, -self.factors.solve(self.elements.phi[self.kept]), self._turn)
+            state = self.moved(state, -self.factors.solve(self.elements.phi[self.kept]))
         if not residual <= CLOSED or not self.elements.branch.min(initial=1.0) > 0.0:
             raise SolveError(
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual "
@@ -207,11 +213,11 @@ class SparseModel:
     def _predicted(self, here: Stand, time: float) -> tuple[Array, Array]:
         """A Taylor step of second order, and that with what the last such step lacked, which grows by the cube of the step."""
         h, before = time - here.time, here.time - here.earlier
-        taylor = moved(here.state, h * (here.rates + (0.5 * h) * here.accelerations), self._turn)
+        taylor = self.moved(here.state, h * (here.rates + (0.5 * h) * here.accelerations))
         if not ABOUT * abs(before) > abs(h):
             return taylor, taylor
         corrected = taylor + (h / before) ** 3 * (here.state - here.predicted)
-        return taylor, moved(corrected, np.zeros_like(here.rates), self._turn)
+        return taylor, self.moved(corrected, np.zeros_like(here.rates))
 
     def reach(self, here: Stand, time: float, drives: Array, tol: float) -> Stand:
         """Go from where a motion stands to a time.
@@ -229,7 +235,7 @@ class SparseModel:
                 renewed = not rate <= CONTRACTS
                 if renewed:
                     self._factor()
-                state = moved(state, -self.factors.solve(self.elements.phi[self.kept]), self._turn)
+                state = self.moved(state, -self.factors.solve(self.elements.phi[self.kept]))
                 last, residual = residual, self._evaluate(state, drives)
                 rate, iterations = residual / last, iterations + 1
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)

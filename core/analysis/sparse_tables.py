@@ -65,7 +65,7 @@ class SparseTables:
         return found
 
     def _moves(self, n: int, given: Memory) -> list[Words]:
-        """The state by the step: see `stand.moved`."""
+        """The state by the step: see `SparseModel.moved`."""
         state, step, new = self._at("state"), self._at("step"), numbers(given.take(4 * n))
         q, pi = state[3 * n : 7 * n], step[3 * n : 6 * n]
         slots = np.zeros((TO.stop, n), np.intp)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..trajectory import Array
-from .turning import Turn
 
 # An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.
 CONTRACTS = 1e-2
@@ -41,13 +40,6 @@ class Stand:
     pivot: float = 0.0
     largest_pivot: float = 0.0
     orientation: bytes = b""
-
-
-def moved(state: Array, step: Array, turn: Turn) -> Array:
-    """The state after a step of the unknowns, of several poses of each; the Euler parameters have length one again."""
-    n = turn.bodies
-    q = turn(state[3 * n : 7 * n], step[3 * n : 6 * n])
-    return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])
 
 
 def distance(change: Array, scale: Array) -> Array:

@@ -24,14 +24,10 @@ def turned() -> Program:
 
 
 class Turn:
-    """Turns Euler parameters by small global rotations; to compute that with arrays took an eighth of a sparse sweep.
-
-    Attributes:
-        bodies: how many.
-    """
+    """Turns Euler parameters by small global rotations; to compute that with arrays took an eighth of a sparse sweep."""
 
     def __init__(self, bodies: int, *, compiled: bool) -> None:
-        self.bodies, plan = bodies, Plan({"turned": turned()}, {str(k): k for k in range(TO.stop)})
+        plan = Plan({"turned": turned()}, {str(k): k for k in range(TO.stop)})
         compiled = compiled and available()
         self._executor: Executor = LlvmExecutor(LlvmCode(plan), bodies) if compiled else NumpyExecutor(plan, bodies)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ctypes
+import inspect
 import pickle
 from collections.abc import Callable, Mapping
+from functools import cache
 
 from . import compiler, image, shelf
 
@@ -40,8 +42,14 @@ def find(content: str) -> Code | None:
 
 
 def told(content: str) -> bytes:
-    """What determines machine code: this for any processor and compiler, and both of them; and how it is loaded."""
-    return "\n".join((*compiler.processor(), str(image.possible()), content)).encode()
+    """What determines machine code: this for any processor and compiler, both of them, and what is made of it here."""
+    return "\n".join((*compiler.processor(), str(image.possible()), _sources(), content)).encode()
+
+
+@cache
+def _sources() -> str:
+    """The text that says how code is compiled, and put together."""
+    return "".join(inspect.getsource(each) for each in (compiler, image))
 
 
 def _made(text: str) -> bytes:

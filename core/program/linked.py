@@ -18,8 +18,6 @@ Rows = NDArray[np.intp]
 Words = NDArray[np.uint32]
 ABREAST = 8
 """Lanes of which each operation is done before the next: none waits for the one before it."""
-
-
 MOST = 2**26
 """Rows that words of 32 bits can name, of vectors of eight numbers."""
 
@@ -112,6 +110,6 @@ def joined(parts: Iterable[Words]) -> Words:
 _OPS = {kind: op for op, kind in KINDS.items()}
 
 
-def _head(op: str, numbers: int) -> Rows:
+def _head(op: str, size: int) -> Rows:
     """What a stretch of so many numbers begins with."""
-    return np.array([KINDS[op], 4 * numbers])
+    return np.array([KINDS[op], 4 * size])
