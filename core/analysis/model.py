@@ -94,14 +94,14 @@ class Model:
         self.sampled = [self.slots[TIME]]
         self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
         fans = bool(self.request.varied) and not self.request.state
-        self._tangent = "motion" if self.request.order == 2 else "tangent"
+        self._tangent = "outputs" if self.request.order == 2 else "tangent"
         kept = [slot for name in self._wanted() for slot in self.vectors[name]]
         self.rows = self._rows()
         self.kept = len(kept) + len(self._tests)
         self._plan = Plan(
             self.programs,
             self.slots,
-            after=("motion", "outputs") if self.request.order else ("outputs",),
+            after=("outputs",),
             alone=following.ALONE,
             joined=() if self.request.state else following.JOINED,
             onward=(self._tangent,),

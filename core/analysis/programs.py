@@ -2,8 +2,9 @@
 
     newton    state, drives                      -> state, residual, sigma, orientation   one Newton-Raphson iteration; what is
                                                     said of residual and rows is that before it
-    motion    state, drives' rates               -> v, a         one factorisation at the converged pose, solved for nu and gamma
-    outputs   state, v, a                        -> wanted motions, closure, leftover, branch
+    outputs   state, drives' rates               -> v, a, wanted motions, closure, leftover, branch   one factorisation at the
+                                                    converged pose, solved for nu and gamma
+    tangent   state, drives' rates               -> v, a         where a march begins, if not all of it is put out
 
 Those that follow a motion are in `following`. Each is traced for what is asked: no acceleration, no gamma; no velocity, no
 factorisation after the last iteration.
@@ -116,14 +117,21 @@ class Tracer:
         self.store_state(out, self.formulation.retract(self.at, [-x for x in step]))
         return program("newton", self.tape, out, self.prepared)
 
-    def motion(self, name: str, order: int) -> Program:
-        """Rates of the unknowns, and with order 2 their accelerations: one factorisation for both."""
+    def tangent(self) -> Program:
+        """Rates of the unknowns and their accelerations."""
+        return program("tangent", self.tape, self._solve_rates(2)[-1], self.prepared)
+
+    def _solve_rates(self, order: int) -> tuple[list[Scalar], list[Scalar], dict[int, Scalar]]:
+        """v and a as far as an order wants them, else zero, and by slot: one factorisation for both."""
         out: dict[int, Scalar] = {}
-        v = self._factor.solve(self._kept(self.formulation.nu(self.at)))
-        self.store(out, RATE, v)
+        v = a = list[Scalar]([0.0] * self.unknowns)
+        if order:
+            v = self._factor.solve(self._kept(self.formulation.nu(self.at)))
+            self.store(out, RATE, v)
         if order == 2:
-            self.store(out, RATE_T, self._factor.solve(self._kept(self.formulation.gamma(self.at, v))))
-        return program(name, self.tape, out, self.prepared)
+            a = self._factor.solve(self._kept(self.formulation.gamma(self.at, v)))
+            self.store(out, RATE_T, a)
+        return v, a, out
 
     @property
     def at_rest(self) -> Mapping[str, Sequence[float]]:
@@ -132,14 +140,25 @@ class Tracer:
         return {f"given {label} {name}": value for name in self.given for label, value in values.items()}
 
     def outputs(self) -> Program:
-        """The wanted motions, and the tests of a solution: closure, redundant rows, branch."""
+        """The wanted motions with the rates they need, and the tests of a solution: closure, redundant rows, branch.
+
+        All in one: what follows from the pose is computed once, and beside the elimination, whose pivots wait for one another.
+        """
+        v, a, rates = self._solve_rates(self.request.order)
+        return self._outputs(v, a, rates)
+
+    def outputs_of_rates(self) -> Program:
+        """As `outputs`, for rates that are given."""
+        return self._outputs(self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns), {})
+
+    def _outputs(self, v: Sequence[Scalar], a: Sequence[Scalar], rates: Mapping[int, Scalar]) -> Program:
         phi = self.formulation.phi(self.at)
         out: dict[int, Scalar] = {
+            **rates,
             self.layout.scalar("closure"): largest(self._kept(phi)),
             self.layout.scalar("leftover"): largest([phi[k] for k in self.selection.dropped]),
             self.layout.scalar("branch"): reduce(minimum, self.formulation.branch(self.at), 1.0),
         }
-        v, a = self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns)
         motions = self.formulation.motions(self.at, v)
         accelerations = self.formulation.accelerations(self.at, v, a)
         for name in self.request.points:

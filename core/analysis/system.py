@@ -81,7 +81,7 @@ class System:
         }
         programs = [program(name, tracer.tape, dict(zip(*each, strict=True))) for name, each in wanted.items()]
         self._vectors, slots = tracer.layout.vectors, tracer.layout.slots
-        self._plan = Plan({each.name: each for each in [*programs, tracer.outputs()]}, slots)
+        self._plan = Plan({each.name: each for each in [*programs, tracer.outputs_of_rates()]}, slots)
         self._sampled = [tracer.layout.scalar(TIME), *(k for name in model.request.drivers for k in self._vectors[f"drive {name}"])]
         self._executors: dict[int, NumpyExecutor] = {}
 

@@ -87,10 +87,8 @@ def _source() -> bytes:
 def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> Tracing:
     tracer = Tracer(mechanism, request, section)
     programs = [tracer.newton(), following.predict(tracer)]
-    if request.order:
-        programs.append(tracer.motion("motion", request.order))
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
-        programs.append(tracer.motion("tangent", 2))
+        programs.append(tracer.tangent())
     if not request.state:
         programs.append(following.extrapolate(tracer))
     programs.append(tracer.outputs())

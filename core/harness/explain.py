@@ -38,10 +38,8 @@ def explain(case: Case) -> list[str]:
 
 def _flops(model: Model) -> str:
     """Operations of one sample: of each Newton iteration, and once at the end."""
-    newton = model.programs["newton"].flops
-    last = [(name, model.programs[name].flops) for name in ("motion", "outputs") if name in model.programs]
-    parts = " + ".join(f"{name} {flops}" for name, flops in last)
-    return f"{newton} operations an iteration, {parts} once: {newton + sum(flops for _, flops in last)} with one iteration"
+    newton, outputs = (model.programs[name].flops for name in ("newton", "outputs"))
+    return f"{newton} operations an iteration, outputs {outputs} once: {newton + outputs} with one iteration"
 
 
 def _names(names: Sequence[str]) -> str:

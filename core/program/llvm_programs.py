@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from .llvm_code import Lines
 from .lowering import lowered
+from .ordering import ordered
 from .straight_line import Program
 from .trace import LEAVES, Node, operands, place_of
 
@@ -18,6 +19,7 @@ def function(program: Program, width: int) -> str:
     program = lowered(program)
     if program.times > 1:
         return _repeated(program, width)
+    program = ordered(program)
     return f"define void @{program.name}(ptr noalias %lane, ptr %table) {{\n  {_Straight(program, width).text}\n  ret void\n}}\n"
 
 

@@ -21,13 +21,15 @@ from . import (
     llvm_programs,
     llvm_walk,
     lowering,
+    ordering,
     shelf,
     trace,
     walk,
 )
 from .executor import Plan
 
-SOURCES = executor, llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_plan, llvm_programs, llvm_walk, lowering, trace, walk
+_WRITERS = llvm_code, llvm_fan, llvm_follow, llvm_loops, llvm_plan, llvm_programs, llvm_walk
+SOURCES = *_WRITERS, executor, lowering, ordering, trace, walk
 """Modules that write text or tables, and what they take from others."""
 _NEEDED = llvm_plan.rows, llvm_loops.settle
 LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {

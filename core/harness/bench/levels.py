@@ -117,4 +117,4 @@ def flops_of(model: Model, iterations: float, lanes: Sequence[str] = SAMPLES) ->
         lanes: what predicts and tests lanes that are `SAMPLES` of a motion, or `MOTIONS`; of the first few other programs do.
     """
     sizes = {name: each["flops"] for name, each in model.sizes.items()}
-    return iterations * sizes["newton"] + sum(sizes[name] for name in ("motion", "outputs", *lanes))
+    return iterations * sizes["newton"] + sum(sizes[name] for name in ("outputs", *lanes))
