@@ -143,6 +143,8 @@ class Absolute(Motion):
 class Path:
     """The way a mechanism is driven: the motions of its drivers over time; drivers without a motion hold their design value.
 
+    Two are equal where motions and times are, to the last bit. The times do not change.
+
     Attributes:
         motions: by driver name.
         times: of the samples, in the order wanted [s], shape (n,).
@@ -152,6 +154,22 @@ class Path:
     motions: Mapping[str, Motion]
     times: Array
     design: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Path) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    @cached_property
+    def _content(self) -> tuple[Any, ...]:
+        return tuple(self.motions.items()), self.times.tobytes(), tuple(self.design.items())
+
+    @property
+    def ours(self) -> bool:
+        """Whether all motions are of this module: what is equal then means the same."""
+        motions = (each.motion if isinstance(each, Absolute) else each for each in self.motions.values())
+        return all(type(each).__module__ == __name__ for each in motions)
 
     def where(self, t: float) -> str:
         """The values of the moving drivers at time t, to read."""

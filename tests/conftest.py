@@ -7,10 +7,10 @@ import kincheck.adapters
 import kincheck.cases
 import pytest
 from kincheck.core import Joint
-from kincheck.core.analysis import model
 from kincheck.core.harness import cli
 
 from .fakes import Fake, crank
+from .running import forget_recent
 
 NATIVE = Fake("native")
 
@@ -19,7 +19,7 @@ NATIVE = Fake("native")
 def no_recent_models():
     """What a test has changed holds for the models it makes."""
     yield
-    model._recent.cache_clear()
+    forget_recent()
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
-"""Run bare programs on a block, as the executors run a model's."""
+"""Run bare programs on a block, as the executors run a model's; and make all ready anew."""
 
 import numpy as np
+from kincheck.core.analysis import model, prepare, route
 from kincheck.core.program import NumpyExecutor, Plan
 
 
@@ -17,3 +18,9 @@ def run_on(programs, block, name="p"):
     executor = numpy_executor(programs, np.asarray(block, dtype=float))
     executor.run(name)
     block[:] = executor.get(range(len(block)))
+
+
+def forget_recent():
+    """What is solved next is made ready anew."""
+    for kept in (model._recent, route._recent, prepare._last_large):
+        kept.cache_clear()

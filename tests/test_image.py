@@ -10,10 +10,10 @@ from ctypes import CFUNCTYPE, c_double, c_int64
 import numpy as np
 import pytest
 from kincheck.core import solve
-from kincheck.core.analysis import model
 from kincheck.core.program import compiled, compiler, image, machine_code
 
 from .mechanisms import mcpherson
+from .running import forget_recent
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 images = pytest.mark.skipif(not image.possible(), reason="images run on x86-64 under Linux")
@@ -75,7 +75,7 @@ def test_code_that_calls_something_outside_makes_no_image():
 
 
 def positions() -> np.ndarray:
-    model._recent.cache_clear()
+    forget_recent()
     machine_code._made.cache_clear()
     return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
 

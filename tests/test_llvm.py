@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kincheck.core import Revolute, solve, solve_designs
-from kincheck.core.analysis import model, tracing
+from kincheck.core.analysis import tracing
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
@@ -36,6 +36,7 @@ from kincheck.core.program import (
 )
 
 from .mechanisms import four_bar, mcpherson
+from .running import forget_recent
 from .test_chain import chain
 
 llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
@@ -258,7 +259,7 @@ TIE_ROD = np.array([1.115, 0.665, 0.118])
 def test_vectors_of_every_width_give_the_same(way, width, monkeypatch):
     expected, asked = WAYS[way](), list[int]()
     monkeypatch.setattr(compiler, "vector_width", lambda: asked.append(width) or width)
-    model._recent.cache_clear()
+    forget_recent()
     found = WAYS[way]()
     assert asked  # whatever was kept was made for other vectors
     for name, motion in expected.items():

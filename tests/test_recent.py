@@ -6,9 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from kincheck.core import Spherical, solve, solve_designs
-from kincheck.core.analysis import model
+from kincheck.core.analysis import cascade, march, model, route, sparse
+from kincheck.core.harness.bench.size import circle
+from kincheck.core.motions import Absolute, Motion, Path, Ramp, Sine
 
 from .mechanisms import mcpherson
+from .test_chain import chain
 
 STROKES = np.linspace(-0.05, 0.05, 21)
 
@@ -65,4 +68,75 @@ def test_joints_of_a_users_own_are_made_anew(made):
     assert any(type(j) is Ball for j in joints)
     for _ in range(2):
         assert solve(replace(mcpherson(), joints=joints), "stroke", STROKES).solved.all()
+    assert len(made) == 2
+
+
+@pytest.fixture
+def bound(monkeypatch):
+    """What was bound to lanes, a route each."""
+    routes, bind = [], march.Marcher.__init__
+    monkeypatch.setattr(march.Marcher, "__init__", lambda self, *given: (routes.append(given[0]), bind(self, *given))[1])
+    return routes
+
+
+def test_the_same_samples_are_laid_out_once(bound):
+    first, again = (solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy() for _ in range(2))
+    assert len(bound) == 1
+    np.testing.assert_array_equal(first, again)
+    for k, other in enumerate([{"values": STROKES[:-1]}, {"rate": 2.0}, {"values": STROKES + 1e-15}, {"order": 1}], start=2):
+        solve(mcpherson(), "stroke", **({"values": STROKES} | other))
+        assert len(bound) == k
+
+
+def test_samples_of_the_users_may_change_afterwards():
+    strokes = STROKES.copy()
+    far = solve(mcpherson(), "stroke", strokes).points["wheel"].position[0].copy()
+    strokes *= 0.5
+    near = solve(mcpherson(), "stroke", strokes).points["wheel"].position
+    assert np.abs(near[0] - far).max() > 1e-3
+    np.testing.assert_array_equal(solve(mcpherson(), "stroke", STROKES).points["wheel"].position[0], far)
+
+
+def test_motions_of_a_users_own_are_followed_anew(bound):
+    """They may be equal, and yet not mean the same."""
+
+    @dataclass(frozen=True)
+    class Mine(Motion):
+        def at(self, t):
+            return 0.0 * t, 0.0 * t, 0.0 * t
+
+    for motion in (Mine(), Absolute(Mine(), 0.0)):
+        assert not Path({"steer": motion}, np.ones(1)).ours
+    for motion in (Ramp(1.0), Absolute(Sine(1.0, 1.0, 0.0), 0.2)):
+        assert Path({"steer": motion}, np.ones(1)).ours
+    request = route.Request(("stroke",), ("wheel",))
+    for number in (1, 2):
+        path = Path({"stroke": Mine()}, STROKES)
+        march.march(route.recent_route(mcpherson(), request, path), 1e-12)
+        assert len(bound) == number
+
+
+def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
+    monkeypatch.setattr(route, "LONGEST_KEPT", 20)
+    for number in (1, 2):
+        solve(mcpherson(), "stroke", STROKES)
+        assert len(bound) == number
+
+
+@pytest.mark.parametrize(
+    ("large", "kind"), [(chain(12), (cascade.Cascade, "__init__")), (circle(21).mechanism, (sparse.SparseModel, "__init__"))]
+)
+def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
+    made, make = [], getattr(*kind)
+    monkeypatch.setattr(*kind, lambda self, *given, **named: (made.append(given[0]), make(self, *given, **named))[1])
+    values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
+    first = solve(large, driver, values).points
+    other = solve(large, driver, values[::2]).points
+    again = solve(large, driver, values).points
+    assert len(made) == 1
+    for name, motion in first.items():
+        np.testing.assert_array_equal(again[name].acceleration, motion.acceleration)
+        assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-9
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(solve, large, driver, values).result()
     assert len(made) == 2

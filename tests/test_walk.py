@@ -28,6 +28,7 @@ from kincheck.core.program.lowering import lowered, unrolled
 from kincheck.core.program.walk import walk
 
 from .mechanisms import four_bar, mcpherson
+from .running import forget_recent
 from .test_chain import chain
 from .test_llvm import OPERATIONS
 
@@ -176,7 +177,7 @@ def request_of(mechanism) -> Request:
 @pytest.mark.parametrize("way", ["designs", "components"])
 def test_designs_and_components_are_the_same_before_and_after(way, monkeypatch):
     def run() -> list[np.ndarray]:
-        models._recent.cache_clear()
+        forget_recent()
         rod = np.array([1.115, 0.665, 0.118])
         places = {"joints.tie_rod.points.0": rod + np.linspace(0.0, 0.01, 11)[:, None]}
         if way == "designs":

@@ -9,9 +9,8 @@ alone, joined   all that is tested, and the tolerance   -> margin    positive wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import reduce
-from operator import mul
 
 import numpy as np
 
@@ -120,22 +119,27 @@ def weights_of_groups(times: Array, lanes: int) -> Array:
     """
     found, wanted = np.zeros((NODES, len(times))), np.arange(lanes, len(times))
     before = wanted // lanes * lanes - lanes
-    found[:, wanted] = _lagrange(times[wanted], [times[before + place_of(k, lanes)] for k in range(NODES)])
+    found[:, wanted] = _lagrange(times[wanted], times[before + [[place_of(k, lanes)] for k in range(NODES)]])
     return found
 
 
 def weights_of_samples(times: Array) -> Array:
     """Weights of the `NODES` samples before each, by the places at which they are kept (`Plan.past`); otherwise as above."""
     found, wanted = np.zeros((NODES, len(times))), np.arange(NODES, len(times))
-    nodes = [wanted - 1 - (wanted - 1 - k) % NODES for k in range(NODES)]  # the last sample that was kept at each place
-    found[:, wanted] = _lagrange(times[wanted], [times[each] for each in nodes])
+    nodes = wanted - 1 - (wanted - 1 - np.arange(NODES)[:, None]) % NODES  # the last sample that was kept at each place
+    found[:, wanted] = _lagrange(times[wanted], times[nodes])
     return found
 
 
-def _lagrange(times: Array, nodes: Sequence[Array]) -> list[Array]:
-    """Lagrange's weights of nodes, each of the same shape as the times."""
+def _lagrange(times: Array, nodes: Array) -> Array:
+    """Lagrange's weights of nodes for the times, shape (n,), of both shape (NODES, n)."""
+    found, ahead = np.empty_like(nodes), times - nodes
     with np.errstate(all="ignore"):
-        return [reduce(mul, ((times - b) / (a - b) for j, b in enumerate(nodes) if j != k)) for k, a in enumerate(nodes)]
+        for k, node in enumerate(nodes):  # one after the other: there may be millions of samples
+            factors = ahead / (node - nodes)
+            factors[k] = 1.0
+            found[k] = factors.prod(axis=0)
+    return found
 
 
 def tests(tracer: Tracer, *, neighbours: bool) -> list[Program]:

@@ -11,16 +11,17 @@ and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
+from threading import get_ident
 
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Trajectory
 from .equations import Style, frames
-from .model import recent_model
 from .request import Request
-from .route import Route
+from .route import recent_route
 from .sweep import follow
+from .tracing import ours
 
 # Up to as many bodies one program is made ready in a third of a second.
 ONE_PROGRAM = 20
@@ -38,20 +39,38 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
-    count = len(mechanism.moving)
-    if count > ONE_PROGRAM and request.style is Style.NATIVE and not mechanism.couplers:
-        # few mechanisms are so large: the others need not wait for the import
-        from .cascade import Cascade
-        from .cascade_sweep import CascadeSweep
-        from .components import components
+    if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE and not mechanism.couplers:
+        make = _last_large(mechanism, request, get_ident()) if ours(mechanism) else _large(mechanism, request)
+        if make:
+            return make(path)
+    return partial(follow, recent_route(mechanism, request, path))
 
-        parts = components(mechanism, frames(mechanism))
-        if max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
-            return CascadeSweep(Cascade(mechanism, request, parts), path).solve
-        if count > IRREDUCIBLE:
-            from .sparse import SparseModel
-            from .sparse_sweep import solve_sparse
 
-            model = SparseModel(mechanism, compiled=request.compiled)
-            return partial(solve_sparse, model, path, request.points, request.bodies, request.order)
-    return partial(follow, Route(recent_model(mechanism, request), path))
+def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] | None:
+    """Component by component, or as a sparse system; None where one program is better."""
+    # few mechanisms are so large: the others need not wait for the import
+    from .cascade import Cascade
+    from .cascade_sweep import CascadeSweep
+    from .components import components
+
+    parts = components(mechanism, frames(mechanism))
+    if max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
+        cascade = Cascade(mechanism, request, parts)
+        return lambda path: CascadeSweep(cascade, path).solve
+    if len(mechanism.moving) <= IRREDUCIBLE:
+        return None
+    from .sparse import SparseModel
+    from .sparse_sweep import solve_sparse
+
+    model = SparseModel(mechanism, compiled=request.compiled)
+    return lambda path: partial(solve_sparse, model, path, request.points, request.bodies, request.order)
+
+
+@lru_cache(maxsize=1)
+def _last_large(mechanism: Mechanism, request: Request, thread: int) -> Callable[[Path], Solver] | None:
+    """The same, and once for whoever solves one again and again; one only, for the largest fill much of the memory.
+
+    Args:
+        thread: which alone uses it: it is solved in place.
+    """
+    return _large(mechanism, request)

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mechanism import Mechanism
 from ..motions import Path
 from ..program import Side
 from ..trajectory import Array
 from .following import weights_of_groups, weights_of_samples
-from .model import Bound, Model
+from .model import RECENT, Bound, Model, recent_model
+from .request import Request
+from .tracing import ours
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
 LANES = 256
+# Routes of more samples are not kept: to make them takes a small part of what solving them does, and megabytes.
+LONGEST_KEPT = 10_000
 # Samples that are in the order of their times.
 AS_THEY_ARE = slice(None)
 
@@ -105,3 +110,17 @@ class Route:
     def sampled(self, times: Array) -> Array:
         """What is given at the times, shape (sampled, n)."""
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
+
+
+def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
+    """A route, and no more than one for the same mechanism, request and path as long as it is among the last few asked for.
+
+    To make one and bind it to lanes takes twenty times as long as to solve it.
+    """
+    kept = len(path.times) <= LONGEST_KEPT and path.ours and ours(mechanism)
+    return _recent(mechanism, request, path) if kept else Route(recent_model(mechanism, request), path)
+
+
+@lru_cache(maxsize=RECENT)
+def _recent(mechanism: Mechanism, request: Request, path: Path) -> Route:
+    return Route(recent_model(mechanism, request), path)

@@ -84,11 +84,11 @@ def asked(
         ("point", wanted, mechanism.points),
         ("body", bodies, mechanism.bodies),
     ):
+        there = [each.name for each in known]
         for name in names:
-            there = [each.name for each in known]
             if name not in there:
                 require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
-            _require(name in there, f"there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
+                raise SolveError(f"solve: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
     path = Path({**(motions or {}), driver: Ramp(rate)}, np.asarray(values, dtype=np.float64) / rate)
     return path, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style))
 

@@ -20,7 +20,7 @@ FIRST = STAGES[1:4]
 def first_use(clock: Sequence[float]) -> None:
     """Build and solve the pickled case on standard input; print the seconds of all stages as a line of JSON.
 
-    Solved anew is what was solved before, all made ready again as `solve` does.
+    Solved anew is what was solved before, asked for again as of `solve`.
 
     Args:
         clock: when the process began, had imported numpy and then what it takes to solve.
@@ -35,7 +35,7 @@ def first_use(clock: Sequence[float]) -> None:
             level.solve(model, case, tol)
         now.append(perf_counter())
     anew = 0.0
-    for _ in range(2):  # the first time the model is not one of those that are kept
+    for _ in range(2):  # the first time nothing of it is among what is kept
         begin = perf_counter()
         prepare(case.mechanism, level.request(case), case.sweep.path)(tol)
         anew = perf_counter() - begin
