@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kincheck.core.analysis.following import weights_of_groups, weights_of_samples
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.request import EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, Request
+from kincheck.core.analysis.request import ACCEPT, EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, Request
 from kincheck.core.analysis.sweep import sweep
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import NODES, place_of
@@ -68,6 +68,10 @@ def test_what_is_continued_is_all_that_tests_need_and_no_step_behind(order):
     now = {slots[TIME]: slots[FROM + TIME], slots[FROM + TIME]: slots[EARLIER + TIME]}
     assert {*now.items()} <= {*plan.carried}
     assert {(slots[TIME], slots[FROM + TIME]), (slots[TIME], slots[EARLIER + TIME])} <= {*plan.continued}
+    # what stands in the last lane `extrapolate` puts out itself
+    puts = plan.programs["extrapolate"].outputs
+    assert {*plan.moved} == {pair for pair in plan.continued if pair[1] not in puts}
+    assert {target for _, target in plan.moved} == {slots[name] for name in (FROM + TIME, EARLIER + TIME, *ACCEPT)}
 
 
 GRIDS = {

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from kincheck.core.analysis.march import march
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.request import SIGMA, Request
+from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request
 from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp
-from kincheck.core.program import LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program
+from kincheck.core.program import NODES, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program
 from kincheck.core.program.compiler import available
 from kincheck.core.program.executor import in_order
 from kincheck.core.program.llvm_plan import TOGETHER, PlanInMemory
@@ -210,3 +210,43 @@ def test_a_window_is_memory_and_takes_what_is_arranged(compiled, lanes):
     copy = executor.get(range(1, 3))
     executor.clear()
     np.testing.assert_array_equal(copy, values)
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, monkeypatch):
+    """Lanes of a group: to slots that are read, that are put out elsewhere, and that nobody reads; and values used on the way."""
+    monkeypatch.setattr("kincheck.core.program.machine_code.OFTEN", 0)
+    tape = Tape()
+    x, last, first, other = tape.input(0), tape.at(NODES - 1, 0), tape.at(0, 0), tape.at(NODES - 1, 1)
+    total = x
+    for k in range(40):  # more than there are registers for
+        total = total * (last + first * float(k))
+    out = {0: total, 1: last, 2: first, 3: other, 4: tape.input(2), 5: other + first, 6: tape.input(1)}
+    plan = Plan({"f": program("f", tape, out)}, {str(k): k for k in range(7)})
+    executor = LlvmExecutor(LlvmCode(plan), 8) if compiled else NumpyExecutor(plan, 8)
+    group = executor.margin if compiled else 8
+    values = np.random.default_rng(5).uniform(0.2, 0.4, size=(7, 8))
+    heads = np.arange(8) // group * group
+    for _ in range(2):  # walked, and compiled
+        executor.put(range(7), values)
+        executor.run("f")
+        lasts, firsts = values[:, heads + group - 1], values[:, heads]
+        expected = values[0]
+        for k in range(40):
+            expected = expected * (lasts[0] + firsts[0] * float(k))
+        found = executor.get(range(7))
+        assert np.abs(found[0] / expected - 1.0).max() <= 1e-13
+        np.testing.assert_array_equal(found[1:], [lasts[0], firsts[0], lasts[1], values[2], lasts[1] + firsts[0], values[1]])
+
+
+@pytest.mark.parametrize("order", [0, 2])
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_at_its_end_a_side_stands_where_it_was_followed_to(compiled, order):
+    """A sweep leaves no anchors there; who follows a side by hand goes on from one."""
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), compiled=compiled, order=order)
+    whole = march(route, TOL)
+    visited = march(route, TOL, visit={0, 81, 103, 160}).visited
+    time = route.model.slots[FROM + TIME]
+    assert {k: float(lane[time]) for k, lane in visited.items()} == {k: float(route.path.times[k]) for k in (0, 81, 103, 160)}
+    again = march(route, TOL)
+    np.testing.assert_array_equal(again.kept, whole.kept)

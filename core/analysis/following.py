@@ -9,7 +9,7 @@ alone, joined   all that is tested, and the tolerance   -> margin    positive wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import reduce
 
 import numpy as np
@@ -85,7 +85,10 @@ def predict(tracer: Tracer) -> Program:
 
 def extrapolate(tracer: Tracer) -> Program:
     """The state from what it is in the group of lanes before, by the weights of those; see `weights_of_groups`."""
-    return _continued(tracer, "extrapolate", tracer.tape.at)
+    # and what is carried of the last of them, which is at hand here; but its time is no longer there
+    time, last = tracer.layout.scalar(TIME), NODES - 1
+    stood = {target: tracer.tape.at(last, source) for source, target in continued(tracer) if source not in (time, target)}
+    return _continued(tracer, "extrapolate", tracer.tape.at, stood)
 
 
 def extend(tracer: Tracer) -> Program:
@@ -93,13 +96,13 @@ def extend(tracer: Tracer) -> Program:
     state = [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[name]]
     past = tracer.vector(PAST, NODES * len(state))
     place = {slot: k for k, slot in enumerate(state)}
-    return _continued(tracer, "extend", lambda k, slot: past[k * len(state) + place[slot]])
+    return _continued(tracer, "extend", lambda k, slot: past[k * len(state) + place[slot]], {})
 
 
-def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar]) -> Program:
-    """The state by Lagrange's formula, without v and a; at(k, slot) is what a slot was at node k."""
+def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]) -> Program:
+    """The state by Lagrange's formula, without v and a; at(k, slot) is what a slot was at node k. And what else is put out."""
     weights = tracer.vector(WEIGHT, NODES)
-    out: dict[int, Scalar] = {}
+    out = dict(further)
     for part, value in tracer.formulation.design.items():
         slots = tracer.layout.vector(part, len(value))
         found = [sum((w * at(k, slot) for k, w in enumerate(weights)), 0.0) for slot in slots]

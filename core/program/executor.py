@@ -31,8 +31,8 @@ class Plan:
     programs in `after`, and at last those of a test, whose margin is positive where the lane may be accepted.
 
     Where there is a program `extrapolate` it takes the place of `predict` for lanes that follow a group that was accepted whole:
-    it goes by what stands in those lanes, and needs nothing of what `onward` puts out. So does `extend`, which takes it for lanes
-    that have come through `NODES` samples: it goes by what is remembered of these.
+    it goes by what stands in those lanes, and needs nothing of what `onward` puts out. What is carried of the last of them it may
+    put out itself. So does `extend`, for lanes that have come through `NODES` samples: it goes by what is remembered of these.
 
     Attributes:
         programs: by name; they share one layout of slots.
@@ -82,6 +82,11 @@ class Plan:
     def carried_on(self) -> Sequence[tuple[int, int]]:
         """What is carried where those after it are not predicted by `predict`."""
         return self.continued or self.carried
+
+    @property
+    def moved(self) -> Sequence[tuple[int, int]]:
+        """What of that `extrapolate` does not put out itself."""
+        return [pair for pair in self.carried_on if pair[1] not in self.programs["extrapolate"].outputs]
 
     def extrapolates(self, lanes: int) -> bool:
         """Whether a group of that many lanes is followed by extrapolation."""

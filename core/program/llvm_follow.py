@@ -15,7 +15,7 @@ forget begins the worst anew, and clears that field: the calls after it go on. `
 
 
 def follow(width: int) -> str:
-    """See `Track`: W samples at a time, and on from the last one accepted.
+    """See `Track`: W samples at a time, and on from the last one accepted. Where nobody stays at the end, no anchor is left there.
 
     What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends there.
     """
@@ -90,7 +90,15 @@ backward:
   {over("keep_turned", "kept", "ptr %out_here", "i64 %row")}
   br label %kept
 kept:
-  br i1 %whole, label %pass, label %onward
+  br i1 %whole, label %pass, label %other
+other:
+  %there = xor i1 %further, true
+  %leaves = xor i1 %stays, true
+  %over = and i1 %there, %leaves
+  br i1 %over, label %leave, label %onward
+leave:
+  {over("end_worst", "worst", "ptr %worst_here", "ptr %worst")}
+  ret i64 %next
 pass:
   {over("spread", "moves", f"i64 {width - 1}")}
   br label %head
@@ -109,11 +117,14 @@ end:
     turned = Rows(width)
     place = turned.number("%numbers", turned.product("%stride", "%row"))
     turned.lines.append(f"store {vector} {turned.turned(turned.read(turned.entry()))}, ptr {place}, align 8")
+    places = "ptr %plan, ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop"
+    stay = f"""  %at = call i64 @go({places}, i1 true)
+  ret i64 %at"""
     return f"""declare i64 @llvm.cttz.i64(i64, i1)
 declare i64 @llvm.smin.i64(i64, i64)
 declare i64 @llvm.smax.i64(i64, i64)
-{turned.function("keep_turned", "ptr %numbers", "i64 %stride")}{_worst(width)}{_run()}""" + function(
-        "i64 @follow(ptr %plan, ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop)", body
+{turned.function("keep_turned", "ptr %numbers", "i64 %stride")}{_worst(width)}{_run()}""" + "".join(
+        [function(f"internal i64 @go({places}, i1 %stays)", body), function(f"i64 @follow({places})", stay)]
     )
 
 
@@ -132,7 +143,7 @@ one:
   %offset = mul i64 %k, {len(SIDE)}
   %side = getelementptr i64, ptr %table, i64 %offset
   {_told("side", SIDE)}
-  %at = call i64 @follow(ptr %plan, ptr %motion, ptr %side, ptr %start, i64 0, i64 %count)
+  %at = call i64 @go(ptr %plan, ptr %motion, ptr %side, ptr %start, i64 0, i64 %count, i1 false)
   %reached_at = getelementptr i64, ptr %side, i64 {_index(SIDE, "reached")}
   store i64 %at, ptr %reached_at, align 8
   %ended = icmp ne i64 %at, %count

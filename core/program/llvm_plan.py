@@ -145,7 +145,7 @@ class PlanInMemory:
         pairs: dict[str, Sequence[tuple[int, ...]]] = {
             "carried": plan.carried,
             "returned": [pair[::-1] for pair in reversed(plan.carried)],
-            "moves": in_order(plan.carried_on if extrapolates else plan.carried),
+            "moves": in_order(plan.moved if extrapolates else plan.carried),
             "continued": in_order(plan.carried_on),
             "remembered": [(slot, k) for k, slot in enumerate(plan.remembered)],
         }

@@ -149,10 +149,14 @@ def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, 
     for k, node in enumerate(nodes):
         if node[0] in ("input", "node") and due[k]:
             last_read[int(node[1])] = max(due[k][0], last_read.get(int(node[1]), 0))
-    last_read |= {int(nodes[k][1]): end for k in program.outputs.values() if nodes[k][0] in ("input", "node")}
+    stands = {slot: int(nodes[k][1]) for slot, k in program.outputs.items() if nodes[k][0] in ("input", "node")}
+    # what stands in a slot is put out where it is used last anyway, if nobody reads what it overwrites
+    read = last_read.keys() | stands.values()
+    early = {slot for slot in stands if due[program.outputs[slot]] and slot not in read}
+    last_read |= {source: end for slot, source in stands.items() if slot not in early}
     writes: dict[int, list[tuple[int, int]]] = {}
     for slot, k in program.outputs.items():
-        when = end if nodes[k][0] in LEAVES else max(k, last_read.get(slot, 0))
+        when = due[k][0] if slot in early else end if nodes[k][0] in LEAVES else max(k, last_read.get(slot, 0))
         writes.setdefault(when, []).append((slot, k))
         due[k] = sorted([*due[k], when], reverse=True)
     return due, writes

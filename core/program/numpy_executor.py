@@ -224,8 +224,8 @@ class NumpyExecutor:
             for x in set(arguments):
                 if last[x] == k and x not in kept and program.nodes[x][0] not in LEAVES:
                     free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
-        for node in kept:  # an input that is put out elsewhere must survive the output that overwrites its slot
-            if program.nodes[node][0] == "input":
+        for node in kept:  # what stood in a slot and is put out elsewhere must survive the output that overwrites it
+            if program.nodes[node][0] in ("input", "node"):
                 copy = np.empty(shape)
                 calls.append((np.copyto, (copy, place[node])))
                 place[node] = copy

@@ -71,12 +71,13 @@ class NumpyTrack:
         """See `Track`."""
         executor, samples = self._executor, self._sides[side].samples
         plan, block, lanes = executor.plan, executor.block, executor.lanes
-        carried, continued = (np.array(each).T for each in (plan.carried, plan.carried_on))
+        extrapolates = plan.extrapolates(lanes)
+        carried, moved = (np.array(each).T for each in (plan.carried, plan.moved if extrapolates else plan.carried))
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
             # what is extrapolated begins at a multiple of the lanes: on to there as soon as a group is accepted whole
-            count = min(lanes - at % lanes if whole and plan.extrapolates(lanes) else lanes, stop - at)
+            count = min(lanes - at % lanes if whole and extrapolates else lanes, stop - at)
             block[sampled, :count] = samples[:, at : at + count]
             block[sampled, count:] = samples[:, stop - 1 : stop]
             executor.settle("extrapolate" if smooth else "predict", plan.joined)
@@ -88,10 +89,10 @@ class NumpyTrack:
             else:
                 break
             whole = accepted == lanes
-            smooth = plan.extrapolates(lanes) and whole and at % lanes == 0 and at + accepted < stop
+            smooth = extrapolates and whole and at % lanes == 0 and at + accepted < stop
             for name in () if smooth or not accepted else plan.remaining:
                 executor.run(name)
-            source, target = continued if smooth else carried
+            source, target = moved if smooth else carried
             block[target] = block[source, max(accepted - 1, 0), None]
             at += accepted
         self.anchors[side] = block[carried[1], 0]
