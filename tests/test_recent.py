@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from kincheck.core import Spherical, solve, solve_designs
+from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.analysis import cascade, march, model, route, sparse
 from kincheck.core.harness.bench.size import circle
 from kincheck.core.motions import Absolute, Motion, Path, Ramp, Sine
@@ -57,6 +57,21 @@ def test_threads_share_it():
 
 
 @pytest.mark.usefixtures("own_joint_types")
+def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
+    @dataclass(frozen=True)
+    class Hinge(Revolute):
+        type = "hinge_of_mine"
+
+    made, make = [], cascade.Cascade.__init__
+    monkeypatch.setattr(cascade.Cascade, "__init__", lambda self, *given: (made.append(self), make(self, *given))[1])
+    mechanism = chain(12)
+    joints = [Hinge(j.name, j.i, j.j, j.point, j.axis) if type(j) is Revolute else j for j in mechanism.joints]
+    for number in (1, 2):
+        assert solve(replace(mechanism, joints=joints), "turn", [0.0, 0.1]).solved.all()
+        assert len(made) == number
+
+
+@pytest.mark.usefixtures("own_joint_types")
 def test_joints_of_a_users_own_are_made_anew(made):
     """They may be equal, and yet not mean the same."""
 
@@ -105,6 +120,8 @@ def test_motions_of_a_users_own_are_followed_anew(bound):
         def at(self, t):
             return 0.0 * t, 0.0 * t, 0.0 * t
 
+    assert Path({}, np.ones(2)) == Path({}, np.ones(2)) != Path({}, np.ones(3))
+    assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})  # their messages differ
     for motion in (Mine(), Absolute(Mine(), 0.0)):
         assert not Path({"steer": motion}, np.ones(1)).ours
     for motion in (Ramp(1.0), Absolute(Sine(1.0, 1.0, 0.0), 0.2)):

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, Translational, Universal
 from kincheck.core.analysis.equations import Style
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.request import RATE, RATE_T, Request
 from kincheck.core.analysis.solve import solve
 from kincheck.core.joints import Cylindrical, Screw
 from kincheck.core.trajectory import Motions, PointMotion
@@ -184,6 +186,10 @@ def test_lower_orders_give_the_same_and_cost_less():
     assert np.abs(velocity.bodies["strut"].v - acceleration.bodies["strut"].v).max() <= 2e-15
     cost = [sum(flops(found).get(name, 0) for name in ("newton", "outputs")) for found in by_order]
     assert cost[0] < cost[1] < cost[2]
+    for order, wanted in enumerate([set(), {RATE}, {RATE, RATE_T}]):
+        model = compile_model(mcpherson(), Request(("stroke",), (), MOVING, order=order))
+        put_out = model.programs["outputs"].outputs.keys()
+        assert {name for name in (RATE, RATE_T) if put_out & {*model.vectors[name]}} == wanted
 
 
 @pytest.mark.parametrize("style", [style.value for style in Style])

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from kincheck.core.analysis.march import march
+from kincheck.core.analysis.march import march, marcher
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request
 from kincheck.core.analysis.route import Route
@@ -20,7 +20,7 @@ from kincheck.core.program.compiler import available
 from kincheck.core.program.executor import in_order
 from kincheck.core.program.llvm_plan import TOGETHER, PlanInMemory
 
-from .mechanisms import four_bar, mcpherson
+from .mechanisms import four_bar, mcpherson, slider_crank
 
 COMPILED = [False, pytest.param(True, marks=pytest.mark.skipif(not available(), reason="llvmlite is not installed"))]
 TOL = 1e-12
@@ -250,3 +250,15 @@ def test_at_its_end_a_side_stands_where_it_was_followed_to(compiled, order):
     assert {k: float(lane[time]) for k, lane in visited.items()} == {k: float(route.path.times[k]) for k in (0, 81, 103, 160)}
     again = march(route, TOL)
     np.testing.assert_array_equal(again.kept, whole.kept)
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_a_group_that_is_accepted_in_part_is_followed_on(compiled):
+    """Without a word from whoever divides steps."""
+    route = route_of(
+        slider_crank(), "turn", np.concatenate([[0.5, 1.0, 1.5], 1.5 + 0.002 * np.arange(1.0, 62.0)]), compiled=compiled
+    )
+    bound = marcher(route, TOL, crossing=False)
+    bound.run()
+    bound.track.begin()
+    assert [*bound.track.run()] == [64]
