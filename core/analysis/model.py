@@ -232,8 +232,7 @@ class Model:
         """Make solved lanes those that go on from where they stand, with the rates that a sample of the drives gives them."""
         executor.put(self.sampled, sample[:, None])
         executor.run(self._tangent)
-        source, target = np.array(self._plan.carried).T
-        executor.put(target, executor.get(source))
+        executor.carry()
         executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))  # there is no step behind it
 
     def standing(self, geometry: Array) -> Array:

@@ -71,7 +71,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             executor.put(ahead, start)
         executor.fan(route.for_motions[k], whole, side.first, side.step)
     kept = whole[:, :, :count]
-    kept[:, :, ~(arrived & closes)] = np.nan
+    if not (arrived & closes).all():
+        kept[:, :, ~(arrived & closes)] = np.nan
     solved = ~np.isnan(kept[model.rows["closure"].start])
     failed = np.flatnonzero(~solved.all(axis=0))
     messages: dict[int, str] = {}

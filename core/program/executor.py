@@ -185,6 +185,10 @@ class Executor(Protocol):
         """Make an attempt at all lanes, each alone."""
         ...
 
+    def carry(self) -> None:
+        """Have solved lanes predicted from: `Plan.carried`."""
+        ...
+
     def track(self, sides: Sequence[Side], start: Array, n: int) -> Track:
         """Bind the samples of one motion, n in all, and where it starts: what `Plan.carried` takes over, in that order."""
         ...

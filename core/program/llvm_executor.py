@@ -70,6 +70,10 @@ class LlvmExecutor:
         self._code.call("follow", "attempt")(self._address, self._groups)
         self._code.count(self._groups)
 
+    def carry(self) -> None:
+        """See `Executor`."""
+        self._code.call("follow", "carry")(self._address, self._groups)
+
     def track(self, sides: Sequence[Side], start: Array, n: int) -> LlvmTrack:
         """See `Executor`."""
         return LlvmTrack(self._code, self._memory, sides, start, n)

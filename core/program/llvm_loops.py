@@ -47,10 +47,12 @@ finish:
 
 
 def run(width: int) -> str:
-    """Functions that make an attempt, or run a program, given the address of its call, on every group of W lanes."""
+    """Functions that make an attempt, run a program, given the address of its call, or carry, on every group of W lanes."""
     head = "void @{}(ptr %plan, ptr %memory, i64 %groups{})"
     attempt = function(head.format("attempt", ""), _over_groups(_ALONE, width))
-    return attempt + function(head.format("run_program", ", ptr %program"), _over_groups(call("once", "%program"), width))
+    carry = function(head.format("carry", ""), _over_groups(over("copy", "carried"), width))
+    once = function(head.format("run_program", ", ptr %program"), _over_groups(call("once", "%program"), width))
+    return attempt + carry + once
 
 
 _ALONE = f"""{call("first", "%plan_predict")}

@@ -34,7 +34,7 @@ SOURCES = *_WRITERS, executor, lowering, ordering, trace, walk
 _NEEDED = llvm_plan.rows, llvm_loops.settle
 LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {
     "walk": ([llvm_walk.walker], {"walk": 2}),
-    "follow": ([*_NEEDED, llvm_loops.run, llvm_follow.follow], {"run_program": 4, "attempt": 3, "follow": 6, "run": 3}),
+    "follow": ([*_NEEDED, llvm_loops.run, llvm_follow.follow], {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3}),
     "fan": ([*_NEEDED, llvm_fan.fan], {"fan": 11}),
     "parts": ([*_NEEDED, llvm_loops.parts], {"parts": 11}),
 }

@@ -120,6 +120,11 @@ class NumpyExecutor:
         for name in tests:
             self.run(name)
 
+    def carry(self) -> None:
+        """See `Executor`."""
+        source, target = np.array(self.plan.carried).T
+        self.block[target] = self.block[source]
+
     def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:
         """See `Executor`."""
         return NumpyTrack(self, sides, start, n)
@@ -136,8 +141,8 @@ class NumpyExecutor:
     def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
         """See `Executor`."""
         plan, block = self.plan, self.block
-        carried, continued = (np.array(each).T for each in (plan.carried, plan.carried_on))
         kept, remembered = list(plan.kept), list(plan.remembered)
+        source, target = np.array(plan.carried_on).T
         past = block[plan.past : plan.past + NODES * len(remembered)].reshape(NODES, -1, self.lanes)
         alive = np.ones(self.lanes, dtype=np.bool_)
         for k, sample in enumerate(samples.T):
@@ -145,15 +150,17 @@ class NumpyExecutor:
             if (alive & ~accepted).any():
                 if k >= NODES:
                     self.go_back(samples[:, k - 1, None])
-                    block[carried[1]] = block[carried[0]]
+                    self.carry()
                 accepted = self._accepted("predict", sample)
             alive &= accepted
             out[:, first + step * k] = np.where(alive, block[kept], np.nan)
             past[k % NODES] = block[remembered]
             for name in plan.remaining if k + 1 < NODES else ():
                 self.run(name)
-            source, target = continued if k + 1 >= NODES else carried
-            block[target] = block[source]
+            if k + 1 < NODES:
+                self.carry()
+            else:
+                block[target] = block[source]
 
     def _accepted(self, start: str, sample: Array) -> NDArray[np.bool_]:
         self.block[list(self.plan.sampled)] = sample[:, None]
