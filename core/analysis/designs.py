@@ -14,8 +14,7 @@ from ..mechanism import Mechanism
 from ..motions import Motion
 from ..trajectory import Array, PointMotion
 from .geometry import places
-from .model import recent_model
-from .route import Route
+from .route import recent_route
 from .solve import asked
 from .variants import solve_variants
 
@@ -77,8 +76,8 @@ def solve_designs(
     if len(counts) != 1:
         raise SolveError(f"solve_designs: found {sorted(counts)} designs for different places, expected as many of each")
     (count,) = counts
-    model = recent_model(mechanism, replace(request, varied=tuple(geometry)))
-    route, lanes, n = Route(model, path), np.concatenate(numbers), len(path.times)
+    route = recent_route(mechanism, replace(request, varied=tuple(geometry)), path)
+    rows, lanes, n = route.model.rows, np.concatenate(numbers), len(path.times)
     labels = ("position", "velocity", "acceleration")[: order + 1]
     motion: dict[str, dict[str, Any]] = {name: {label: np.empty((count, n, 3)) for label in labels} for name in request.points}
     solved, messages = np.empty((count, n), dtype=np.bool_), dict[int, str]()
@@ -89,7 +88,7 @@ def solve_designs(
         messages |= {first + k: message for k, message in part.messages.items()}
         for name, each in motion.items():
             for label, values_of in each.items():
-                values_of[here] = part.kept[model.rows[f"{label} {name}"]].T
+                values_of[here] = part.kept[rows[f"{label} {name}"]].T
     found = {name: PointMotion(each["position"], each.get("velocity"), each.get("acceleration")) for name, each in motion.items()}
     return Designs(found, solved, messages)
 
