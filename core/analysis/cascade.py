@@ -16,6 +16,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism, Vector
 from ..motions import Path
 from ..program import MARGIN, Parts, Plan
+from ..program.memory import aligned
 from ..trajectory import Array
 from .components import Component, Section, components, section
 from .equations import frames
@@ -139,9 +140,10 @@ class Lanes:
         self.cascade, self.lanes = cascade, lanes
         executors = {id(kind): kind.model.executor(lanes) for kind in cascade.kinds}
         room, self._groups = max(each.room for each in executors.values()), next(iter(executors.values())).groups
-        self.world = np.zeros((cascade.rows, room))
+        self.world = aligned(cascade.rows * room).reshape(-1, room)
+        self.world[:] = 0.0
         self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
-        self._samples = [np.zeros((len(kind.model.sampled), room)) for kind in cascade.kinds]
+        self._samples = [aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in cascade.kinds]
         self._carried = [_carried(kind.model.plan) for kind in cascade.kinds]
         self._calls: list[Callable[[int], object]] = []
         self._parts: list[Parts] = []  # calls know addresses, not arrays

@@ -35,7 +35,7 @@ class CascadeSweep:
 
     def __init__(self, cascade: Cascade, path: Path) -> None:
         self.cascade, self.path = cascade, path
-        self._lanes = Lanes(cascade, max(HALVINGS, LANES))
+        self._lanes = Lanes(cascade, LANES)
         self._outputs = self._places()
 
     def _places(self) -> dict[str, list[int]]:
@@ -112,11 +112,10 @@ class CascadeSweep:
             if lanes.sound:
                 sound, start = lanes.anchor, here
             rounds += 1
-            parts: Array = here + (times[at] - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
-            part = longest(lanes.attempt(parts, path))
-            if part is not None and rounds <= MAX_ROUNDS:
-                lanes.carry(part)
-                here = float(parts[part])
+            reached = self._divide(here, float(times[at]), path)
+            if reached is not None and rounds <= MAX_ROUNDS:
+                lane, here = reached
+                lanes.carry(lane)
                 continue
             message = self._end(here, float(times[at]), path)
             beyond = cross(lanes, path, sound, start, here, float(times[at]), tol)
@@ -134,8 +133,17 @@ class CascadeSweep:
             return f"refused at {places}: so near a singular pose that neither side reaches it; keep away from it"
         return ""
 
+    def _divide(self, here: float, wanted: float, path: Path) -> tuple[int, float] | None:
+        """Go a part of a step: the lane there and its time. As many parts as there are lanes are tried at once, longest first."""
+        for first in range(1, HALVINGS, LANES - 1):  # a part counts if its half is reached too
+            parts = here + (wanted - here) * 0.5 ** np.arange(first, min(first + LANES, HALVINGS + 1))
+            part = longest(self._lanes.attempt(parts, path))
+            if part is not None:
+                return part, float(parts[part])
+        return None
+
     def _end(self, here: float, wanted: float, path: Path) -> str:
-        lane = HALVINGS - 1
+        lane = (HALVINGS - 1) % (LANES - 1)  # the shortest part was tried last
         closure, sigma = (self._lanes.each(name)[:, lane] for name in ("closure", SIGMA))
         worst = int(np.nan_to_num(closure, nan=np.inf).argmax())
         order = [part for kind in self.cascade.kinds for part in kind.members]
