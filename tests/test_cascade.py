@@ -7,9 +7,10 @@ import pytest
 from kincheck import cases
 from kincheck.core import Gear, JointAngle, SolveError
 from kincheck.core.analysis.cascade import Cascade
-from kincheck.core.analysis.cascade_sweep import CascadeSweep
+from kincheck.core.analysis.cascade_sweep import LANES, CascadeSweep
+from kincheck.core.analysis.march import HALVINGS
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.request import FROM, TIME, Request, accept_by
 from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.reading.casefile import load_case
@@ -127,3 +128,44 @@ def test_a_narrow_gap_is_not_stepped_over(name):
     else:
         assert not found.solved.any()
         assert "cannot be followed beyond" in found.message
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
+    path, request = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)), Request(("turn",), ("end",), compiled=compiled)
+    cascade = Cascade(chain(3), request)
+    for count in (LANES, 5):  # all that there are, or the last ones are as the last
+        going, carrying = (CascadeSweep(cascade, path) for _ in range(2))
+        for sweep in (going, carrying):
+            lanes = sweep._lanes
+            lanes.anchor = sweep._departure[1]
+            lanes.accept_by(accept_by(1e-12))
+            for first in (0.0, 0.1, 0.2):  # there and back again
+                assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), path) > 0.0).all()
+                if sweep is going:
+                    lanes.go_on()
+                else:
+                    lanes.carry(count - 1)
+        for a, b in zip(going._lanes.anchor, carrying._lanes.anchor, strict=True):
+            np.testing.assert_array_equal(a, b)
+        model = cascade.kinds[0].model
+        assert going._lanes.anchor[0][0, [*model.plan.fixed].index(model.slots[FROM + TIME])] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("part", [1, 2, 14, 15, 16, 17, 30, 31, 39])
+def test_a_step_is_divided_as_often_as_with_one_program(part):
+    """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is not reached."""
+    sweep = CascadeSweep(Cascade(chain(1), Request(("turn",), ("end",), compiled=False)), Path({"turn": Ramp(1.0)}, np.ones(1)))
+    tried = list[np.ndarray]()
+
+    def attempt(times, path):
+        assert len(times) <= LANES
+        tried.append(times)
+        return np.where(times - 1.0 <= 2.0**-part, 1.0, -1.0)
+
+    sweep._lanes.attempt = attempt
+    lane, time = sweep._divide(1.0, 2.0, sweep.path)
+    assert time == 1.0 + 2.0**-part == tried[-1][lane]
+    sweep._lanes.attempt = lambda times, path: np.where(times - 1.0 <= 2.0**-HALVINGS, 1.0, tried.append(times) or -1.0)
+    assert sweep._divide(1.0, 2.0, sweep.path) is None
+    assert tried[-1][-1] == 1.0 + 2.0**-HALVINGS

@@ -143,9 +143,10 @@ class Lanes:
         self.world = aligned(cascade.rows * room).reshape(-1, room)
         self.world[:] = 0.0
         self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
+        self._ahead = [kind.fixed.copy() for kind in cascade.kinds]
         self._samples = [aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in cascade.kinds]
         self._carried = [_carried(kind.model.plan) for kind in cascade.kinds]
-        self._calls: list[Callable[[int], object]] = []
+        self._calls: list[list[Callable[[int], object]]] = [[], []]  # from what is fixed now, and from what is ahead
         self._parts: list[Parts] = []  # calls know addresses, not arrays
         number = {id(kind): k for k, kind in enumerate(cascade.kinds)}
         for k, run in groupby(range(len(cascade.parts)), key=lambda part: number[id(cascade.place[part][0])]):
@@ -153,8 +154,10 @@ class Lanes:
             members = np.array([cascade.place[part][1] for part in parts], dtype=np.int64)
             rows = [[row for body in cascade.parts[part].given for row in cascade.body_rows(body)] for part in parts]
             taken = np.array(rows, dtype=np.int64).reshape(len(parts), -1)
-            self._parts.append(Parts(members, self._fixed[k], self._samples[k], taken, self.world, kind.base))
-            self._calls.append(executors[id(kind)].parts(self._parts[-1]))
+            now, ahead = self._fixed[k], self._ahead[k]
+            for calls, (fixed, other) in zip(self._calls, ((now, ahead), (ahead, now)), strict=True):
+                self._parts.append(Parts(members, fixed, other, self._samples[k], taken, self.world, kind.base))
+                calls.append(executors[id(kind)].parts(self._parts[-1]))
 
     def accept_by(self, tolerances: Mapping[str, float]) -> None:
         """Set the tolerances."""
@@ -181,7 +184,7 @@ class Lanes:
             samples[:, :count] = kind.model.samples(times, drive)
             samples[:, count:] = samples[:, count - 1 : count]
         groups = self._groups(count)
-        for call in self._calls:
+        for call in self._calls[0]:
             call(groups)
         return self.each(MARGIN)[:, :count].min(axis=0)
 
@@ -222,8 +225,13 @@ class Lanes:
                 return False
         return True
 
+    def go_on(self) -> None:
+        """Predict from the last of the times that were attempted from now on: what that takes is there."""
+        self._fixed, self._ahead = self._ahead, self._fixed
+        self._calls.reverse()
+
     def carry(self, lane: int) -> None:
-        """Predict from a solved lane from now on."""
+        """Predict from a solved lane from now on, whichever it is."""
         for kind, fixed, samples, carried in zip(self.cascade.kinds, self._fixed, self._samples, self._carried, strict=True):
             size, count = kind.model.kept, len(kind.members)
             solved = self.world[kind.base : kind.base + size * count, lane].reshape(count, size)

@@ -84,6 +84,12 @@ class Plan:
         return self.continued or self.carried
 
     @property
+    def left(self) -> Sequence[tuple[int, int]]:
+        """What of that is fixed, and its place there."""
+        place = {slot: k for k, slot in enumerate(self.fixed)}
+        return [(source, place[target]) for source, target in self.carried if target in place]
+
+    @property
     def moved(self) -> Sequence[tuple[int, int]]:
         """What of that `extrapolate` does not put out itself."""
         return [pair for pair in self.carried_on if pair[1] not in self.programs["extrapolate"].outputs]
@@ -129,6 +135,7 @@ class Parts:
     Attributes:
         members: which rows of `fixed` they are, in order.
         fixed: values of `Plan.fixed`, shape (all members, fixed).
+        ahead: takes those of the lanes after the last one, of the same shape: of what is carried, what that is carried from.
         samples: values of `Plan.sampled`, shape (sampled, room).
         taken: rows of the world that `Plan.taken` come from, shape (parts, taken).
         world: all that has been solved, shape (rows, room); takes `Plan.kept` of a member from row `base + member * kept` on.
@@ -136,6 +143,7 @@ class Parts:
 
     members: NDArray[np.int64]
     fixed: Array
+    ahead: Array
     samples: Array
     taken: NDArray[np.int64]
     world: Array

@@ -102,7 +102,8 @@ class LlvmExecutor:
     def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
         samples, addresses = parts.samples, [each.ctypes.data for each in (parts.taken, parts.world)]
-        tables = parts.members.ctypes.data, parts.fixed.ctypes.data, samples.ctypes.data, samples.shape[1], *addresses
+        own = [parts.members.ctypes.data, *(each.ctypes.data for each in (parts.fixed, parts.ahead, samples))]
+        tables = *own, samples.shape[1], *addresses
         call = partial(self._code.call("parts", "parts"), self._address, len(parts.members), *tables, parts.base)
 
         def count(groups: int) -> None:

@@ -81,7 +81,10 @@ def parts(width: int) -> str:
     row = source.let(f"load i64, ptr {source.number('%rows', '%row')}, align 8")
     place = source.number("%world", source.product("%room", row))
     source.write(source.entry(), source.let(f"load <{width} x double>, ptr {place}, align 8"))
-    tables = "ptr %members, ptr %own_all, ptr %samples, i64 %room, ptr %sources_all, ptr %world"
+    leave = Rows(width)
+    last = leave.let(f"load double, ptr {leave.number(leave.slot(leave.entry(0, 2)), width - 1)}, align 8")
+    leave.lines.append(f"store double {last}, ptr {leave.number('%ahead', leave.entry(1, 2))}, align 8")
+    tables = "ptr %members, ptr %own_all, ptr %ahead_all, ptr %samples, i64 %room, ptr %sources_all, ptr %world"
     body = f"""%bytes = mul i64 %plan_stride, {8 * width}
   br label %part
 part:
@@ -90,6 +93,7 @@ part:
   %member = load i64, ptr %place, align 8
   %own_at = mul i64 %member, %plan_fixed_count
   %own = getelementptr double, ptr %own_all, i64 %own_at
+  %ahead = getelementptr double, ptr %ahead_all, i64 %own_at
   %sources_at = mul i64 %k, %plan_taken_count
   %sources = getelementptr i64, ptr %sources_all, i64 %sources_at
   %rows_before = mul i64 %member, %plan_kept_count
@@ -113,10 +117,12 @@ group:
   %more = icmp slt i64 %next, %groups
   br i1 %more, label %group, label %end_part
 end_part:
+  {over("leave", "left", "ptr %ahead")}
   %next_part = add i64 %k, 1
   %more_parts = icmp slt i64 %next_part, %count
   br i1 %more_parts, label %part, label %end
 end:
   ret void"""
-    sources = source.function("source", "ptr %rows", "ptr %world", "i64 %room")
-    return sources + function(f"void @parts(ptr %plan, ptr %memory, i64 %count, {tables}, i64 %base, i64 %groups)", body)
+    head = f"void @parts(ptr %plan, ptr %memory, i64 %count, {tables}, i64 %base, i64 %groups)"
+    rows = [source.function("source", "ptr %rows", "ptr %world", "i64 %room"), leave.function("leave", "ptr %ahead")]
+    return "".join([*rows, function(head, body)])

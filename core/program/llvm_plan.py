@@ -26,6 +26,7 @@ TABLES: Mapping[str, int] = {
     **dict.fromkeys(CALLS, 1),
     **dict.fromkeys(PAIRS, 2),
     **dict.fromkeys(("targets", "sampled", "kept", "fixed", "taken"), 1),
+    "left": 2,
     "worst": 3,  # a slot, 1 or -1 where the smallest is wanted, and where to begin
 }
 """Columns of each. A table takes two numbers of the plan: its address, and how many rows it has."""
@@ -155,6 +156,7 @@ class PlanInMemory:
             **{name: vector * _table([*each, *[*each[-1:]] * (-len(each) % TOGETHER)], 2) for name, each in pairs.items()},
             "targets": vector * _table([target for _, target in plan.carried], 1),
             **{name: vector * _table(getattr(plan, name), 1) for name in ("sampled", "kept", "fixed", "taken")},
+            "left": _table([(vector * slot, k) for slot, k in plan.left], 2),
             "worst": _table([(vector * x, _bits(sign), _bits(start)) for slots, sign, start in worst for x in slots], 3),
         }
         found = {

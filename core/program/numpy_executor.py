@@ -190,6 +190,8 @@ class NumpyExecutor:
                 self.attempt()
                 row = parts.base + member * len(plan.kept)
                 parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
+                for slot, k in plan.left:
+                    parts.ahead[member, k] = block[slot, -1]
 
         return call
 
