@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
-from kincheck.core.analysis import cascade, march, model, route, sparse
+from kincheck.core.analysis import cascade, cascade_sweep, march, model, route, sparse
 from kincheck.core.harness.bench.size import circle
 from kincheck.core.motions import Absolute, Motion, Path, Ramp, Sine
 
@@ -54,6 +54,18 @@ def test_threads_share_it():
     with ThreadPoolExecutor(4) as threads:
         for found in threads.map(lambda _: solve(mcpherson(), "stroke", STROKES), range(24)):
             np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
+
+
+def test_of_a_chain_the_last_path_is_kept(monkeypatch):
+    made, make = [], cascade_sweep.CascadeSweep.__init__
+    monkeypatch.setattr(cascade_sweep.CascadeSweep, "__init__", lambda self, *given: (made.append(self), make(self, *given))[1])
+    turn, half = np.linspace(-0.1, 0.2, 9), np.linspace(-0.1, 0.05, 9)
+    found = []
+    for values, number in ((turn, 1), (turn, 1), (half, 2), (turn, 3)):
+        found.append(solve(chain(12), "turn", values).points["end"].acceleration)
+        assert len(made) == number
+    for each in (found[1], found[3]):
+        np.testing.assert_array_equal(each, found[0])
 
 
 @pytest.mark.usefixtures("own_joint_types")

@@ -134,10 +134,11 @@ class Lanes:
 
     Attributes:
         world: all that is solved, shape (rows, room); see `Cascade`.
+        last: the lane of the last of the times that were attempted last.
     """
 
     def __init__(self, cascade: Cascade, lanes: int) -> None:
-        self.cascade, self.lanes = cascade, lanes
+        self.cascade, self.lanes, self.last = cascade, lanes, 0
         executors = {id(kind): kind.model.executor(lanes) for kind in cascade.kinds}
         room, self._groups = max(each.room for each in executors.values()), next(iter(executors.values())).groups
         self.world = aligned(cascade.rows * room).reshape(-1, room)
@@ -178,6 +179,7 @@ class Lanes:
     def attempt(self, times: Array, path: Path) -> Array:
         """Solve all components at as many times as there are lanes, or fewer; the margin of each, positive where accepted."""
         count = len(times)
+        self.last = count - 1
         for kind, samples in zip(self.cascade.kinds, self._samples, strict=True):
             names = kind.model.request.drivers
             drive = path.drive(names, times) if names else np.zeros((3, 0, count))
@@ -226,7 +228,7 @@ class Lanes:
         return True
 
     def go_on(self) -> None:
-        """Predict from the last of the times that were attempted from now on: what that takes is there."""
+        """Predict from the last lane from now on: what that takes is there."""
         self._fixed, self._ahead = self._ahead, self._fixed
         self._calls.reverse()
 

@@ -147,7 +147,7 @@ class CascadeSweep:
         return None
 
     def _end(self, here: float, wanted: float, path: Path) -> str:
-        lane = (HALVINGS - 1) % (LANES - 1)  # the shortest part was tried last
+        lane = self._lanes.last  # the shortest part of the step
         closure, sigma = (self._lanes.each(name)[:, lane] for name in ("closure", SIGMA))
         worst = int(np.nan_to_num(closure, nan=np.inf).argmax())
         order = [part for kind in self.cascade.kinds for part in kind.members]

@@ -40,7 +40,8 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE and not mechanism.couplers:
-        make = _last_large(mechanism, request, get_ident()) if ours(mechanism) else _large(mechanism, request)
+        known = ours(mechanism) and path.ours
+        make = _last_large(mechanism, request, get_ident()) if known else _large(mechanism, request)
         if make:
             return make(path)
     return partial(follow, recent_route(mechanism, request, path))
@@ -56,7 +57,12 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     parts = components(mechanism, frames(mechanism))
     if max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
         cascade = Cascade(mechanism, request, parts)
-        return lambda path: CascadeSweep(cascade, path).solve
+
+        @lru_cache(maxsize=1)
+        def along(path: Path) -> Solver:
+            return CascadeSweep(cascade, path).solve
+
+        return along
     if len(mechanism.moving) <= IRREDUCIBLE:
         return None
     from .sparse import SparseModel
@@ -68,7 +74,7 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
 
 @lru_cache(maxsize=1)
 def _last_large(mechanism: Mechanism, request: Request, thread: int) -> Callable[[Path], Solver] | None:
-    """The same, and once for whoever solves one again and again; one only, for the largest fill much of the memory.
+    """The same, and once for whoever solves one again and again. One only, and of its paths the last: they fill much of the memory.
 
     Args:
         thread: which alone uses it: it is solved in place.
