@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.program import Tape, program
+from kincheck.core.program import Tape, llvm_programs, program
+from kincheck.core.program.llvm_programs import _Straight
 from kincheck.core.program.lowering import lowered
 from kincheck.core.program.ordering import AT_ONCE, CYCLES, OTHERS, ordered
 from kincheck.core.program.trace import LEAVES, operands
@@ -49,9 +50,18 @@ def test_what_the_rest_waits_for_comes_first_and_the_rest_between():
 
 
 def test_what_has_no_need_to_wait_is_left_as_it_was_traced():
-    wide = waiting(1, 60)
+    wide = waiting(1, 90)
     assert ordered(wide) is wide
-    assert ordered(waiting(3, 60)) is not wide
+
+
+@pytest.mark.parametrize("width", [2, 4, 8])
+def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkeypatch):
+    each = compile_model(mcpherson(), Request(("stroke",), ("wheel",), compiled=False)).programs["newton"]
+    traced, waiting = (_Straight(found, width).text for found in (lowered(each), ordered(lowered(each))))
+    assert traced != waiting
+    assert (waiting if width == 8 else traced) in llvm_programs.function(each, width)
+    monkeypatch.setattr(llvm_programs, "PUT_AWAY", 0.0)  # nothing may be put away for it
+    assert traced in llvm_programs.function(each, width)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
