@@ -167,8 +167,12 @@ class Path:
 
     @property
     def ours(self) -> bool:
-        """Whether all motions are of this module: what is equal then means the same."""
+        """Whether all motions are of this module, of numbers that do not change: what is equal then means the same."""
         motions = (each.motion if isinstance(each, Absolute) else each for each in self.motions.values())
+        try:
+            hash(self._content)
+        except TypeError:  # lists or arrays of numbers
+            return False
         return all(type(each).__module__ == __name__ for each in motions)
 
     def where(self, t: float) -> str:
