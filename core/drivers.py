@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from .errors import MechanismError
-from .joints.base import Joint
+from .joints.base import Joint, Kind, triple
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,8 @@ class PointCoordinate(Driver):
     relative: bool = True
 
     def __post_init__(self) -> None:
+        who = f"driver {self.name!r}: direction"
+        object.__setattr__(self, "direction", triple(who, self.direction, Kind.DIRECTION.value))
         if not any(self.direction):
             raise MechanismError(f"driver {self.name!r}: direction is zero; give a direction of any other length")
 

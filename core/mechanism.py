@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
-from .joints.base import Coupler, Joint
+from .joints.base import Coupler, Joint, Kind, triple
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -39,7 +39,8 @@ class Body:
     fixed: bool = False
 
     def __post_init__(self) -> None:
-        p = self.euler_parameters
+        object.__setattr__(self, "origin", triple(f"body {self.name!r}: origin", self.origin, Kind.POSITION.value))
+        p = tuple(self.euler_parameters)
         length = math.sqrt(sum(e * e for e in p))
         # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
         if len(p) != 4 or not abs(length - 1.0) < 1e-3:
@@ -57,6 +58,9 @@ class Point:
     name: str
     body: str
     position: Vector
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", triple(f"point {self.name!r}: position", self.position, Kind.POSITION.value))
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,8 @@ class Table(Motion):
     values: tuple[float, ...] = measured(Measure.DRIVER)
 
     def __post_init__(self) -> None:
+        for name in ("times", "values"):  # lists and arrays may change, motions do not
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         if len(self.times) != len(self.values) or len(self.times) < 2:
             raise MechanismError(
                 f"table motion: {len(self.times)} times and {len(self.values)} values, expected as many of each, two or more"
@@ -171,7 +173,7 @@ class Path:
         motions = (each.motion if isinstance(each, Absolute) else each for each in self.motions.values())
         try:
             hash(self._content)
-        except TypeError:  # lists or arrays of numbers
+        except TypeError:  # a number given as an array
             return False
         return all(type(each).__module__ == __name__ for each in motions)
 

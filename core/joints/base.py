@@ -104,12 +104,20 @@ class Joint(ABC):
             kind, value = each.metadata.get("kind"), getattr(self, each.name)
             if kind is None or value is None:
                 continue
-            pair = kind in (Kind.POSITIONS, Kind.DIRECTIONS)
-            for numbers in value if pair else [(value,)] if kind is Kind.LENGTH else [value]:
+            who, expected = f"{self}: {each.name}", kind.value
+            if kind is Kind.LENGTH:
+                parts = [(value,)]
+            elif kind in (Kind.POSITIONS, Kind.DIRECTIONS):
+                value = parts = tuple(triple(who, numbers, expected) for numbers in _held(who, value, 2, expected))
+            else:
+                value = triple(who, value, expected)
+                parts = [value]
+            object.__setattr__(self, each.name, value)
+            for numbers in parts:
                 if not all(math.isfinite(number) for number in numbers):
-                    raise MechanismError(f"{self}: {each.name} = {value} is not finite; give {kind.value}")
+                    raise MechanismError(f"{who} = {value} is not finite; give {expected}")
                 if kind in (Kind.DIRECTION, Kind.DIRECTIONS) and not any(numbers):
-                    raise MechanismError(f"{self}: {each.name} is zero; give a direction of any other length")
+                    raise MechanismError(f"{who} is zero; give a direction of any other length")
 
     def __str__(self) -> str:
         return f"joint {self.name!r} ({self.type})"
@@ -214,6 +222,7 @@ class Coupler(ABC):
             Coupler.registry[cls.type] = cls
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", _held(f"{self}: joints", self.joints, 2, "two names"))
         if self.joints[0] == self.joints[1]:
             raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
         if not all(weight and math.isfinite(weight) for weight in self.coefficients):
@@ -230,6 +239,25 @@ class Coupler(ABC):
     @abstractmethod
     def coefficients(self) -> tuple[float, float]:
         """Weights of the two coordinates [m, rad]; their weighted sum stays zero."""
+
+
+def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
+    """Three numbers as a tuple, whatever sequence or array they are given as: that may change, a mechanism does not.
+
+    Raises:
+        MechanismError: there are not three.
+    """
+    return _held(who, value, 3, expected)
+
+
+def _held(who: str, value: Any, count: int, expected: str) -> Any:
+    try:
+        found = tuple(value)
+    except TypeError:  # a number, or nothing
+        found = ()
+    if len(found) != count or isinstance(value, str):
+        raise MechanismError(f"{who} is {value!r}, expected {expected}")
+    return found
 
 
 def _times(factor: float, value: float | Sequence[Any]) -> Any:

@@ -1,0 +1,70 @@
+"""A mechanism is data that does not change: numbers may be given as lists or arrays, and what is no point is told so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from kincheck.core import Body, Distance, JointAngle, Mechanism, MechanismError, Point, PointCoordinate, Revolute, solve
+from kincheck.core.joints import Gear
+from kincheck.core.motions import Table
+
+from .running import forget_recent
+
+
+def rssr(held=tuple):
+    """An RSSR linkage of points held in tuples, lists or arrays."""
+    return Mechanism(
+        "rssr",
+        [Body("crank", held((0.1, 0.2, 0.3)), held((1.0, 0.0, 0.0, 0.0))), Body("rocker")],
+        [
+            Revolute("input", "ground", "crank", held((0.0, 0.0, 0.0)), held((0.0, 0.0, 1.0))),
+            Revolute("output", "ground", "rocker", held((2.0, 1.0, 3.0)), held((1.0, 0.0, 0.0))),
+            Distance("rod", "crank", "rocker", held([held((1.0, 0.0, 0.0)), held((2.0, 4.9, 2.2))])),
+        ],
+        [Point("end", "rocker", held((2.0, 4.9, 2.2)))],
+        [JointAngle("turn", "input")],
+    )
+
+
+@pytest.mark.parametrize("held", [list, np.array])
+def test_points_may_be_lists_and_arrays(held):
+    assert rssr(held) == rssr()
+    assert hash(rssr(held)) == hash(rssr())
+    turn = np.linspace(0.0, 1.0, 5)
+    expected = solve(rssr(), "turn", turn).points["end"].acceleration.copy()
+    forget_recent()
+    np.testing.assert_array_equal(solve(rssr(held), "turn", turn).points["end"].acceleration, expected)
+    assert PointCoordinate("lift", "end", held((0.0, 0.0, 1.0))) == PointCoordinate("lift", "end", (0.0, 0.0, 1.0))
+    assert Table(held([0.0, 1.0]), held([0.0, 2.0])) == Table((0.0, 1.0), (0.0, 2.0))
+    assert Gear("gear", ["input", "output"], ratio=2.0) == Gear("gear", ("input", "output"), ratio=2.0)
+
+
+def test_what_changes_afterwards_changes_no_mechanism():
+    place = np.array([2.0, 4.9, 2.2])
+    point = Point("end", "rocker", place)
+    place[:] = 0.0
+    assert point.position == (2.0, 4.9, 2.2)
+
+
+WRONG = {
+    "a point of two numbers": (
+        lambda: Revolute("a", "b", "c", (1, 2), (0, 0, 1)),
+        "joint 'a' (revolute): point is (1, 2), expected a point",
+    ),
+    "a number": (lambda: Revolute("a", "b", "c", 3.0, (0, 0, 1)), "point is 3.0, expected a point"),
+    "a word": (lambda: Revolute("a", "b", "c", "xyz", (0, 0, 1)), "point is 'xyz', expected a point"),
+    "one point for two": (lambda: Distance("a", "b", "c", (1, 2, 3)), "points is (1, 2, 3), expected two points"),
+    "two short points": (lambda: Distance("a", "b", "c", ((1, 2, 3), (1, 2))), "(1, 2), expected two points"),
+    "no place": (lambda: Point("end", "b", None), "point 'end': position is None, expected a point"),
+    "an origin of four": (lambda: Body("b", (0, 0, 0, 1)), "body 'b': origin is (0, 0, 0, 1), expected a point"),
+    "a flat direction": (lambda: PointCoordinate("d", "end", (0, 1)), "driver 'd': direction is (0, 1), expected a direction"),
+    "one joint for two": (lambda: Gear("g", "ab", ratio=1.0), "joints is 'ab', expected two names"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_no_point_is_told_so(name):
+    make, message = WRONG[name]
+    with pytest.raises(MechanismError) as told:
+        make()
+    assert message in str(told.value)
