@@ -1,7 +1,8 @@
 """Programs that follow a motion: what lanes are predicted from, how, and which of them are accepted (see `programs`).
 
 predict   from state, v, a and time; time    -> state        Taylor step of second order
-extrapolate   states of the group of lanes before, weights   -> state        through `NODES` of them, without v and a
+extrapolate   states of the group of lanes before, weights   -> state        through `NODES` of them, without v and a; and what is
+                                                                carried of the last of them
 extend    states of the samples before, weights   -> state        likewise, for lanes that are motions of their own
 gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
 alone, joined   all that is tested, and the tolerance   -> margin    positive where a lane may be accepted

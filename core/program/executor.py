@@ -85,13 +85,13 @@ class Plan:
 
     @property
     def left(self) -> Sequence[tuple[int, int]]:
-        """What of that is fixed, and its place there."""
+        """Slots that are carried to slots that are fixed, and the places of those among them."""
         place = {slot: k for k, slot in enumerate(self.fixed)}
         return [(source, place[target]) for source, target in self.carried if target in place]
 
     @property
     def moved(self) -> Sequence[tuple[int, int]]:
-        """What of that `extrapolate` does not put out itself."""
+        """What of `carried_on` is to be copied before `extrapolate`, which puts out the rest itself."""
         return [pair for pair in self.carried_on if pair[1] not in self.programs["extrapolate"].outputs]
 
     def extrapolates(self, lanes: int) -> bool:
