@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.analysis import cascade, cascade_sweep, march, model, route, sparse
+from kincheck.core.analysis.prepare import prepare
 from kincheck.core.harness.bench.size import circle
 from kincheck.core.motions import Absolute, Motion, Path, Ramp, Sine, Table
 
@@ -66,6 +67,21 @@ def test_of_a_chain_the_last_path_is_kept(monkeypatch):
         assert len(made) == number
     for each in (found[1], found[3]):
         np.testing.assert_array_equal(each, found[0])
+
+
+def test_large_mechanisms_follow_motions_of_a_users_own_anew():
+    rate = 1.0
+
+    @dataclass(frozen=True)
+    class Mine(Motion):
+        def at(self, t):
+            return rate * t, rate + 0.0 * t, 0.0 * t
+
+    request, times = route.Request(("turn",), ("end",)), np.linspace(0.0, 0.1, 5)
+    slow = prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).points["end"].position
+    rate = 2.0
+    fast = prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).points["end"].position
+    assert np.abs(fast - slow).max() > 1e-3
 
 
 @pytest.mark.usefixtures("own_joint_types")
