@@ -218,25 +218,29 @@ def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, mon
     monkeypatch.setattr("kincheck.core.program.machine_code.OFTEN", 0)
     tape = Tape()
     x, last, first, other = tape.input(0), tape.at(NODES - 1, 0), tape.at(0, 0), tape.at(NODES - 1, 1)
+    head = tape.at(0, 3)
     total = x
     for k in range(40):  # more than there are registers for
-        total = total * (last + first * float(k))
-    out = {0: total, 1: last, 2: first, 3: other, 4: tape.input(2), 5: other + first, 6: tape.input(1)}
-    plan = Plan({"f": program("f", tape, out)}, {str(k): k for k in range(7)})
+        total = total * (last + first * float(k)) * head
+    late = tape.input(7) + total
+    out = {0: total, 1: last, 2: first, 3: other, 4: tape.input(2), 5: other + first, 6: tape.input(1), 7: head, 8: late}
+    plan = Plan({"f": program("f", tape, out)}, {str(k): k for k in range(9)})
     executor = LlvmExecutor(LlvmCode(plan), 8) if compiled else NumpyExecutor(plan, 8)
     group = executor.margin if compiled else 8
-    values = np.random.default_rng(5).uniform(0.2, 0.4, size=(7, 8))
+    values = np.random.default_rng(5).uniform(0.2, 0.4, size=(9, 8))
     heads = np.arange(8) // group * group
     for _ in range(2):  # walked, and compiled
-        executor.put(range(7), values)
+        executor.put(range(9), values)
         executor.run("f")
         lasts, firsts = values[:, heads + group - 1], values[:, heads]
         expected = values[0]
         for k in range(40):
-            expected = expected * (lasts[0] + firsts[0] * float(k))
-        found = executor.get(range(7))
-        assert np.abs(found[0] / expected - 1.0).max() <= 1e-13
-        np.testing.assert_array_equal(found[1:], [lasts[0], firsts[0], lasts[1], values[2], lasts[1] + firsts[0], values[1]])
+            expected = expected * (lasts[0] + firsts[0] * float(k)) * firsts[3]
+        found = executor.get(range(9))
+        for each, wanted in ((found[0], expected), (found[8], values[7] + expected)):
+            assert np.abs(each / wanted - 1.0).max() <= 1e-13
+        stood = [lasts[0], firsts[0], lasts[1], values[2], lasts[1] + firsts[0], values[1], firsts[3]]
+        np.testing.assert_array_equal(found[1:8], stood)
 
 
 @pytest.mark.parametrize("order", [0, 2])
