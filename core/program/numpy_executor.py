@@ -155,9 +155,9 @@ class NumpyExecutor:
             alive &= accepted
             out[:, first + step * k] = np.where(alive, block[kept], np.nan)
             past[k % NODES] = block[remembered]
-            for name in plan.remaining if k + 1 < NODES else ():
-                self.run(name)
             if k + 1 < NODES:
+                for name in plan.remaining:
+                    self.run(name)
                 self.carry()
             else:
                 block[target] = block[source]
