@@ -40,12 +40,12 @@ class Body:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "origin", triple(f"body {self.name!r}: origin", self.origin, Kind.POSITION.value))
-        p = tuple(self.euler_parameters)
+        p = [float(e) for e in self.euler_parameters]
         length = math.sqrt(sum(e * e for e in p))
         # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
         if len(p) != 4 or not abs(length - 1.0) < 1e-3:
             raise MechanismError(
-                f"body {self.name!r}: euler_parameters {list(p)} have length {length:.6g}, expected four numbers of "
+                f"body {self.name!r}: euler_parameters {p} have length {length:.6g}, expected four numbers of "
                 "length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
             )
         object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))

@@ -30,6 +30,7 @@ def rssr(held=tuple):
 def test_points_may_be_lists_and_arrays(held):
     assert rssr(held) == rssr()
     assert hash(rssr(held)) == hash(rssr())
+    assert repr(rssr(held)) == repr(rssr())  # plain numbers all
     turn = np.linspace(0.0, 1.0, 5)
     expected = solve(rssr(), "turn", turn).points["end"].acceleration.copy()
     forget_recent()

@@ -69,19 +69,18 @@ def test_of_a_chain_the_last_path_is_kept(monkeypatch):
         np.testing.assert_array_equal(each, found[0])
 
 
-def test_large_mechanisms_follow_motions_of_a_users_own_anew():
-    rate = 1.0
-
+def test_large_mechanisms_follow_motions_of_a_users_own_anew(monkeypatch):
     @dataclass(frozen=True)
     class Mine(Motion):
         def at(self, t):
-            return rate * t, rate + 0.0 * t, 0.0 * t
+            return t, 1.0 + 0.0 * t, 0.0 * t
 
+    made, make = [], cascade_sweep.CascadeSweep.__init__
+    monkeypatch.setattr(cascade_sweep.CascadeSweep, "__init__", lambda self, *given: (made.append(self), make(self, *given))[1])
     request, times = route.Request(("turn",), ("end",)), np.linspace(0.0, 0.1, 5)
-    slow = prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).points["end"].position
-    rate = 2.0
-    fast = prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).points["end"].position
-    assert np.abs(fast - slow).max() > 1e-3
+    for number in (1, 2):
+        assert prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).solved.all()
+        assert len(made) == number
 
 
 @pytest.mark.usefixtures("own_joint_types")
@@ -182,7 +181,8 @@ def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
     assert len(made) == 1
     for name, motion in first.items():
         np.testing.assert_array_equal(again[name].acceleration, motion.acceleration)
-        assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-9
+        # predicted from other samples: round-off, by the condition and once more for each derivative
+        assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-10
     with ThreadPoolExecutor(1) as threads:
         threads.submit(solve, large, driver, values).result()
     assert len(made) == 2

@@ -238,7 +238,7 @@ def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, mon
             expected = expected * (lasts[0] + firsts[0] * float(k)) * firsts[3]
         found = executor.get(range(9))
         for each, wanted in ((found[0], expected), (found[8], values[7] + expected)):
-            assert np.abs(each / wanted - 1.0).max() <= 1e-13
+            assert np.abs(each / wanted - 1.0).max() <= 4e-14  # 160 operations, some of them fused, each rounded
         stood = [lasts[0], firsts[0], lasts[1], values[2], lasts[1] + firsts[0], values[1], firsts[3]]
         np.testing.assert_array_equal(found[1:8], stood)
 

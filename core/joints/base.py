@@ -244,6 +244,8 @@ class Coupler(ABC):
 def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
     """Three numbers as a tuple, whatever sequence or array they are given as: that may change, a mechanism does not.
 
+    Of an array they are Python's own numbers: numpy's divide by zero without a word, and print their type.
+
     Raises:
         MechanismError: there are not three.
     """
@@ -252,7 +254,7 @@ def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
 
 def _held(who: str, value: Any, count: int, expected: str) -> Any:
     try:
-        found = tuple(value)
+        found = tuple(value.tolist() if hasattr(value, "tolist") else value)
     except TypeError:  # a number, or nothing
         found = ()
     if len(found) != count or isinstance(value, str):
