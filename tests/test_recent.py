@@ -57,30 +57,34 @@ def test_threads_share_it():
             np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
 
 
-def test_of_a_chain_the_last_path_is_kept(monkeypatch):
-    made, make = [], cascade_sweep.CascadeSweep.__init__
-    monkeypatch.setattr(cascade_sweep.CascadeSweep, "__init__", lambda self, *given: (made.append(self), make(self, *given))[1])
+@pytest.fixture
+def swept(monkeypatch):
+    """What was made of paths through components."""
+    sweeps, make = [], cascade_sweep.CascadeSweep.__init__
+    monkeypatch.setattr(cascade_sweep.CascadeSweep, "__init__", lambda self, *given: (sweeps.append(self), make(self, *given))[1])
+    return sweeps
+
+
+def test_of_a_chain_the_last_path_is_kept(swept):
     turn, half = np.linspace(-0.1, 0.2, 9), np.linspace(-0.1, 0.05, 9)
     found = []
     for values, number in ((turn, 1), (turn, 1), (half, 2), (turn, 3)):
         found.append(solve(chain(12), "turn", values).points["end"].acceleration)
-        assert len(made) == number
+        assert len(swept) == number
     for each in (found[1], found[3]):
         np.testing.assert_array_equal(each, found[0])
 
 
-def test_large_mechanisms_follow_motions_of_a_users_own_anew(monkeypatch):
+def test_large_mechanisms_follow_motions_of_a_users_own_anew(swept):
     @dataclass(frozen=True)
     class Mine(Motion):
         def at(self, t):
             return t, 1.0 + 0.0 * t, 0.0 * t
 
-    made, make = [], cascade_sweep.CascadeSweep.__init__
-    monkeypatch.setattr(cascade_sweep.CascadeSweep, "__init__", lambda self, *given: (made.append(self), make(self, *given))[1])
     request, times = route.Request(("turn",), ("end",)), np.linspace(0.0, 0.1, 5)
     for number in (1, 2):
         assert prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).solved.all()
-        assert len(made) == number
+        assert len(swept) == number
 
 
 @pytest.mark.usefixtures("own_joint_types")
