@@ -7,27 +7,37 @@ from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import ACCEPT, EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, Request
 from kincheck.core.analysis.sweep import sweep
 from kincheck.core.motions import Path, Ramp
-from kincheck.core.program import NODES, place_of
+from kincheck.core.program import NODES, groups_behind, place_of
 
 from .mechanisms import mcpherson, slider_crank, slider_crank_motion
 
 STROKES = np.linspace(-0.08, 0.08, 33)
 
 
-def test_weights_continue_what_is_of_fifth_order():
+@pytest.mark.parametrize(("lanes", "behind"), [(2, 3), (4, 2), (5, 2), (6, 1), (8, 1), (30, 1)])
+def test_nodes_reach_from_the_first_lane_to_the_last_of_the_groups_that_hold_them(lanes, behind):
+    nodes = [group * lanes + lane for group, lane in (place_of(k, lanes) for k in range(NODES))]
+    assert groups_behind(lanes) == behind
+    assert (nodes[0], nodes[-1]) == (0, behind * lanes - 1)
+    assert np.ptp(np.diff(nodes)) <= 1
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+def test_weights_continue_what_is_of_fifth_order(lanes):
     times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 40))
     values = np.polynomial.Polynomial([1.0, -2.0, 0.5, 1.0, -0.3, 0.02])(times / 10.0)
-    of_samples, of_groups = weights_of_samples(times), weights_of_groups(times, 8)
+    of_samples, of_groups = weights_of_samples(times), weights_of_groups(times, lanes)
+    behind = groups_behind(lanes) * lanes
     assert not of_samples[:, :NODES].any()
-    assert not of_groups[:, :8].any()
-    for k in range(8, len(times)):
+    assert not of_groups[:, :behind].any()
+    for k in range(behind, len(times)):
         past = [values[j] for place in range(NODES) for j in range(k - NODES, k) if j % NODES == place]
         assert of_samples[:, k] @ past == pytest.approx(values[k], rel=1e-11)
-        group = values[k // 8 * 8 - 8 : k // 8 * 8]
-        assert of_groups[:, k] @ [group[place_of(j, 8)] for j in range(NODES)] == pytest.approx(values[k], rel=1e-9)
+        groups = values[k // lanes * lanes - behind : k // lanes * lanes].reshape(-1, lanes)
+        assert of_groups[:, k] @ [groups[place_of(j, lanes)] for j in range(NODES)] == pytest.approx(values[k], rel=1e-9)
     for few in range(9):
-        assert weights_of_samples(times[:few]).shape == weights_of_groups(times[:few], 8).shape == (NODES, few)
-    for weights in weights_of_samples(np.repeat(times, 2)), weights_of_groups(np.repeat(times, 2), 8):
+        assert weights_of_samples(times[:few]).shape == weights_of_groups(times[:few], lanes).shape == (NODES, few)
+    for weights in weights_of_samples(np.repeat(times, 2)), weights_of_groups(np.repeat(times, 2), lanes):
         assert not np.isfinite(weights[:, 8:]).all(axis=0).any()
 
 
@@ -55,6 +65,27 @@ def test_lanes_are_extrapolated_to_one_iteration(order):
     by_rates = positions(fine[::8], order)  # all that is left of the lanes before are rates
     assert (by_rates.iterations[1:-1] > 1).any()
     assert np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max() <= 4e-16
+
+
+@pytest.mark.parametrize("walked", [False, True])
+@pytest.mark.parametrize("order", [0, 2])
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, walked, monkeypatch):
+    """Whatever the processor's: it runs such vectors too. On from where the grid changes it takes as many again."""
+    pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
+    monkeypatch.setattr("kincheck.core.program.compiler.vector_width", lambda: lanes)
+    monkeypatch.setattr("kincheck.core.program.machine_code.OFTEN", 10**9 if walked else 0)
+    grid = np.concatenate([np.linspace(-0.08, 0.0, 80), 0.001 * np.arange(1.0, 41.0), 0.06 + 0.001 * np.arange(1.0, 20.0)])
+    found, first = positions(grid, order, compiled=True), groups_behind(lanes) * lanes
+    expected = positions(grid, order).points["wheel"]
+    assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
+    assert order == 0 or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
+    below, above = found.iterations[78::-1], found.iterations[79:]  # the sides, from the start
+    assert (below[:first] > 1).any()
+    assert (below[first:] == 1).all()
+    assert (above[first:40] == 1).all()
+    assert (above[41 : 41 + first] > 1).any()
+    assert (above[41 + lanes + first :] == 1).all()
 
 
 @pytest.mark.parametrize("order", [0, 2])
@@ -93,6 +124,18 @@ def test_where_extrapolation_fails_the_rates_take_over(values, order, monkeypatc
         assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
         assert order == 0 or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
     np.testing.assert_array_equal(*(found.iterations for found in both))  # predicted by the same
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+def test_beyond_a_long_step_groups_are_counted_anew(lanes, monkeypatch):
+    """A group of eight is accepted in part there, and those after it begin at no multiple of eight."""
+    pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
+    monkeypatch.setattr("kincheck.core.program.compiler.vector_width", lambda: lanes)
+    angles = np.concatenate([0.002 * np.arange(21.0), 0.94 + 0.002 * np.arange(60.0)])
+    found = sweep(compile_model(slider_crank(), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, angles), 1e-12)
+    assert np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max() <= 1e-15
+    assert (found.iterations[21:25] > 1).any()
+    assert (found.iterations[-40:] == 1).all()
 
 
 @pytest.mark.usefixtures("eight_lanes")

@@ -29,6 +29,7 @@ from kincheck.core.program import (
     machine_code,
     maximum,
     minimum,
+    place_of,
     program,
     sin,
     sqrt,
@@ -84,7 +85,7 @@ def test_all_lanes_may_read_a_few_of_their_group():
     """The first of them, the last, and some between; of machine code a group is a vector."""
     lanes = compiler.vector_width()
     values = np.random.default_rng(0).normal(size=(1, lanes))
-    read = values[0, [k * (lanes - 1) // (NODES - 1) for k in range(NODES)]]
+    read = values[0, [place_of(k, lanes)[1] for k in range(NODES)]]
     for executor in executors(lambda x: sum((10.0**k * x.tape.at(k, 0) for k in range(NODES)), 0.0), 1, lanes):
         executor.put([0], values)
         executor.run("f")

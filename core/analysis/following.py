@@ -1,7 +1,7 @@
 """Programs that follow a motion: what lanes are predicted from, how, and which of them are accepted (see `programs`).
 
 predict   from state, v, a and time; time    -> state        Taylor step of second order
-extrapolate   states of the group of lanes before, weights   -> state        through `NODES` of them, without v and a; and what is
+extrapolate   states of the groups of lanes before, weights   -> state       through `NODES` of them, without v and a; and what is
                                                                 carried of the last of them
 extend    states of the samples before, weights   -> state        likewise, for lanes that are motions of their own
 gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
@@ -16,7 +16,21 @@ from functools import reduce
 import numpy as np
 
 from ..algebra import Scalar
-from ..program import DONE, MARGIN, NODES, Program, absolute, before, maximum, minimum, place_of, program, where_larger
+from ..program import (
+    DONE,
+    MARGIN,
+    NODES,
+    Program,
+    absolute,
+    before,
+    groups_behind,
+    maximum,
+    minimum,
+    place_of,
+    program,
+    where_larger,
+)
+from ..program.executor import shifted
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
 from .programs import Tracer
@@ -84,20 +98,39 @@ def predict(tracer: Tracer) -> Program:
     return program("predict", tracer.tape, out, tracer.prepared)
 
 
-def extrapolate(tracer: Tracer) -> Program:
-    """The state from what it is in the group of lanes before, by the weights of those; see `weights_of_groups`."""
+def states(tracer: Tracer) -> list[int]:
+    """The slots of the state."""
+    return [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[name]]
+
+
+def past_slots(tracer: Tracer) -> list[int]:
+    """The slots in which what was there at up to `NODES` samples, or in groups of lanes, is remembered."""
+    return tracer.layout.vector(PAST, NODES * len(states(tracer)))
+
+
+def extrapolate(tracer: Tracer, lanes: int) -> Program:
+    """The state from what it is in the group of so many lanes before, or several, by the weights of those: `weights_of_groups`."""
     # and what is carried of the last of them, which is at hand here; but its time is no longer there
     time, last = tracer.layout.scalar(TIME), NODES - 1
     stood = {target: tracer.tape.at(last, source) for source, target in continued(tracer) if source not in (time, target)}
-    return _continued(tracer, "extrapolate", tracer.tape.at, stood)
+    state, behind = states(tracer), groups_behind(lanes)
+    past = past_slots(tracer) if behind > 1 else []
+    place = {slot: k for k, slot in enumerate(state)}
+    for source, target in shifted(past[0] if past else 0, state, behind):
+        stood[target] = tracer.tape.input(source)
+
+    def at(k: int, slot: int) -> Scalar:
+        group, _ = place_of(k, lanes)
+        return tracer.tape.at(k, slot if group == behind - 1 else past[group * len(state) + place[slot]])
+
+    return _continued(tracer, "extrapolate", at, stood)
 
 
 def extend(tracer: Tracer) -> Program:
     """The state from what it was at the last `NODES` samples, by the weights of those; see `weights_of_samples`."""
-    state = [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[name]]
-    past = tracer.vector(PAST, NODES * len(state))
+    state, past = states(tracer), past_slots(tracer)
     place = {slot: k for k, slot in enumerate(state)}
-    return _continued(tracer, "extend", lambda k, slot: past[k * len(state) + place[slot]], {})
+    return _continued(tracer, "extend", lambda k, slot: tracer.tape.input(past[k * len(state) + place[slot]]), {})
 
 
 def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]) -> Program:
@@ -113,17 +146,18 @@ def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], furt
 
 
 def weights_of_groups(times: Array, lanes: int) -> Array:
-    """Weights of `NODES` lanes of the group before, for samples in groups of so many lanes.
+    """Weights of `NODES` lanes of the group before, or several, for samples in groups of so many lanes.
 
     Args:
         times: of samples in the order in which they are gone through, shape (n,).
 
     Returns:
-        Shape (NODES, n): zero for the first group, not finite where two nodes share a time.
+        Shape (NODES, n): zero for the first groups, not finite where two nodes share a time.
     """
-    found, wanted = np.zeros((NODES, len(times))), np.arange(lanes, len(times))
-    before = wanted // lanes * lanes - lanes
-    found[:, wanted] = _lagrange(times[wanted], times[before + [[place_of(k, lanes)] for k in range(NODES)]])
+    behind = groups_behind(lanes) * lanes
+    found, wanted = np.zeros((NODES, len(times))), np.arange(behind, len(times))
+    nodes = [[group * lanes + lane] for group, lane in (place_of(k, lanes) for k in range(NODES))]
+    found[:, wanted] = _lagrange(times[wanted], times[wanted // lanes * lanes - behind + nodes])
     return found
 
 

@@ -93,7 +93,6 @@ class Model:
         self.geometry = [slot for place in tracing.geometry for slot in self.vectors[place]]
         self.sampled = [self.slots[TIME]]
         self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
-        fans = bool(self.request.varied) and not self.request.state
         self._tangent = "outputs" if self.request.order == 2 else "tangent"
         kept = [slot for name in self._wanted() for slot in self.vectors[name]]
         self.rows = self._rows()
@@ -106,8 +105,9 @@ class Model:
             joined=() if self.request.state else following.JOINED,
             onward=(self._tangent,),
             sampled=[*self.sampled, *self.vectors.get(following.WEIGHT, ())],
-            remembered=[slot for name in self.state for slot in self.vectors[name]] if fans else (),
-            past=self.vectors[following.PAST][0] if fans else 0,
+            behind=tracing.behind,
+            remembered=[slot for name in self.state for slot in self.vectors[name]] if following.PAST in self.vectors else (),
+            past=self.vectors.get(following.PAST, (0,))[0],
             carried=tracing.carried,
             continued=tracing.continued,
             kept=[*kept, *(self.slots[name] for name in self._tests)],

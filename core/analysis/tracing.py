@@ -14,8 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from ..mechanism import Mechanism
-from ..program import ITERATIONS, Program
-from ..program.compiler import available
+from ..program import ITERATIONS, NODES, Program, compiler, groups_behind
 from ..program.shelf import kept
 from . import following
 from .components import Section
@@ -40,6 +39,7 @@ class Tracing:
         given: name of a vector that tells how a given body moves -> its value at rest at design.
         carried, continued: slots of a solved lane, and of what the lanes after it are predicted from, or continued.
         prepared: slots of what depends on the geometry alone.
+        behind: by how many groups of lanes those after them are extrapolated.
     """
 
     programs: Sequence[Program]
@@ -51,6 +51,7 @@ class Tracing:
     carried: Sequence[tuple[int, int]]
     continued: Sequence[tuple[int, int]]
     prepared: Sequence[int]
+    behind: int
     selection: Selection
     frame: Frames
 
@@ -61,10 +62,12 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     Raises:
         SolveError: drivers and degrees of freedom do not match.
     """
-    if section or request.varied or not (ours(mechanism) and request.compiled and available()):
-        return _trace(mechanism, request, section)
-    content = _source() + pickle.dumps((mechanism, request))
-    found: Tracing = pickle.loads(kept(content, lambda: pickle.dumps(_trace(mechanism, request, None))))
+    compiled = request.compiled and compiler.available()
+    lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
+    if section or request.varied or not (ours(mechanism) and compiled):
+        return _trace(mechanism, request, section, lanes)
+    content = _source() + pickle.dumps((mechanism, request, lanes))
+    found: Tracing = pickle.loads(kept(content, lambda: pickle.dumps(_trace(mechanism, request, None, lanes))))
     return found
 
 
@@ -84,13 +87,13 @@ def _source() -> bytes:
     return digest.digest()
 
 
-def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> Tracing:
+def _trace(mechanism: Mechanism, request: Request, section: Section | None, lanes: int) -> Tracing:
     tracer = Tracer(mechanism, request, section)
     programs = [tracer.newton(), following.predict(tracer)]
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
         programs.append(tracer.tangent())
     if not request.state:
-        programs.append(following.extrapolate(tracer))
+        programs.append(following.extrapolate(tracer, lanes))
     programs.append(tracer.outputs())
     programs += following.tests(tracer, neighbours=False)
     if not request.state:  # parts of a mechanism are attempted lane by lane
@@ -111,6 +114,7 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None) -> T
         carried,
         continued,
         tracer.prepared.slots,
+        groups_behind(lanes),
         tracer.selection,
         tracer.frame,
     )

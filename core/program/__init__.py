@@ -6,7 +6,21 @@ from .llvm_executor import LlvmExecutor
 from .machine_code import LlvmCode, make_loops_ready
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
-from .trace import NODES, Tape, Traced, absolute, before, cos, maximum, minimum, place_of, sin, sqrt, where_larger
+from .trace import (
+    NODES,
+    Tape,
+    Traced,
+    absolute,
+    before,
+    cos,
+    groups_behind,
+    maximum,
+    minimum,
+    place_of,
+    sin,
+    sqrt,
+    where_larger,
+)
 
 __all__ = [
     "DONE",
@@ -29,6 +43,7 @@ __all__ = [
     "absolute",
     "before",
     "cos",
+    "groups_behind",
     "make_loops_ready",
     "maximum",
     "minimum",

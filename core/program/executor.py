@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .straight_line import Program
-from .trace import NODES
+from .trace import groups_behind
 
 Table = TypeVar("Table", bound=NDArray[Any])
 
@@ -31,8 +31,9 @@ class Plan:
     programs in `after`, and at last those of a test, whose margin is positive where the lane may be accepted.
 
     Where there is a program `extrapolate` it takes the place of `predict` for lanes that follow a group that was accepted whole:
-    it goes by what stands in those lanes, and needs nothing of what `onward` puts out. What is carried of the last of them it may
-    put out itself. So does `extend`, for lanes that have come through `NODES` samples: it goes by what is remembered of these.
+    it goes by what stands in those lanes, and needs nothing of what `onward` puts out. Where groups are of few lanes it goes by
+    several of them, and remembers the earlier ones itself. What is carried of the last lane it may put out, too. So does `extend`,
+    for lanes that have come through `NODES` samples: it goes by what is remembered of these.
 
     Attributes:
         programs: by name; they share one layout of slots.
@@ -42,8 +43,10 @@ class Plan:
         onward: names of the programs that make a solved lane ready to be predicted from; they may be in `after` too.
         sampled: slots that are given anew at every sample; what `extrapolate` is given holds for groups that begin at a multiple
             of their lanes.
-        remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for `extend`.
-        past: the slot it begins to keep them at: those of sample k are at place k modulo `NODES`.
+        behind: how many groups `extrapolate` goes by.
+        remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for `extend`, and `follow` what was
+            there in all groups but the last that `extrapolate` goes by.
+        past: the slot they begin to keep them at: those of sample k are at place k modulo `NODES`, those of groups in order.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
         continued: the same where those after it are not predicted by `predict`; as `carried` where nothing is said.
         kept: slots that are stored of every sample.
@@ -61,6 +64,7 @@ class Plan:
     joined: Sequence[str] = ()
     onward: Sequence[str] = ()
     sampled: Sequence[int] = ()
+    behind: int = 1
     remembered: Sequence[int] = ()
     past: int = 0
     carried: Sequence[tuple[int, int]] = ()
@@ -95,8 +99,20 @@ class Plan:
         return [pair for pair in self.carried_on if pair[1] not in self.programs["extrapolate"].outputs]
 
     def extrapolates(self, lanes: int) -> bool:
-        """Whether a group of that many lanes is followed by extrapolation."""
-        return "extrapolate" in self.programs and lanes >= NODES
+        """Whether groups of that many lanes are followed by extrapolation."""
+        return "extrapolate" in self.programs and groups_behind(lanes) == self.behind
+
+    @property
+    def shifted(self) -> Sequence[tuple[int, int]]:
+        """Slots of the last group and those before, and where they are remembered when it becomes one of those."""
+        return shifted(self.past, self.remembered, self.behind)
+
+
+def shifted(past: int, remembered: Sequence[int], behind: int) -> Sequence[tuple[int, int]]:
+    """See `Plan.shifted`."""
+    count = len(remembered)
+    places = [*range(past, past + (behind - 1) * count), *remembered]
+    return list(zip(places[count:], places, strict=False))
 
 
 def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -244,7 +260,10 @@ class Track(Protocol):
     worst: Array
 
     def begin(self) -> Array:
-        """Room for `Plan.kept` of all samples, shape (kept, n), which is filled from now on."""
+        """Room for `Plan.kept` of all samples, shape (kept, n), which is filled from now on.
+
+        Hold it as long as samples are followed: it is not held here, for it may be large, and belongs to whoever asked for it.
+        """
         ...
 
     def run(self) -> Sequence[int]:

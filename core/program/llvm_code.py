@@ -91,10 +91,13 @@ class Lines:
         return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
 
     def umax(self, a: str, b: str) -> str:
-        """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and NaN comes last."""
+        """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and NaN comes last.
+
+        As whole numbers with a sign, although they have none: AVX2 compares only those, and takes four instructions for others.
+        """
         words = f"<{self.width} x i64>"
         x, y = (self.let(f"bitcast {self.vector} {each} to {words}") for each in (a, b))
-        larger = self.let(f"call {words} @llvm.umax.v{self.width}i64({words} {x}, {words} {y})")
+        larger = self.let(f"call {words} @llvm.smax.v{self.width}i64({words} {x}, {words} {y})")
         return self.let(f"bitcast {words} {larger} to {self.vector}")
 
     def arithmetic(self, op: str, a: str, b: str) -> str:
@@ -168,4 +171,4 @@ def declarations(width: int) -> str:
     one = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector})" for name in ("sqrt", "fabs", "rint", "floor"))
     two = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})" for name in ("minimum", "maximum"))
     words, three = f"<{width} x i64>", f"declare {vector} @llvm.fmuladd.v{width}f64({vector}, {vector}, {vector})"
-    return f"{one}\n{two}\n{three}\ndeclare {words} @llvm.umax.v{width}i64({words}, {words})\n"
+    return f"{one}\n{two}\n{three}\ndeclare {words} @llvm.smax.v{width}i64({words}, {words})\n"

@@ -17,14 +17,15 @@ forget begins the worst anew, and clears that field: the calls after it go on. `
 def follow(width: int) -> str:
     """See `Track`: W samples at a time, and on from the last one accepted. Where nobody stays at the end, no anchor is left there.
 
-    What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends there.
+    What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends there. Of few lanes several
+    such groups come before it.
     """
     vector, test = f"<{width} x double>", Lines(width, "test")
     accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
     body = f"""{_told("motion", MOTION)}
   {_told("side", SIDE)}
   %descending = icmp slt i64 %step, 0
-  %extrapolates = icmp ne i64 %plan_extrapolates, 0
+  %extrapolates = icmp ne i64 %plan_behind, 0
   %quick = icmp ne i64 %plan_quick, 0
   %forget_at = getelementptr i64, ptr %motion, i64 {_index(MOTION, "forget")}
   store i64 0, ptr %forget_at, align 8
@@ -36,6 +37,7 @@ head:
   %at = phi i64 [%from, %entry], [%next, %pass], [%next, %take]
   %smooth = phi i1 [false, %entry], [%extrapolates, %pass], [false, %take]
   %whole_before = phi i1 [false, %entry], [false, %pass], [%onto, %take]
+  %behind = phi i64 [0, %entry], [%behind_now, %pass], [%behind_now, %take]
   %more = icmp slt i64 %at, %stop
   br i1 %more, label %attempt, label %end
 attempt:
@@ -61,10 +63,13 @@ attempt:
   %full = and i1 %every, %quick
   %further = icmp slt i64 %next, %stop
   %onto = and i1 %full, %extrapolates
-  %largest_offset = select i1 %extrapolates, i64 0, i64 {width}
-  %aligned = icmp ule i64 %offset, %largest_offset
+  %aligned = icmp eq i64 %offset, 0
+  %counts = and i1 %every, %aligned
+  %one_more = add i64 %behind, 1
+  %behind_now = select i1 %counts, i64 %one_more, i64 0
+  %enough = icmp uge i64 %behind_now, %plan_behind
   %going = and i1 %full, %further
-  %whole = and i1 %going, %aligned
+  %whole = and i1 %going, %enough
   %none = icmp eq i64 %accepted, 0
   br i1 %none, label %missed, label %keep
 missed:
@@ -103,6 +108,7 @@ pass:
   {over("spread", "moves", f"i64 {width - 1}")}
   br label %head
 onward:
+  {over("copy", "shifted")}
   {over("calls", "remaining")}
   br label %take
 take:

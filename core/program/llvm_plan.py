@@ -15,13 +15,13 @@ from .llvm_code import Lines
 
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
 """Slots that loops read and write, by their names in the plan."""
-NUMBERS = ("stride", *SLOTS, "tolerance", "most", "extrapolates", "quick", "past", "state")
+NUMBERS = ("stride", *SLOTS, "tolerance", "most", "behind", "quick", "past", "state")
 """Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the next, and "state" is how many slots
-are remembered."""
+are remembered. Where nothing is extrapolated "behind" is zero."""
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
 """Each the address of a call: that of a function of lanes and a table, and that of the table."""
 CALLS = ("after", "alone", "joined", "onward", "remaining")
-PAIRS = ("carried", "returned", "moves", "continued", "remembered")
+PAIRS = ("carried", "returned", "moves", "continued", "remembered", "shifted")
 TABLES: Mapping[str, int] = {
     **dict.fromkeys(CALLS, 1),
     **dict.fromkeys(PAIRS, 2),
@@ -149,6 +149,7 @@ class PlanInMemory:
             "moves": in_order(plan.moved if extrapolates else plan.carried),
             "continued": in_order(plan.carried_on),
             "remembered": [(slot, k) for k, slot in enumerate(plan.remembered)],
+            "shifted": plan.shifted,
         }
         vector, worst = 8 * width, [(plan.largest, 1.0, 0.0), (plan.smallest, -1.0, -np.inf)]
         self._tables: dict[str, NDArray[np.int64]] = {
@@ -164,7 +165,7 @@ class PlanInMemory:
             **{name: plan.slots.get(slot, 0) for name, slot in SLOTS.items()},
             "tolerance": _bits(plan.tolerance),
             "most": plan.most,
-            "extrapolates": extrapolates,
+            "behind": plan.behind if extrapolates else 0,
             "quick": extrapolates or not plan.remaining,
             "past": plan.past,
             "state": len(plan.remembered),

@@ -110,7 +110,7 @@ class _Straight(Lines):
         if node[0] == "larger":
             return self._masks[k]
         if node[0] == "node":
-            place = self.number(self.slot(int(node[1])), place_of(int(node[2]), self.width))
+            place = self.number(self.slot(int(node[1])), place_of(int(node[2]), self.width)[1])
             name = self.spread(self.anew(f"load double, ptr {place}, align 8"))
         else:
             place = self.slot(int(node[1])) if node[0] == "input" else self._place(self._stacked[k])

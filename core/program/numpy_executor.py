@@ -215,7 +215,7 @@ class NumpyExecutor:
                 place.append(block[slot] if times == 1 else block[slot : slot + times])
                 continue
             if op == "node":
-                lane = place_of(int(rest[1]), self.lanes)
+                _, lane = place_of(int(rest[1]), self.lanes)
                 place.append(self.block[int(rest[0]), lane : lane + 1])
                 continue
             if op == "const":

@@ -19,9 +19,10 @@ Node: TypeAlias = tuple[str, *tuple[float, ...]]
 true where |a| > |b|; "where" m p q is p where m is true, else q; "before" x a is the x of the lane before, and a in the first lane.
 """
 LEAVES = frozenset({"input", "const", "node"})
-"""What has no operands. "node" s k is what stands in slot s of lane k among `NODES` of a group of lanes, for all lanes alike."""
+"""What has no operands. "node" s k is what stands in slot s of the lane that is number k of `NODES`, for all lanes alike."""
 NODES = 6
-"""Lanes of a group that later ones may be extrapolated from, from the first to the last, about as far from each other."""
+"""Lanes that later ones may be extrapolated from, about as far from each other: of a group, or of several that follow one another
+where a group has fewer."""
 
 
 class Tape:
@@ -231,6 +232,11 @@ def operands(node: Node) -> tuple[int, ...]:
     return () if node[0] in LEAVES else tuple(map(int, node[1:]))
 
 
-def place_of(k: int, lanes: int) -> int:
-    """The lane of a group that is number k of `NODES`."""
-    return k * (lanes - 1) // (NODES - 1)
+def groups_behind(lanes: int) -> int:
+    """How many groups of so many lanes `NODES` are among."""
+    return -(-NODES // lanes)
+
+
+def place_of(k: int, lanes: int) -> tuple[int, int]:
+    """Number k of `NODES`: in which of those groups, the earliest first, and which of its lanes."""
+    return divmod(k * (groups_behind(lanes) * lanes - 1) // (NODES - 1), lanes)

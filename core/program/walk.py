@@ -64,7 +64,7 @@ def walk(program: Program, slots: int, width: int) -> Walk:
             if op == "const":
                 numbers: Sequence[int] = _HALVES.unpack(_NUMBER.pack(nodes[k][1]))
             elif op == "node":
-                numbers = (int(nodes[k][1]) * vector + 8 * place_of(int(nodes[k][2]), width),)
+                numbers = (int(nodes[k][1]) * vector + 8 * place_of(int(nodes[k][2]), width)[1],)
             else:
                 numbers = [place[x] for x in operated[k]]
                 for x in operated[k]:
