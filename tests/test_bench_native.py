@@ -22,7 +22,7 @@ def test_native_efforts_go_from_coarse_to_fine():
     assert iterations[0] == 1.0
     assert iterations == sorted(iterations)
     assert errors == sorted(errors, reverse=True)
-    assert errors[0] > 1e-8
+    assert errors[0] > 1e-10  # extrapolated by 8 lanes 2e-8, by twice four 3e-9
     assert errors[-1] < 1e-14
     assert len({json.dumps(dict(each.settings)) for each in found}) == len(found)
 
@@ -39,7 +39,7 @@ def test_levels_give_what_is_asked_and_no_more():
 def test_loops_alone_reach_every_sample_or_say_so():
     pytest.importorskip("llvmlite")
     case = cases.load("mcpherson_strut")
-    levels.loops_alone(case, TOL)()
+    assert np.isfinite(levels.loops_alone(case, TOL)()).all()
     out_of_reach = replace(case, sweep=replace(case.sweep, values=np.linspace(0.0, 0.6, 61)))
     with pytest.raises(SolveError, match="of 61 samples"):
         levels.loops_alone(out_of_reach, TOL)()

@@ -264,5 +264,6 @@ def test_a_group_that_is_accepted_in_part_is_followed_on(compiled):
     )
     bound = marcher(route, TOL, crossing=False)
     bound.run()
-    bound.track.begin()
+    kept = bound.track.begin()
     assert [*bound.track.run()] == [64]
+    assert np.isfinite(kept).all()

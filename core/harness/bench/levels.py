@@ -15,7 +15,7 @@ from ...analysis.route import Route
 from ...analysis.sweep import follow
 from ...errors import SolveError
 from ...program.compiler import available
-from ...trajectory import Trajectory
+from ...trajectory import Array, Trajectory
 from ..case import Case
 
 EVERYTHING = "every body and point: position, velocity, acceleration"
@@ -88,7 +88,7 @@ SAMPLES, MOTIONS = ("extrapolate", *following.JOINED), ("extend", *following.ALO
 """Names of the programs that predict and test lanes, by what lanes are."""
 
 
-def loops_alone(case: Case, tol: float) -> Callable[[], None]:
+def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
     """The executor's loops over all samples, everything asked for: no Python but two calls, no result made of the numbers.
 
     It is to the native engine what a floor is to a simulator, tests and copying included.
@@ -99,11 +99,12 @@ def loops_alone(case: Case, tol: float) -> Callable[[], None]:
     route = Level().build(case)
     track = marcher(route, tol, crossing=False).track
 
-    def work() -> None:
-        track.begin()
+    def work() -> Array:
+        kept = track.begin()
         for went, side in zip(track.run(), route.sides, strict=True):
             if went < side.count:
                 raise SolveError(f"case {case.name!r}: the loops alone end after {went} of {side.count} samples on one side")
+        return kept
 
     return work
 
