@@ -20,7 +20,7 @@ from .cartesian import COLUMNS, Cartesian
 from .equations import Constraint, Style, constraints, frames
 from .freedom import FreedomAccount, account
 from .poses import jacobian
-from .redundancy import RANK_TOLERANCE, independent_joint_rows, independent_rows
+from .redundancy import DIGITS, RANK_TOLERANCE, independent_joint_rows, independent_rows
 from .request import CONSISTENT
 from .screws import Screw, free_motions, screws
 
@@ -136,8 +136,8 @@ class Ranks:
         found: list[Dependency] = []
         for k in sorted(set(range(self.joint_rows)) - set(kept)):
             weights: Array = joints[k] @ np.linalg.pinv(joints[kept])
-            terms = [(w, self.rows[row]) for w, row in zip(weights.tolist(), kept, strict=True) if abs(w) > OWED]
-            found.append(Dependency(self.rows[k], tuple(sorted(terms, key=lambda term: -abs(term[0])))))
+            terms = [(float(weights[at]), self.rows[kept[at]]) for at in _largest_first(weights) if abs(weights[at]) > OWED]
+            found.append(Dependency(self.rows[k], tuple(terms)))
         return found
 
     @cached_property
@@ -148,7 +148,7 @@ class Ranks:
         found: list[tuple[float, list[Row]]] = []
         for k in np.flatnonzero((values > RANK_TOLERANCE * scale) & (values < NEARLY * scale)):
             share = np.abs(u[:, k])
-            found.append((float(values[k]), [self.rows[row] for row in np.argsort(-share) if share[row] > SHARE * share.max()]))
+            found.append((float(values[k]), [self.rows[row] for row in _largest_first(share) if share[row] > SHARE * share.max()]))
         return found
 
     @cached_property
@@ -201,7 +201,7 @@ class Ranks:
     def _violations(self, amounts: Array, length: float) -> list[Violation]:
         """The rows with the largest amounts; those of lengths are in this unit."""
         largest = np.abs(amounts).max(initial=0.0)
-        order = [int(k) for k in np.argsort(-np.abs(amounts)) if abs(amounts[k]) > max(SHARE * largest, OWED * OWED)]
+        order = [k for k in _largest_first(amounts) if abs(amounts[k]) > max(SHARE * largest, OWED * OWED)]
         units = [length if "along" in self.rows[k].holds else 1.0 for k in order]
         return [Violation(self.rows[k], float(amounts[k]) * unit) for k, unit in zip(order, units, strict=True)]
 
@@ -222,6 +222,13 @@ class Ranks:
                 break
         phi = np.array(self.formulation.phi(self.formulation.configuration(state)))
         return self._violations(phi, self.frame.unit) if np.abs(phi).max(initial=0.0) > CONSISTENT else []
+
+
+def _largest_first(amounts: Array) -> list[int]:
+    """Indices by size; of equals, to all but round-off, in their own order: the same on every processor."""
+    sizes = np.abs(amounts)
+    scale = float(sizes.max(initial=0.0)) or 1.0
+    return np.argsort(-np.round(sizes / scale, DIGITS), kind="stable").tolist()
 
 
 def _direction(a: Array) -> str:

@@ -18,6 +18,8 @@ SHARE = 1e-6
 # Anything from 0.1 to 0.3 leaves out the same rows of 113 pairs of four-bars; 0.5 takes one of the ground's hinges apart, 1 most.
 LARGE = 0.3
 """Rows with this part of the largest weight can be left out as well as those that have it."""
+DIGITS = 9
+"""Decimals to which parts are compared: what is equal but for round-off is so on every processor, and the first is chosen."""
 # Work and memory grow with the square of what is looked at together. Mechanisms have less, senseless files have thousands.
 PORTION = 2
 """Conditions that are looked at together, for every unknown."""
@@ -74,9 +76,9 @@ def _left_out(weights: Mapping[int, Array], conditions: Sequence[Condition]) -> 
             at = [place[row] for row in each.rows]
             part = float(sizes[at[0]]) if len(at) == 1 else _least(left[at])
             if part > SHARE:
-                candidates.append(_Candidate(True, each.remote, True, part, at))
+                candidates.append(_Candidate(True, each.remote, True, round(part, DIGITS), at))
             else:
-                candidates += [_Candidate(each.steady, each.remote, False, float(sizes[k]), [k]) for k in at]
+                candidates += [_Candidate(each.steady, each.remote, False, round(float(sizes[k]), DIGITS), [k]) for k in at]
         large = LARGE * max(each.part for each in candidates)
         chosen = max((each for each in candidates if each.part >= large), key=lambda each: each[:-1]).at
         found.update(chosen)
