@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..core.analysis.prepare import Solver, prepare
@@ -13,6 +12,7 @@ from ..core.analysis.request import LAST_ITERATION, Request
 from ..core.harness.case import Case
 from ..core.program.compiler import available
 from ..core.trajectory import Trajectory
+from ..core.version import VERSION
 
 # Residuals from which Newton's last step starts, by effort: what that step leaves is about its square.
 EFFORTS: Mapping[str, float] = {
@@ -50,10 +50,7 @@ class Native:
 
     def version(self) -> str | None:
         """Version of kincheck."""
-        try:
-            return version("kincheck")
-        except PackageNotFoundError:
-            return None
+        return VERSION
 
     def unsupported(self, case: Case) -> str | None:
         """Never: a joint is supported by being composed of primitives."""

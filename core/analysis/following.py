@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import reduce
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,8 +34,10 @@ from ..program import (
 from ..program.executor import shifted
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
-from .programs import Tracer
 from .request import ACCEPT, BLOCKS, EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME
+
+if TYPE_CHECKING:
+    from .programs import Tracer
 
 WEIGHT, PAST = "weight", "past"
 """The vectors of the samples that a state is continued through: their weights, and where they are remembered their states."""

@@ -20,7 +20,6 @@ from . import following
 from .components import Section
 from .equations import Frames
 from .freedom import Selection
-from .programs import Tracer
 from .request import Request
 
 CORE = Path(__file__).parents[1]
@@ -88,6 +87,8 @@ def _source() -> bytes:
 
 
 def _trace(mechanism: Mechanism, request: Request, section: Section | None, lanes: int) -> Tracing:
+    from .programs import Tracer  # with all that tracing takes: who finds it done does without
+
     tracer = Tracer(mechanism, request, section)
     programs = [tracer.newton(), following.predict(tracer)]
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import platform
 import statistics
 import subprocess
@@ -17,6 +16,7 @@ import msgspec
 import numpy as np
 
 from ..motions import Absolute, Motion
+from ..version import VERSION
 from .case import TIME, Case, Truth
 from .compare import as_numbers
 from .record import OutputSeries, Record, Results
@@ -45,7 +45,7 @@ def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, comma
     """What is known of a run before it begins, as JSON has it."""
     return plain(
         {
-            "kincheck": importlib.metadata.version("kincheck"),
+            "kincheck": VERSION,
             "python": platform.python_version(),
             "numpy": np.__version__,
             "engines": {},

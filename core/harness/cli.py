@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.metadata
 import os
 import shlex
 import sys
@@ -12,6 +11,7 @@ import traceback
 from collections.abc import Sequence
 
 from ..errors import KincheckError
+from ..version import VERSION
 from .commands import COMMANDS
 from .commands.house import House, Status
 from .console import complain
@@ -21,7 +21,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
     argv = sys.argv[1:] if argv is None else list(argv)
     try:
-        options = _parser().parse_args(argv, argparse.Namespace(command=shlex.join(["kincheck", *argv])))
+        options = _parser(argv).parse_args(argv, argparse.Namespace(command=shlex.join(["kincheck", *argv])))
     except SystemExit as end:  # argparse has said why
         return int(end.code or 0)
     try:
@@ -43,10 +43,12 @@ def house() -> House:
     return House(tuple(adapters.ENGINES), adapters.engine, cases.names, cases.load, *writers, tuple(adapters.SIMULATIONS))
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
+    """Of the command that the arguments begin with; of all, where they begin with none: to make each takes a millisecond."""
     parser = argparse.ArgumentParser(prog="kincheck", description="Cross-validation of the kinematics of multibody systems.")
-    parser.add_argument("--version", action="version", version=f"kincheck {importlib.metadata.version('kincheck')}")
+    parser.add_argument("--version", action="version", version=f"kincheck {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for name in COMMANDS:
+    named = [name for name in COMMANDS if argv and argv[0] == name.replace("_", "-")]
+    for name in named or COMMANDS:
         importlib.import_module(f".commands.{name}", __package__).add(commands)
     return parser

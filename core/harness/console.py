@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import re
 import shlex
 import sys
@@ -46,6 +45,8 @@ def lacking(results: Results, required: Sequence[str]) -> list[str]:
 
 def how_to_install(engine: str) -> str:
     """The command that installs an engine's simulator, whose name is its own up to a hyphen, from kincheck's own metadata."""
+    import importlib.metadata  # rarely needed, and slow
+
     wanted = [
         requirement.split(";")[0].strip()
         for requirement in importlib.metadata.requires("kincheck") or []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TextIO
 
 import msgspec
 from rich.console import Console
@@ -17,10 +18,14 @@ from .record import to_json
 LOG_WIDTH = 200
 
 
+def console(file: TextIO) -> Console:
+    """Where to print text as it is: names may have square brackets or colons, which rich takes for colours and pictures."""
+    return Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False, emoji=False)
+
+
 def page(json: str | None) -> Console:
     """Where to print: standard output, unless the JSON has it."""
-    file = sys.stderr if json == "-" else sys.stdout
-    return Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False)
+    return console(sys.stderr if json == "-" else sys.stdout)
 
 
 def columns(*heads: str, title: str | None = None) -> Table:

@@ -6,7 +6,6 @@ That is a statement about the equations that kincheck has made of the descriptio
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from ..analysis.proof import Drives, Proofs, prove
 from ..jet import Jet
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array
+from ..version import VERSION
 from .case import Case, Quantity
 from .compare import output_series
 from .references import ProvedSeries, Reference, Sample
@@ -90,7 +90,7 @@ def prove_case(case: Case, *, digits: int, numbers: str, tol: float) -> tuple[Re
         errors = _native_errors(case, found, values)
     made = Reference(
         case=case.name,
-        kincheck=importlib.metadata.version("kincheck"),
+        kincheck=VERSION,
         numbers=numbers,
         note=NOTE,
         digits=digits,

@@ -53,7 +53,7 @@ def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prep
             waiting += operands(node)
     position = {number: k for k, number in enumerate(sorted(live))}
     nodes = tuple(
-        node if node[0] in LEAVES else (node[0], *(position[int(x)] for x in node[1:])) for _, node in sorted(live.items())
+        node if node[0] in LEAVES else (node[0], *[position[x] for x in operands(node)]) for _, node in sorted(live.items())
     )
     return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()}, times)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 from ..algebra import Scalar
 
@@ -229,7 +229,7 @@ def before(x: Traced, first: Traced) -> Scalar:
 
 def operands(node: Node) -> tuple[int, ...]:
     """The nodes an operation reads."""
-    return () if node[0] in LEAVES else tuple(map(int, node[1:]))
+    return () if node[0] in LEAVES else cast("tuple[int, ...]", node[1:])
 
 
 def groups_behind(lanes: int) -> int:

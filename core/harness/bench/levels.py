@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +15,7 @@ from ...analysis.sweep import follow
 from ...errors import SolveError
 from ...program.compiler import available
 from ...trajectory import Array, Trajectory
+from ...version import VERSION
 from ..case import Case
 
 EVERYTHING = "every body and point: position, velocity, acceleration"
@@ -52,7 +52,7 @@ class Level:
 
     def version(self) -> str | None:
         """Version of kincheck."""
-        return importlib.metadata.version("kincheck")
+        return VERSION
 
     def unsupported(self, case: Case) -> str | None:
         """Never."""

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from ...errors import KincheckError
+from .. import printing
 from ..record import to_json
 from ..reporting.report import packed
-from ..reporting.table import LOG_WIDTH
 from ..reporting.wording import known, number
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
 
 def print_report(report: Report, file: TextIO) -> None:
     """Print the tables, each with its verdict and notes below."""
-    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    console = printing.console(file)
     console.print(Text(report.headline, style="bold"))
     console.print(Text(" · ".join(report.facts)), soft_wrap=True)
     for section in report.sections:

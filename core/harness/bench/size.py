@@ -7,7 +7,6 @@ as the first one does: the truth is a closed form.
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from ...joints import Revolute, Spherical, Universal
 from ...mechanism import Body, Mechanism, Point
 from ...program.compiler import available
 from ...trajectory import Trajectory
+from ...version import VERSION
 from ..case import Case, Output, Series, Sweep, Truth
 from ..engine import Engine
 from ..record import Outcome
@@ -121,7 +121,7 @@ class ByComponents:
 
     def version(self) -> str | None:
         """Version of kincheck."""
-        return importlib.metadata.version("kincheck")
+        return VERSION
 
     def unsupported(self, case: Case) -> str | None:
         """Never: for chains only."""

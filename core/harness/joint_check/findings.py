@@ -107,12 +107,12 @@ class Report:
 
     def print(self, file: TextIO) -> None:
         """Print one line per check, then what was said of failures and skips, then a count."""
-        from rich.console import Console
         from rich.table import Table
         from rich.text import Text
 
-        # a log or a pipe has no width of its own; lines are not to be broken there
-        console = Console(file=file, width=None if file.isatty() else 200, highlight=False)
+        from .. import printing
+
+        console = printing.console(file)
         table = Table(box=None, pad_edge=False, header_style="bold")
         for name in ("check", "verdict", "worst", "limit", "at"):
             table.add_column(name, justify="right" if name in ("worst", "limit") else "left", no_wrap=name != "at")

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import TextIO
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from .. import printing
 from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
-from .table import COLOURS, LOG_WIDTH, QUANTITIES, messages, print_messages, signs, worst
+from .table import COLOURS, QUANTITIES, messages, print_messages, signs, worst
 
 NOT_ASKED = "–"
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
     """Print a row per case and a column per engine, then every message, then a count of outcomes."""
-    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    console = printing.console(file)
     table = Table(box=None, pad_edge=False, header_style="bold", caption=Text(visible(_reading(results))), caption_justify="left")
     table.add_column("case", overflow="fold")
     engines, rows = _laid_out(results)

@@ -9,19 +9,18 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from .. import printing
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
 QUANTITIES = {"position": LENGTH, "velocity": "m/s", "acceleration": "m/s²"}
-# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
-LOG_WIDTH = 200
 
 
 def print_table(results: Results, file: TextIO) -> None:
     """Print one line per record, then every message, then a count of outcomes."""
-    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    console = printing.console(file)
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("case", overflow="fold")
     for name in ("engine", "outcome"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ import numpy as np
 
 from ...analysis.enclosure import UnprovedError
 from ...errors import KincheckError, SolveError
+from ...version import VERSION
 from ..attempt import Failure, Pair
 from ..case import Case
 from ..circumstances import plain
@@ -96,7 +96,7 @@ def stress(
             found.unfinished[family.name] = str(error)
             tell(f"{family.name}: not finished: {error}")
     results = Stress(
-        kincheck=importlib.metadata.version("kincheck"),
+        kincheck=VERSION,
         command=command,
         seed=seed,
         samples=samples,

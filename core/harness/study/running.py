@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import pickle
 from collections import OrderedDict, deque
 from collections.abc import Callable, Generator
@@ -14,6 +13,7 @@ from typing import Any, TypeAlias
 from uuid import uuid4
 
 from ...errors import KincheckError
+from ...version import VERSION
 from ..attempt import said
 from ..workers.distributed import ClusterError, connected, loaded
 from ..workers.frames import pack
@@ -61,13 +61,13 @@ def on_cluster(address: str) -> Source:
 
     def solve(study: Study) -> Chunks:
         distributed = loaded()
-        packed, version = pack(study), importlib.metadata.version("kincheck")
+        packed = pack(study)
         name = f"kincheck-sweep-{uuid4().hex}"  # the scheduler takes equal names for one and the same task
         with connected(distributed, address) as client, _explained(distributed, address):
             waiting = deque[Any]()
             for first in range(0, study.chunks, OF_A_TASK):
                 last = min(first + OF_A_TASK, study.chunks)
-                task: Any = client.submit(solve_there, packed, first, last, version, key=f"{name}-{first}", pure=False)
+                task: Any = client.submit(solve_there, packed, first, last, VERSION, key=f"{name}-{first}", pure=False)
                 waiting.append(task)
                 # asked each time: workers may come and go
                 if len(waiting) >= AHEAD * max(1, sum(client.nthreads().values())):
@@ -103,9 +103,10 @@ def solve_there(packed: bytes, first: int, last: int, version: str) -> list[Chun
     Raises:
         ClusterError: the worker has another version of kincheck.
     """
-    mine = importlib.metadata.version("kincheck")
-    if mine != version:
-        raise ClusterError(f"kincheck {mine} on the cluster's worker, expected {version} as in the sweep; install the same there")
+    if version != VERSION:
+        raise ClusterError(
+            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the sweep; install the same there"
+        )
     key = hashlib.sha256(packed).digest()
     with _lock:  # threads of a worker share the model; two studies at a time are enough
         if key not in _ready:

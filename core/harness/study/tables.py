@@ -12,12 +12,11 @@ from types import TracebackType
 from typing import Any, Self, TextIO
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from ...errors import KincheckError
-from ..reporting.table import LOG_WIDTH
+from .. import printing
 from ..reporting.wording import number
 from ..visible import cell
 from .page import effect, headline
@@ -27,7 +26,7 @@ from .study import Chunk, Study
 
 def print_sweep(results: SweepResults, file: TextIO) -> None:
     """Print a line for each output, then what could not be solved, what deviates, and how fast it was."""
-    console = Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False)
+    console = printing.console(file)
     console.print(Text(headline(results), style="bold"))
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("output", "unit"):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 from collections.abc import Sequence
 from threading import Lock
 from typing import Any
 from uuid import uuid4
 
 from ...errors import KincheckError
+from ...version import VERSION
 from ..attempt import Attempt, Attempts, Failure, Pair, Solver, said
 from ..record import Outcome
 from .frames import pack
@@ -55,7 +55,6 @@ def connected(distributed: Any, address: str) -> Any:
 
 
 def _gathered(distributed: Any, client: Any, address: str, pairs: Sequence[Pair], limits: Limits) -> Attempts:
-    version = importlib.metadata.version("kincheck")
     name = f"kincheck-{uuid4().hex}"  # of tasks: the scheduler takes equal names for one and the same task
     tasks = dict[Any, int]()
     for index, pair in enumerate(pairs):
@@ -65,7 +64,7 @@ def _gathered(distributed: Any, client: Any, address: str, pairs: Sequence[Pair]
             yield index, Attempt(None, Failure(Outcome.ERROR, f"cannot be sent to a cluster: {said(error)}; define it in a module"))
             continue
         engine = f"{pair.engine.name} {pair.engine.mode}"
-        task = client.submit(solve_there, packed, engine, limits, version, key=f"{name}-{index}", pure=False)
+        task = client.submit(solve_there, packed, engine, limits, VERSION, key=f"{name}-{index}", pure=False)
         tasks[task] = index
     for task in distributed.as_completed(tasks, loop=client.loop):
         try:
@@ -101,9 +100,8 @@ _lock = Lock()
 
 def solve_there(packed: bytes, engine: str, limits: Limits, version: str) -> Attempt:
     """Solve a packed pair in a process beside this one, a cluster's worker, which keeps it for the engine's next pair."""
-    mine = importlib.metadata.version("kincheck")
-    if mine != version:
-        message = f"kincheck {mine} on the cluster's worker, expected {version} as in the run; install the same there"
+    if version != VERSION:
+        message = f"kincheck {VERSION} on the cluster's worker, expected {version} as in the run; install the same there"
         return Attempt(None, Failure(Outcome.ERROR, message))
     with _lock:
         idle = _idle.setdefault((engine, limits), [])
