@@ -101,39 +101,39 @@ def predict(tracer: Tracer) -> Program:
     return program("predict", tracer.tape, out, tracer.prepared)
 
 
-def states(tracer: Tracer) -> list[int]:
-    """The slots of the state."""
-    return [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[name]]
-
-
-def past_slots(tracer: Tracer) -> list[int]:
-    """The slots in which what was there at up to `NODES` samples, or in groups of lanes, is remembered."""
-    return tracer.layout.vector(PAST, NODES * len(states(tracer)))
-
-
 def extrapolate(tracer: Tracer, lanes: int) -> Program:
     """The state from what it is in the group of so many lanes before, or several, by the weights of those: `weights_of_groups`."""
     # and what is carried of the last of them, which is at hand here; but its time is no longer there
     time, last = tracer.layout.scalar(TIME), NODES - 1
     stood = {target: tracer.tape.at(last, source) for source, target in continued(tracer) if source not in (time, target)}
-    state, behind = states(tracer), groups_behind(lanes)
-    past = past_slots(tracer) if behind > 1 else []
+    state, behind = _state_slots(tracer), groups_behind(lanes)
+    past = _past_slots(tracer) if behind > 1 else state
+    stood |= {target: tracer.tape.input(source) for source, target in shifted(past[0], state, behind)}
+    groups = [*(past[k * len(state) :][: len(state)] for k in range(behind - 1)), state]
     place = {slot: k for k, slot in enumerate(state)}
-    for source, target in shifted(past[0] if past else 0, state, behind):
-        stood[target] = tracer.tape.input(source)
 
     def at(k: int, slot: int) -> Scalar:
         group, _ = place_of(k, lanes)
-        return tracer.tape.at(k, slot if group == behind - 1 else past[group * len(state) + place[slot]])
+        return tracer.tape.at(k, groups[group][place[slot]])
 
     return _continued(tracer, "extrapolate", at, stood)
 
 
 def extend(tracer: Tracer) -> Program:
     """The state from what it was at the last `NODES` samples, by the weights of those; see `weights_of_samples`."""
-    state, past = states(tracer), past_slots(tracer)
+    state, past = _state_slots(tracer), _past_slots(tracer)
     place = {slot: k for k, slot in enumerate(state)}
     return _continued(tracer, "extend", lambda k, slot: tracer.tape.input(past[k * len(state) + place[slot]]), {})
+
+
+def _state_slots(tracer: Tracer) -> list[int]:
+    """The slots of the state."""
+    return [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[name]]
+
+
+def _past_slots(tracer: Tracer) -> list[int]:
+    """The slots in which what was there at up to `NODES` samples, or in groups of lanes, is remembered."""
+    return tracer.layout.vector(PAST, NODES * len(_state_slots(tracer)))
 
 
 def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]) -> Program:
