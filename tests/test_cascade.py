@@ -5,16 +5,17 @@ from pathlib import Path as File
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import Gear, JointAngle, SolveError
-from kincheck.core.analysis.cascade import Cascade
+from kincheck.core import Gear, JointAngle, SolveError, solve
+from kincheck.core.analysis.cascade import WORST, Cascade
 from kincheck.core.analysis.cascade_sweep import LANES, CascadeSweep
 from kincheck.core.analysis.march import HALVINGS
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.request import FROM, TIME, Request, accept_by
+from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request, accept_by
 from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.motions import Path, Ramp
+from kincheck.core.program import MARGIN
 
 from .mechanisms import four_bar, mcpherson, slider_crank
 from .test_chain import LEAN, chain
@@ -150,6 +151,37 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
             np.testing.assert_array_equal(a, b)
         model = cascade.kinds[0].model
         assert going._lanes.anchor[0][0, [*model.plan.fixed].index(model.slots[FROM + TIME])] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("part", range(4))
+def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
+    """The first, which is driven, any of those that are alike, and the last; what is not a number is the worst of all."""
+    path, request = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)), Request(("turn",), ("end",), compiled=compiled)
+    cascade = Cascade(chain(3), request)
+    sweep = CascadeSweep(cascade, path)
+    lanes, times = sweep._lanes, np.linspace(0.005, 0.1, LANES)
+    lanes.anchor = sweep._departure[1]
+    lanes.accept_by(accept_by(1e-12))
+    assert len(cascade.parts) == 4
+    assert (lanes.attempt(times, path) > 0.0).all()
+    np.testing.assert_array_equal(lanes.worst[WORST.index("closure")], lanes.each("closure").max(axis=0))
+    np.testing.assert_array_equal(lanes.worst[WORST.index(SIGMA)], lanes.each(SIGMA).min(axis=0))
+    kind, member = cascade.place[part]
+    anchor, model = lanes.anchor, kind.model
+    column = [*model.plan.fixed].index(model.vectors[FROM + "q b0"][0])
+    anchor[cascade.kinds.index(kind)][member, column] = np.nan
+    lanes.anchor = anchor
+    assert not (lanes.attempt(times, path) > 0.0).any()
+    for name in ("closure", MARGIN):
+        assert np.isnan(lanes.worst[WORST.index(name)]).all()
+
+
+def test_nothing_may_be_wanted():
+    found = solve(chain(30), "turn", np.linspace(0.0, 0.3, 5), points=())
+    assert found.details["components"] == 31
+    assert found.solved.all()
+    assert not found.points
 
 
 @pytest.mark.parametrize("part", [1, 2, 14, 15, 16, 17, 30, 31, 39])

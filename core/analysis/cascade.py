@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -21,9 +22,11 @@ from ..trajectory import Array
 from .components import Component, Section, components, section
 from .equations import frames
 from .geometry import places
-from .model import CLOSED, Model, compile_model
-from .request import FROM, LARGEST_SIGMA, RATE, RATE_T, SIGMA, Request
+from .model import CLOSED, LARGEST_OF_PARTS, SMALLEST_OF_PARTS, Model, compile_model
+from .request import ACCEPT, FROM, LARGEST_SIGMA, RATE, RATE_T, SIGMA, Request
 
+WORST = (*LARGEST_OF_PARTS, *SMALLEST_OF_PARTS)
+"""Tests of which the worst of all components is known."""
 # A pose with smallest singular values above this part of their largest is sound enough to look over a singular pose from.
 SOUND = 0.1
 
@@ -42,6 +45,12 @@ class Kind:
     members: tuple[int, ...]
     fixed: Array
     base: int
+
+    @cached_property
+    def column(self) -> Mapping[str, int]:
+        """Where in what is fixed stands what tests go by: what they are told, and what was there before."""
+        names = (*ACCEPT, *(FROM + name for name in (SIGMA, LARGEST_SIGMA)))
+        return {name: list(self.model.plan.fixed).index(self.model.slots[name]) for name in names}
 
     def rows(self, name: str, member: int) -> range:
         """Rows of the world that hold what the model keeps of a member under a name."""
@@ -134,6 +143,7 @@ class Lanes:
 
     Attributes:
         world: all that is solved, shape (rows, room); see `Cascade`.
+        worst: the worst of all components, shape (WORST, room).
         last: the lane of the last of the times that were attempted last.
     """
 
@@ -143,6 +153,8 @@ class Lanes:
         room, self._groups = max(each.room for each in executors.values()), next(iter(executors.values())).groups
         self.world = aligned(cascade.rows * room).reshape(-1, room)
         self.world[:] = 0.0
+        self.worst = aligned(len(WORST) * room).reshape(-1, room)
+        self._best = np.array([[0.0]] * len(LARGEST_OF_PARTS) + [[np.inf]] * len(SMALLEST_OF_PARTS))
         self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
         self._ahead = [kind.fixed.copy() for kind in cascade.kinds]
         self._samples = [aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in cascade.kinds]
@@ -157,14 +169,14 @@ class Lanes:
             taken = np.array(rows, dtype=np.int64).reshape(len(parts), -1)
             now, ahead = self._fixed[k], self._ahead[k]
             for calls, (fixed, other) in zip(self._calls, ((now, ahead), (ahead, now)), strict=True):
-                self._parts.append(Parts(members, fixed, other, self._samples[k], taken, self.world, kind.base))
+                self._parts.append(Parts(members, fixed, other, self._samples[k], taken, self.world, kind.base, self.worst))
                 calls.append(executors[id(kind)].parts(self._parts[-1]))
 
     def accept_by(self, tolerances: Mapping[str, float]) -> None:
         """Set the tolerances."""
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             for name, value in tolerances.items():
-                fixed[:, list(kind.model.plan.fixed).index(kind.model.slots[name])] = value
+                fixed[:, kind.column[name]] = value
 
     @property
     def anchor(self) -> list[Array]:
@@ -178,20 +190,29 @@ class Lanes:
 
     def attempt(self, times: Array, path: Path) -> Array:
         """Solve all components at as many times as there are lanes, or fewer; the margin of each, positive where accepted."""
-        count = len(times)
+        return self.attempt_at(self.sampled(times, path))
+
+    def sampled(self, times: Array, path: Path) -> list[Array]:
+        """What is given at times, by kind, shape (sampled, times): of those that no driver moves one table for all."""
+        models, alone = [kind.model for kind in self.cascade.kinds], times[None]
+        driven = [(model, model.request.drivers) for model in models]
+        return [model.samples(times, path.drive(names, times)) if names else alone for model, names in driven]
+
+    def attempt_at(self, tables: Sequence[Array]) -> Array:
+        """As `attempt`, of what is given at the times."""
+        count = tables[0].shape[1]
         self.last = count - 1
-        for kind, samples in zip(self.cascade.kinds, self._samples, strict=True):
-            names = kind.model.request.drivers
-            drive = path.drive(names, times) if names else np.zeros((3, 0, count))
-            samples[:, :count] = kind.model.samples(times, drive)
-            samples[:, count:] = samples[:, count - 1 : count]
+        for table, samples in zip(tables, self._samples, strict=True):
+            samples[:, :count] = table
+            samples[:, count:] = table[:, count - 1 :]
+        self.worst[:] = self._best
         groups = self._groups(count)
         for call in self._calls[0]:
             call(groups)
-        return self.each(MARGIN)[:, :count].min(axis=0)
+        return self.worst[WORST.index(MARGIN), :count]
 
     def each(self, name: str) -> Array:
-        """A scalar of all components, shape (components, room)."""
+        """A test that is kept of all components, shape (components, room)."""
         found: list[Array] = []
         for kind in self.cascade.kinds:
             size, first = kind.model.kept, kind.base + kind.model.rows[name].start
@@ -221,8 +242,7 @@ class Lanes:
     def sound(self) -> bool:
         """Whether nothing is nearly singular where the lanes are predicted from."""
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
-            slots = list(kind.model.plan.fixed)
-            sigma, largest = (fixed[:, slots.index(kind.model.slots[FROM + name])] for name in (SIGMA, LARGEST_SIGMA))
+            sigma, largest = (fixed[:, kind.column[FROM + name]] for name in (SIGMA, LARGEST_SIGMA))
             if not (sigma >= SOUND * largest).all():
                 return False
         return True

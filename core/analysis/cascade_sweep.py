@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ..errors import SolveError
 from ..motions import Path
+from ..program import ITERATIONS
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
-from .cascade import Cascade, Lanes
+from .cascade import WORST, Cascade, Lanes
 from .cascade_bridge import cross
 from .march import HALVINGS, MAX_ROUNDS, longest
 from .model import CLOSED
@@ -60,28 +61,36 @@ class CascadeSweep:
         """The motion at all samples; see `solve.solve`."""
         path, lanes = self.path, self._lanes
         n = len(path.times)
-        found = {name: np.full((n, len(rows)), np.nan) for name, rows in self._outputs.items()}
-        tests = {name: np.full(n, np.nan) for name in ("closure", "leftover", SIGMA, "iterations")}
+        rows = [row for each in self._outputs.values() for row in each]
+        table, worst = np.full((len(rows), n), np.nan), np.full((len(WORST), n), np.nan)
         messages: list[str] = []
         self._notes: list[str] = []
         start, departure, message = self._departure
         messages += [message] if message else []
-        for side in (path.times >= start, path.times < start) if not messages else ():
-            order = np.flatnonzero(side)[np.argsort(np.abs(path.times[side] - start), kind="stable")]
+        for order, samples in self._sides if not messages else ():
 
             def keep(samples: Indices | slice, lane: Indices | slice, order: Indices = order) -> None:
                 at = order[samples]
-                for name, rows in self._outputs.items():
-                    found[name][at] = lanes.world[rows][:, lane].T
-                for name, into in tests.items():
-                    each = lanes.each(name)[:, lane]
-                    into[at] = each.min(axis=0) if name == SIGMA else each.max(axis=0)
+                table[:, at] = lanes.world[rows][:, lane]
+                worst[:, at] = lanes.worst[:, lane]
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
-            message = self._follow(path.times[order], start, path, keep, tol)
+            message = self._follow(path.times[order], samples, start, path, keep, tol)
             messages += [message] if message else []
-        return self._trajectory(found, tests, messages)
+        found, at = dict[str, Array](), 0
+        for name, each in self._outputs.items():
+            found[name] = table[at : at + len(each)].T
+            at += len(each)
+        return self._trajectory(found, dict(zip(WORST, worst, strict=True)), messages)
+
+    @cached_property
+    def _sides(self) -> list[tuple[Indices, list[Array]]]:
+        """Of each side of the start the samples outwards, and what is given there."""
+        start, times = self._departure[0], self.path.times
+        sides = [np.flatnonzero(side) for side in (times >= start, times < start)]
+        orders = [side[np.argsort(np.abs(times[side] - start), kind="stable")] for side in sides]
+        return [(order, self._lanes.sampled(times[order], self.path)) for order in orders]
 
     @cached_property
     def _departure(self) -> tuple[float, list[Array], str]:
@@ -91,19 +100,20 @@ class CascadeSweep:
         if not path.from_design:
             way = path.lead_in()
             start = float(path.times[0])
-            message = self._follow(np.array([0.0, 1.0]), 0.0, way, _nothing, CLOSED)
+            times = np.array([0.0, 1.0])
+            message = self._follow(times, lanes.sampled(times, way), 0.0, way, _nothing, CLOSED)
             message = f"on the way to the first sample: {message}" if message else ""
         lanes.attempt(np.array([start]), path)  # the rates of the path where the mechanism stands
         lanes.carry(0)
         return start, lanes.anchor, message
 
-    def _follow(self, times: Array, here: float, path: Path, keep: Keep, tol: float) -> str:
-        """Follow the samples outwards; empty, or why they end."""
+    def _follow(self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float) -> str:
+        """Follow the samples outwards, with what is given there; empty, or why they end."""
         lanes, at, rounds, refused = self._lanes, 0, 0, list[int]()
         sound, start = lanes.anchor, here
         while at < len(times):
             ahead = times[at : at + LANES]
-            good = lanes.attempt(ahead, path) > 0.0
+            good = lanes.attempt_at([each[:, at : at + LANES] for each in given]) > 0.0
             accepted = len(ahead) if good.all() else int(good.argmin())
             if accepted:
                 keep(slice(at, at + accepted), slice(accepted))
@@ -174,7 +184,7 @@ class CascadeSweep:
         return Trajectory(
             points={name: motion(name) for name in request.points},
             solved=solved,
-            iterations=np.where(solved, tests["iterations"], 0.0).astype(np.int64),
+            iterations=np.where(solved, tests[ITERATIONS], 0.0).astype(np.int64),
             residual=float(tests["closure"][solved].max(initial=0.0)) * unit,
             message="; ".join(messages),
             details={

@@ -30,6 +30,12 @@ TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITE
 """Scalars that are kept of every sample, after the motions."""
 TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
 """Of variants these: where there is a solution, how sure, and what it took; there are very many to be written."""
+TESTS_OF_PARTS = ("closure", SIGMA, ORIENTATION, LARGEST_SIGMA)
+"""Of parts of a large mechanism these: what the next sample is accepted by, and whose fault it is if it is not."""
+LARGEST, SMALLEST = ("closure", "leftover"), (SIGMA,)
+"""Tests of which the worst is found over all samples."""
+LARGEST_OF_PARTS, SMALLEST_OF_PARTS = (*LARGEST, ITERATIONS), (*SMALLEST, MARGIN)
+"""Those of a sample, over all its parts."""
 
 
 def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
@@ -111,8 +117,8 @@ class Model:
             carried=tracing.carried,
             continued=tracing.continued,
             kept=[*kept, *(self.slots[name] for name in self._tests)],
-            largest=[self.slots["closure"], self.slots["leftover"]],
-            smallest=[self.slots[SIGMA]],
+            largest=[self.slots[name] for name in (LARGEST_OF_PARTS if request.state else LARGEST)],
+            smallest=[self.slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)],
             fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
             taken=[slot for name in self.given for slot in self.vectors[name]],
             tolerance=self.request.last_iteration,
@@ -133,7 +139,7 @@ class Model:
 
     @property
     def _tests(self) -> Sequence[str]:
-        return TESTS_OF_VARIANTS if self.request.varied and not self.request.state else TESTS
+        return TESTS_OF_PARTS if self.request.state else TESTS_OF_VARIANTS if self.request.varied else TESTS
 
     def _rows(self) -> dict[str, slice]:
         rows: dict[str, slice] = {}

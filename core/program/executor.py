@@ -50,7 +50,8 @@ class Plan:
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
         continued: the same where those after it are not predicted by `predict`; as `carried` where nothing is said.
         kept: slots that are stored of every sample.
-        largest, smallest: slots of which `follow` finds the largest and the smallest over the samples it keeps.
+        largest, smallest: slots of which the largest and the smallest are found: by `follow` over the samples it keeps, by `parts`
+            over the parts.
         fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
         taken: slots that a part takes from what was solved before it.
         tolerance: of the residual before an iteration; that iteration is the last.
@@ -155,6 +156,8 @@ class Parts:
         samples: values of `Plan.sampled`, shape (sampled, room).
         taken: rows of the world that `Plan.taken` come from, shape (parts, taken).
         world: all that has been solved, shape (rows, room); takes `Plan.kept` of a member from row `base + member * kept` on.
+        worst: takes the largest of `Plan.largest` and the smallest of `Plan.smallest`, lane by lane, of what stood there and of all
+            parts, NaN where that is among them; shape (largest and smallest, room).
     """
 
     members: NDArray[np.int64]
@@ -164,6 +167,7 @@ class Parts:
     taken: NDArray[np.int64]
     world: Array
     base: int
+    worst: Array
 
 
 class Executor(Protocol):

@@ -102,9 +102,9 @@ class LlvmExecutor:
     def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
         samples, addresses = parts.samples, [each.ctypes.data for each in (parts.taken, parts.world)]
-        own = [parts.members.ctypes.data, *(each.ctypes.data for each in (parts.fixed, parts.ahead, samples))]
-        tables = *own, samples.shape[1], *addresses
-        call = partial(self._code.call("parts", "parts"), self._address, len(parts.members), *tables, parts.base)
+        own = [each.ctypes.data for each in (parts.members, parts.fixed, parts.ahead, samples)]
+        tables = *own, samples.shape[1], *addresses, parts.base, parts.worst.ctypes.data
+        call = partial(self._code.call("parts", "parts"), self._address, len(parts.members), *tables)
 
         def count(groups: int) -> None:
             call(groups)

@@ -84,6 +84,11 @@ def parts(width: int) -> str:
     leave = Rows(width)
     last = leave.let(f"load double, ptr {leave.number(leave.slot(leave.entry(0, 2)), width - 1)}, align 8")
     leave.lines.append(f"store double {last}, ptr {leave.number('%ahead', leave.entry(1, 2))}, align 8")
+    worsen = Rows(width)
+    sign, worst_at = worsen.spread(worsen.entry(1, 3, "double")), worsen.number("%worst", worsen.product("%room", "%row"))
+    values = worsen.read(worsen.entry(0, 3)), worsen.let(f"load {worsen.vector}, ptr {worst_at}, align 8")
+    worse = worsen.call("maximum", *(worsen.arithmetic("*", sign, each) for each in values))  # NaN if either is
+    worsen.lines.append(f"store {worsen.vector} {worsen.arithmetic('*', sign, worse)}, ptr {worst_at}, align 8")
     tables = "ptr %members, ptr %own_all, ptr %ahead_all, ptr %samples, i64 %room, ptr %sources_all, ptr %world"
     body = f"""%bytes = mul i64 %plan_stride, {8 * width}
   br label %part
@@ -108,11 +113,13 @@ group:
   %given = getelementptr double, ptr %samples, i64 %first
   %from = getelementptr double, ptr %world, i64 %first
   %to = getelementptr double, ptr %from, i64 %first_at
+  %worst_here = getelementptr double, ptr %worst, i64 %first
   {over("give", "fixed", "ptr %own", "i64 1")}
   {over("take", "sampled", "ptr %given", "i64 %room")}
   {over("source", "taken", "ptr %sources", "ptr %from", "i64 %room")}
   {_ALONE}
   {over("keep", "kept", "ptr %to", "i64 %room")}
+  {over("worsen", "worst", "ptr %worst_here", "i64 %room")}
   %next = add i64 %g, 1
   %more = icmp slt i64 %next, %groups
   br i1 %more, label %group, label %end_part
@@ -123,6 +130,10 @@ end_part:
   br i1 %more_parts, label %part, label %end
 end:
   ret void"""
-    head = f"void @parts(ptr %plan, ptr %memory, i64 %count, {tables}, i64 %base, i64 %groups)"
-    rows = [source.function("source", "ptr %rows", "ptr %world", "i64 %room"), leave.function("leave", "ptr %ahead")]
+    head = f"void @parts(ptr %plan, ptr %memory, i64 %count, {tables}, i64 %base, ptr %worst, i64 %groups)"
+    rows = [
+        source.function("source", "ptr %rows", "ptr %world", "i64 %room"),
+        leave.function("leave", "ptr %ahead"),
+        worsen.function("worsen", "ptr %worst", "i64 %room"),
+    ]
     return "".join([*rows, function(head, body)])

@@ -36,7 +36,7 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
     "walk": ([llvm_walk.walker], {"walk": 2}),
     "follow": ([*_NEEDED, llvm_loops.run, llvm_follow.follow], {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3}),
     "fan": ([*_NEEDED, llvm_fan.fan], {"fan": 11}),
-    "parts": ([*_NEEDED, llvm_loops.parts], {"parts": 12}),
+    "parts": ([*_NEEDED, llvm_loops.parts], {"parts": 13}),
 }
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
 OFTEN, AGAIN, OPERATIONS = 150, 20, 3000

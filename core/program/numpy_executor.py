@@ -181,6 +181,7 @@ class NumpyExecutor:
     def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
         plan, block = self.plan, self.block
+        largest, smallest = np.split(parts.worst, [len(plan.largest)])
 
         def call(groups: int) -> None:
             for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
@@ -190,6 +191,8 @@ class NumpyExecutor:
                 self.attempt()
                 row = parts.base + member * len(plan.kept)
                 parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
+                np.maximum(largest, block[list(plan.largest)], out=largest)
+                np.minimum(smallest, block[list(plan.smallest)], out=smallest)
                 for slot, k in plan.left:
                     parts.ahead[member, k] = block[slot, -1]
 
