@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from .version import VERSION
+
 if TYPE_CHECKING:
     from .analysis.assemble import assemble
     from .analysis.assemblies import find_assemblies
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
     )
     from .mechanism import GROUND, Body, Mechanism, Point
     from .motions import Ramp, Sine, Table
+
+__version__ = VERSION
 
 __all__ = [
     "GROUND",
@@ -69,6 +73,7 @@ __all__ = [
     "Table",
     "Translational",
     "Universal",
+    "__version__",
     "assemble",
     "find_assemblies",
     "solve",

@@ -20,6 +20,7 @@ LONGEST = 300
 
 DESCRIPTION = {"errors", "algebra", "trajectory", "joints", "drivers", "motions", "mechanism", "topology"}
 MAY_IMPORT: dict[str, set[str]] = {
+    "version": set(),
     "errors": set(),
     "algebra": set(),
     "trajectory": set(),
@@ -32,8 +33,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "topology": {"drivers", "joints", "mechanism"},
     "analysis": {"primitives", "program", *DESCRIPTION},
     "jet": {"algebra"},
-    "harness": {"analysis", "jet", "primitives", "program", *DESCRIPTION},
-    "__init__": {"analysis", *DESCRIPTION},
+    "harness": {"analysis", "jet", "primitives", "program", "version", *DESCRIPTION},
+    "__init__": {"analysis", "version", *DESCRIPTION},
 }
 """Room of core (a module or a folder) -> the rooms it may import besides itself."""
 

@@ -1,5 +1,6 @@
 """The command line: exit statuses, messages, and what goes to which stream."""
 
+import importlib.metadata
 import json
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import kincheck.adapters
 import kincheck.cases
+import kincheck.core
 import pytest
 from kincheck.core.errors import CaseError
 from kincheck.core.harness import cli
@@ -180,6 +182,21 @@ def test_a_required_engine_is_run_even_if_others_were_asked_for(kincheck_main, c
     argv = ["run", "crank", "--engine", "native", "--require", "wrong", "--json", "-"]
     assert kincheck_main(*argv, engines=[RIGHT, WRONG]) == 1
     assert [each["engine"] for each in json.loads(capsys.readouterr().out)["records"]] == ["native", "wrong"]
+
+
+def test_the_version_is_that_of_the_installation(capsys):
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == f"kincheck {kincheck.core.__version__}\n"
+    assert kincheck.core.__version__ == importlib.metadata.version("kincheck")
+
+
+def test_a_command_loads_no_other():
+    code = (
+        "import sys; from kincheck.core.harness import cli; cli.main(['check-joint', '--help']);"
+        "print(*sorted(name.rpartition('.')[2] for name in sys.modules if '.harness.commands.' in name))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "check_joint house"
 
 
 def test_how_to_install_comes_from_the_metadata():

@@ -20,8 +20,8 @@ from .request import SIGMA, accept_by
 from .singularity import CONTINUED, listed
 
 # Samples at once: all are predicted from one pose, and the farther they are from it the more iterations they take, and the more are
-# tried in vain; and what a large chain takes its time for is memory. A chain of 200 loops takes 1.6 times as long with 24, one of
-# 16 loops half as long again with 8.
+# tried in vain; and what a large chain takes its time for is memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8
+# one of 16 loops takes 1.3 times as long.
 LANES = 16
 POINT = ("position", "velocity", "acceleration")
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
