@@ -209,7 +209,7 @@ class Lanes:
         groups = self._groups(count)
         for call in self._calls[0]:
             call(groups)
-        return self.worst[WORST.index(MARGIN), :count]
+        return self.worst[WORST.index(MARGIN), :count].copy()
 
     def each(self, name: str) -> Array:
         """A test that is kept of all components, shape (components, room)."""
