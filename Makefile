@@ -16,7 +16,7 @@ test: .venv/ready
 	$(BIN)/pyright
 	$(BIN)/pytest --numprocesses auto
 
-.venv/ready: pyproject.toml requirements.lock
+.venv/ready: pyproject.toml requirements.lock core/version.py
 ifdef UV
 	uv venv --quiet --allow-existing --python $(PYTHON) .venv
 	uv pip install --quiet --compile-bytecode --python $(BIN)/python --requirement requirements.lock

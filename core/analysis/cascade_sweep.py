@@ -67,7 +67,7 @@ class CascadeSweep:
         self._notes: list[str] = []
         start, departure, message = self._departure
         messages += [message] if message else []
-        for order, samples in self._sides if not messages else ():
+        for order, given in self._sides if not messages else ():
 
             def keep(samples: Indices | slice, lane: Indices | slice, order: Indices = order) -> None:
                 at = order[samples]
@@ -76,7 +76,7 @@ class CascadeSweep:
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
-            message = self._follow(path.times[order], samples, start, path, keep, tol)
+            message = self._follow(path.times[order], given, start, path, keep, tol)
             messages += [message] if message else []
         found, at = dict[str, Array](), 0
         for name, each in self._outputs.items():

@@ -103,14 +103,9 @@ class Plan:
         """Whether groups of that many lanes are followed by extrapolation."""
         return "extrapolate" in self.programs and groups_behind(lanes) == self.behind
 
-    @property
-    def shifted(self) -> Sequence[tuple[int, int]]:
-        """Slots of the last group and those before, and where they are remembered when it becomes one of those."""
-        return shifted(self.past, self.remembered, self.behind)
-
 
 def shifted(past: int, remembered: Sequence[int], behind: int) -> Sequence[tuple[int, int]]:
-    """See `Plan.shifted`."""
+    """Slots of the last group and those before, and where they are remembered when it becomes one of those; see `Plan`."""
     count = len(remembered)
     places = [*range(past, past + (behind - 1) * count), *remembered]
     return list(zip(places[count:], places, strict=False))

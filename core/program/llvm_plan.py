@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .executor import DONE, ITERATIONS, MARGIN, Plan, in_order
+from .executor import DONE, ITERATIONS, MARGIN, Plan, in_order, shifted
 from .llvm_code import Lines
 
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
@@ -149,7 +149,7 @@ class PlanInMemory:
             "moves": in_order(plan.moved if extrapolates else plan.carried),
             "continued": in_order(plan.carried_on),
             "remembered": [(slot, k) for k, slot in enumerate(plan.remembered)],
-            "shifted": plan.shifted,
+            "shifted": shifted(plan.past, plan.remembered, plan.behind),
         }
         vector, worst = 8 * width, [(plan.largest, 1.0, 0.0), (plan.smallest, -1.0, -np.inf)]
         self._tables: dict[str, NDArray[np.int64]] = {
