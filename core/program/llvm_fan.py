@@ -21,6 +21,7 @@ def fan(width: int) -> str:
     given = over("give", "sampled", "ptr %samples_here", "i64 %stride")
     body = f"""%bytes = mul i64 %plan_stride, {8 * width}
   %plane = mul i64 %columns, %lanes
+  %ahead = mul i64 %step, %lanes
   br label %group
 group:
   %g = phi i64 [0, %entry], [%next_group, %end_group]
@@ -65,7 +66,7 @@ keep:
   %column_at = mul i64 %column, %lanes
   %in_plane = add i64 %column_at, %group_at
   %out_here = getelementptr double, ptr %out, i64 %in_plane
-  {over("keep_alive", "kept", "ptr %out_here", "i64 %plane", f"{mask} %still")}
+  {over("keep_alive", "kept", "ptr %out_here", "i64 %plane", f"{mask} %still", "i64 %ahead")}
   %next = add i64 %k, 1
   %enough = icmp uge i64 %next, {NODES}
   br i1 %enough, label %continue, label %onward
@@ -93,20 +94,24 @@ end:
   ret void"""
     inputs = "ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted"
     head = f"void @fan(ptr %plan, {inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step)"
-    return f"declare i1 @llvm.vector.reduce.or.v{width}i1({mask})\n{_kept(width)}{function(head, body)}"
+    declared = f"declare void @llvm.prefetch.p0(ptr, i32, i32, i32)\ndeclare i1 @llvm.vector.reduce.or.v{width}i1({mask})\n"
+    return f"{declared}{_kept(width)}{function(head, body)}"
 
 
 def _kept(width: int) -> str:
     """Functions that put out a sample, NaN where a motion has ended, and remember it."""
     keep, remember = Rows(width), Rows(width, TOGETHER)
     # whole cache lines go straight to memory: to have each fetched first, only to be overwritten, takes a third of all time
-    past_caches = ", !nontemporal !{i32 1}" if width == LINE else ""
+    whole = width == LINE
+    past_caches = ", !nontemporal !{i32 1}" if whole else ""
     place = keep.number("%numbers", keep.product("%stride", "%row"))
     value = keep.choose("%still", keep.read(keep.entry()), keep.constant(math.nan))
     keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
+    if not whole:  # parts of them are fetched a sample ahead; to put them aside until they are whole takes as long as waiting
+        keep.lines.append(f"call void @llvm.prefetch.p0(ptr {keep.number(place, '%ahead')}, i32 1, i32 3, i32 1)")
     for k in range(TOGETHER):
         remember.at = remember.sum("%row", k)
         to = remember.sum("%past", remember.entry(1, 2))
         remember.write(to, remember.anew(f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"))
-    kept = keep.function("keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still")
+    kept = keep.function("keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still", "i64 %ahead")
     return kept + remember.function("remember", "i64 %past")
