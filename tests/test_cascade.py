@@ -5,7 +5,7 @@ from pathlib import Path as File
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import Gear, JointAngle, SolveError, solve
+from kincheck.core import Body, Gear, JointAngle, Point, SolveError, solve
 from kincheck.core.analysis.cascade import WORST, Cascade
 from kincheck.core.analysis.cascade_sweep import LANES, CascadeSweep
 from kincheck.core.analysis.march import HALVINGS
@@ -14,7 +14,7 @@ from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request, accept_by
 from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.reading.casefile import load_case
-from kincheck.core.motions import Path, Ramp
+from kincheck.core.motions import Path, Ramp, Sine
 from kincheck.core.program import MARGIN
 
 from .mechanisms import four_bar, mcpherson, slider_crank
@@ -58,6 +58,45 @@ def test_any_samples(times):
     for mechanism, driver in ((slider_crank(), "turn"), (four_bar(), "turn")):
         points = tuple(point.name for point in mechanism.points)
         assert_alike(*both(mechanism, Path({driver: Ramp(2.0)}, times), points))
+
+
+@pytest.mark.parametrize("first", [-7.0, 0.0, 3.0, 1000.0])
+def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
+    """The drivers go there in a second of their own; the path's own time may be any."""
+    mechanism, path = chain(3), Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5))
+    assert not path.from_design
+    assert_alike(*both(mechanism, path, ("end",)))
+
+
+def test_a_singular_pose_on_the_way_to_the_first_sample_is_told_every_time():
+    path = Path({"turn": Sine(2.4, 1e-2, np.pi / 2.0)}, np.linspace(2.0, 3.0, 5))
+    sweep = CascadeSweep(Cascade(chain(6), Request(("turn",), ("end",))), path)
+    told = [sweep.solve(1e-12).details["notes"] for _ in range(2)]
+    assert told[0] == told[1]
+    assert "crosses a singular pose near turn = 1.870" in told[0][0]
+
+
+def test_what_is_fixed_stands_still_beside_many_components():
+    m = chain(2)
+    still = Body("frame", fixed=True, origin=(0.5, 0.0, 0.0))
+    m = type(m)(m.name, [*m.bodies, still], m.joints, [*m.points, Point("mark", "frame", (1.0, 2.0, 3.0))], m.drivers)
+    request, path = Request(("turn",), ("mark",), ("frame",)), Path({"turn": Ramp(1.0)}, np.array([0.0, 0.2, LEAN + np.pi / 2.0]))
+    found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
+    assert found.solved.tolist() == [True, True, False]
+    mark, frame = found.points["mark"], found.bodies["frame"]
+    given = mark.position, mark.velocity, mark.acceleration, frame.r, frame.p, frame.v, frame.a
+    expected = (1.0, 2.0, 3.0), [0.0] * 3, [0.0] * 3, (0.5, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), [0.0] * 6, [0.0] * 6
+    for values, wanted in zip(given, expected, strict=True):
+        assert np.array_equal(values[:2], [wanted] * 2)
+        assert np.isnan(values[2]).all()
+
+
+def test_components_iterate_no_more_than_is_asked_for():
+    path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.2, 9))
+    once = Request(("turn",), ("end",), last_iteration=np.inf)
+    found = CascadeSweep(Cascade(chain(3), once), path).solve(np.inf)
+    assert (found.iterations == 1).all()
+    assert found.residual > 1e-10
 
 
 def test_components_built_alike_share_a_program():

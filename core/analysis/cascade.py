@@ -23,7 +23,7 @@ from .components import Component, Section, components, section
 from .equations import frames
 from .geometry import places
 from .model import CLOSED, LARGEST_OF_PARTS, SMALLEST_OF_PARTS, Model, compile_model
-from .request import ACCEPT, FROM, LARGEST_SIGMA, RATE, RATE_T, SIGMA, Request
+from .request import ACCEPT, EARLIER, FROM, LARGEST_SIGMA, RATE, RATE_T, SIGMA, TIME, Request
 
 WORST = (*LARGEST_OF_PARTS, *SMALLEST_OF_PARTS)
 """Tests of which the worst of all components is known."""
@@ -48,8 +48,8 @@ class Kind:
 
     @cached_property
     def column(self) -> Mapping[str, int]:
-        """Where in what is fixed stands what tests go by: what they are told, and what was there before."""
-        names = (*ACCEPT, *(FROM + name for name in (SIGMA, LARGEST_SIGMA)))
+        """Where in what is fixed stands what tests go by: what they are told, and what was there before; and the times of that."""
+        names = (*ACCEPT, EARLIER + TIME, *(FROM + name for name in (TIME, SIGMA, LARGEST_SIGMA)))
         return {name: list(self.model.plan.fixed).index(self.model.slots[name]) for name in names}
 
     def rows(self, name: str, member: int) -> range:
@@ -114,6 +114,7 @@ class Cascade:
             tuple(f"p{k}" for k in range(len(self.points[members[0]]))),
             tuple(f"b{k}" for k, name in enumerate(part.bodies) if name in self.request.bodies),
             compiled=self.request.compiled,
+            last_iteration=self.request.last_iteration,
             state=True,
             varied=varied,
         )
@@ -177,6 +178,11 @@ class Lanes:
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             for name, value in tolerances.items():
                 fixed[:, kind.column[name]] = value
+
+    def stand_at(self, time: float) -> None:
+        """Have what the lanes are predicted from stand at another time, with no step behind it: so it does on another path."""
+        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
+            fixed[:, [kind.column[FROM + TIME], kind.column[EARLIER + TIME]]] = time
 
     @property
     def anchor(self) -> list[Array]:

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolveError
 from ..motions import Path
 from ..program import ITERATIONS
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
@@ -25,6 +24,7 @@ from .singularity import CONTINUED, listed
 LANES = 16
 POINT = ("position", "velocity", "acceleration")
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
+STILL = 0.0, 0.0, 0.0
 
 
 Indices = NDArray[np.intp]
@@ -38,24 +38,30 @@ class CascadeSweep:
     def __init__(self, cascade: Cascade, path: Path) -> None:
         self.cascade, self.path = cascade, path
         self._lanes = Lanes(cascade, LANES)
-        self._outputs = self._places()
+        self._outputs, self._still = self._places()
 
-    def _places(self) -> dict[str, list[int]]:
-        """Rows of the world of everything wanted, by name."""
-        cascade = self.cascade
-        found: dict[str, list[int]] = {}
+    def _places(self) -> tuple[dict[str, list[int]], dict[str, Sequence[float]]]:
+        """Rows of the world of everything wanted, by name; and what of it stands still."""
+        cascade, m = self.cascade, self.cascade.mechanism
+        found, still = dict[str, list[int]](), dict[str, Sequence[float]]()
         for name in cascade.request.points:
-            body = cascade.mechanism.point(name).body
-            if body not in cascade.part_of:
-                raise SolveError(f"point {name!r} is on {body!r}, which is fixed: leave it out")
-            kind, member = cascade.place[cascade.part_of[body]]
-            own = f"p{cascade.points[cascade.part_of[body]].index(name)}"
+            point = m.point(name)
+            if point.body not in cascade.part_of:
+                still |= {f"{label} {name}": STILL for label in POINT} | {f"position {name}": point.position}
+                continue
+            kind, member = cascade.place[cascade.part_of[point.body]]
+            own = f"p{cascade.points[cascade.part_of[point.body]].index(name)}"
             found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in POINT}
         for name in cascade.request.bodies:
+            if name not in cascade.part_of:
+                body = m.body(name)
+                still |= {f"{label} {name}": STILL for label in BODY}
+                still |= {f"r {name}": body.origin, f"p {name}": body.euler_parameters}
+                continue
             kind, member = cascade.place[cascade.part_of[name]]
             own = f"b{cascade.parts[kind.members[member]].bodies.index(name)}"
             found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in BODY}
-        return found
+        return found, still
 
     def solve(self, tol: float) -> Trajectory:
         """The motion at all samples; see `solve.solve`."""
@@ -63,10 +69,9 @@ class CascadeSweep:
         n = len(path.times)
         rows = [row for each in self._outputs.values() for row in each]
         table, worst = np.full((len(rows), n), np.nan), np.full((len(WORST), n), np.nan)
-        messages: list[str] = []
-        self._notes: list[str] = []
-        start, departure, message = self._departure
-        messages += [message] if message else []
+        start, departure, message, notes = self._departure
+        self._notes = [*notes]
+        messages = [message] if message else []
         for order, given in self._sides if not messages else ():
 
             def keep(samples: Indices | slice, lane: Indices | slice, order: Indices = order) -> None:
@@ -93,19 +98,21 @@ class CascadeSweep:
         return [(order, self._lanes.sampled(times[order], self.path)) for order in orders]
 
     @cached_property
-    def _departure(self) -> tuple[float, list[Array], str]:
-        """Where the sweep starts: the time, what is predicted from, and why it cannot be reached if it cannot."""
+    def _departure(self) -> tuple[float, list[Array], str, Sequence[str]]:
+        """Where the sweep starts: the time, what is predicted from, why it cannot be reached if it cannot, and notes of the way."""
         lanes, path, start, message = self._lanes, self.path, 0.0, ""
         lanes.accept_by(accept_by(CLOSED))
+        self._notes = list[str]()
         if not path.from_design:
             way = path.lead_in()
             start = float(path.times[0])
             times = np.array([0.0, 1.0])
             message = self._follow(times, lanes.sampled(times, way), 0.0, way, _nothing, CLOSED)
             message = f"on the way to the first sample: {message}" if message else ""
+            lanes.stand_at(start)
         lanes.attempt(np.array([start]), path)  # the rates of the path where the mechanism stands
         lanes.carry(0)
-        return start, lanes.anchor, message
+        return start, lanes.anchor, message, tuple(self._notes)
 
     def _follow(self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float) -> str:
         """Follow the samples outwards, with what is given there; empty, or why they end."""
@@ -171,6 +178,7 @@ class CascadeSweep:
     def _trajectory(self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]) -> Trajectory:
         request, solved = self.cascade.request, ~np.isnan(tests["closure"])
         order, unit = request.order + 1, self.cascade.unit
+        found |= {name: np.where(solved[:, None], value, np.nan) for name, value in self._still.items()}
 
         def motion(name: str) -> PointMotion:
             series = [found[f"{label} {name}"] for label in POINT[:order]]

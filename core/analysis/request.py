@@ -24,7 +24,8 @@ class Request:
         compiled: run by machine code where llvmlite is installed, else by numpy; the same results to round-off.
         state: keep the whole state of every sample, and its rates.
         varied: places of the geometry (see `places`) that are inputs of the programs; all others are constants in them.
-        last_iteration: of a sample, the one that starts from a residual below this [units of the mechanism's size].
+        last_iteration: of a sample, the one that starts from a residual below this [units of the mechanism's size]; a sparse system
+            iterates as long as it gains by it.
     """
 
     drivers: tuple[str, ...]
