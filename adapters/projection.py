@@ -188,7 +188,11 @@ class Walk:
         return _Sample(t, self.model.save(), position.ravel(), v, (position, velocity, acceleration), *done)
 
     def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
-        """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t)."""
+        """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t).
+
+        Args:
+            step: between samples; zero where all are one.
+        """
         at, h = start, t - start.t
         while at.t != t:
             to = t if abs(t - at.t) <= abs(h) else at.t + h
@@ -200,7 +204,7 @@ class Walk:
                 at, h = new, 2.0 * h
             else:
                 h = 0.5 * min(abs(h), abs(t - at.t)) * math.copysign(1.0, h)
-                if abs(h) < SMALLEST_STEP * step:
+                if abs(h) < SMALLEST_STEP * (step or abs(t - start.t)):
                     return at, False
         return at, True
 
@@ -223,7 +227,8 @@ class Walk:
         if not reached:
             return None, f"the drivers reach only {first.t:.3g} of the way from the design to the first sample; start nearer"
         self.model.restore(first.saved)
-        return self.solve(path, float(path.times[0])), ""
+        found = self.solve(path, float(path.times[0]))
+        return found, "" if found else "the first sample's pose is reached, but its drivers cannot move there (a dead centre)"
 
     def trajectory(self, details: Mapping[str, Any]) -> Trajectory:
         path, points = self.case.sweep.path, self.case.points

@@ -130,6 +130,8 @@ def test_a_motion_without_singular_poses():
         ({"direction": 2}, "direction is 2, expected 1"),
         ({"length": -1.0}, "length is -1.0, expected a positive number"),
         ({"longest": np.nan}, "longest is nan"),
+        ({"tol": 0.0}, "tol is 0.0"),
+        ({"style": "dads"}, "no style 'dads'; known: native, paper"),
         ({"points": ["hub"]}, "no point 'hub'; known: wheel, rod_end"),
     ],
 )

@@ -2,10 +2,12 @@
 
 import importlib.metadata
 import json
+from pathlib import Path
 
 import pytest
 from kincheck.core.harness import doctor
 from kincheck.core.harness.cli import main
+from kincheck.core.program import shelf
 
 
 @pytest.fixture
@@ -81,3 +83,20 @@ def test_a_cache_that_cannot_be_written_is_said(without_imports, monkeypatch, tm
     out = capsys.readouterr().out
     assert "every process compiles anew" in out
     assert "XDG_CACHE_HOME" in out
+
+
+def test_a_user_without_a_home_solves_and_keeps_nothing(without_imports, monkeypatch, capsys):
+    """As in a container that is run as a user whom it does not know."""
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", nobody)
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "nowhere" in out
+    assert "the user has no home directory; every process compiles anew" in out
+    assert shelf.kept(b"said", lambda: b"made") == b"made"
+    assert shelf.find(b"said") is None
+    assert not shelf.known(b"said")
+
+
+def nobody():
+    raise RuntimeError("Could not determine home directory.")

@@ -1,10 +1,13 @@
 """The walk that the simulators share: what it must not accept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kincheck.adapters.projection import solve_by_projection
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, SolveError
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
+from kincheck.core.motions import Sine
 
 CASE = Case(
     name="crank",
@@ -83,3 +86,26 @@ def test_freedom_that_is_left_is_refused():
 
     with pytest.raises(SolveError, match=r"1 of the 2 coordinates .* left free"):
         solve_by_projection(Loose(lambda c: 1.0), CASE, 1e-12)
+
+
+def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
+    """No step between samples says how small a part of one may be."""
+    case = replace(CASE, sweep=Sweep("turn", np.array([0.5, 0.5])))
+    assert solve_by_projection(Crank(lambda c: 1.0), case, 1e-12).solved.all()
+    jumps = solve_by_projection(Crank(lambda c: float(c > 0.25)), case, 1e-12)
+    assert not jumps.solved.any()
+    assert "no sample reached on this side" in jumps.message
+
+
+def test_a_first_sample_whose_rates_cannot_be_met_is_told():
+    """The pose is reached on the way there, where the drivers move otherwise."""
+
+    class Stuck(Crank):
+        def bias(self, v):
+            return np.full(2, np.nan if abs(v[0]) < 1e-9 else 0.0)
+
+    case = replace(CASE, sweep=Sweep("time", np.linspace(0.0, 1.0, 3), motions={"turn": Sine(0.5, 0.1, np.pi / 2.0)}))
+    assert solve_by_projection(Crank(lambda c: 0.0), case, 1e-12).solved.all()
+    found = solve_by_projection(Stuck(lambda c: 0.0), case, 1e-12)
+    assert not found.solved.any()
+    assert "its drivers cannot move there" in found.message

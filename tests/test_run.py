@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.errors import SolveError
+from kincheck.core.errors import CaseError, SolveError
 from kincheck.core.harness.case import Series, Truth
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
@@ -51,6 +51,13 @@ def test_the_right_answer_passes_and_is_recorded():
     assert record.settings == {"scheme": 0.5}
     deviation = record.errors["x"].velocity
     assert (deviation.max_abs, deviation.against, deviation.within) == (0.0, "closed_form", True)
+
+
+def test_two_of_one_name_are_refused():
+    with pytest.raises(CaseError, match="two cases named 'crank'"):
+        run([crank(), crank()], [Fake()], tol=TOL)
+    with pytest.raises(CaseError, match=r"two engines named 'fake \(projection\)'"):
+        run([crank()], [Fake(), Fake()], tol=TOL)
 
 
 def test_the_sign_of_an_output_matters():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, Translational, Universal
+from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, SolveError, Translational, Universal
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import RATE, RATE_T, Request
@@ -247,3 +247,24 @@ def test_motions_are_views_by_name_made_when_looked_at():
     assert np.shares_memory(motions["P"].velocity, table)
     with pytest.raises(KeyError, match="Q"):
         motions["Q"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"driver": "steer"}, "there is no driver 'steer'; known: stroke"),
+        ({"points": ["hub"]}, "there is no point 'hub'; known: wheel"),
+        ({"bodies": ["hub"]}, "there is no body 'hub'; known: "),
+        ({"order": 3}, "order is 3, expected 0, 1 or 2"),
+        ({"rate": 0.0}, "rate is 0.0, expected driver units"),
+        ({"tol": np.nan}, "tol is nan, expected a positive number"),
+        ({"tol": np.inf}, "tol is inf"),
+        ({"values": 0.1}, r"values have shape \(\), expected \(n,\)"),
+        ({"values": [[0.0, 0.1]]}, r"values have shape \(1, 2\)"),
+        ({"values": [0.0, np.nan]}, "values are not all finite"),
+        ({"style": "dads"}, "there is no style 'dads'; known: native, paper, conventional, mixed, relative"),
+    ],
+)
+def test_an_argument_that_makes_no_sense_is_told(arguments, message):
+    with pytest.raises(SolveError, match=message):
+        solve(mcpherson(), **({"driver": "stroke", "values": [0.0, 0.1]} | arguments))

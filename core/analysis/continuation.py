@@ -22,8 +22,6 @@ from .walk import NODE, Beside, Spot, Walk
 
 # A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be cheap, near enough to be drawn.
 LONGEST = 0.05
-# Local dips of sigma that do not reach this part of the largest are no bifurcation.
-DIP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +113,7 @@ def trace(
         raise SolveError(f"trace: there is no driver {driver!r}; known: {', '.join(each.name for each in mechanism.drivers)}")
     if direction not in (1, -1):
         raise SolveError(f"trace: direction is {direction}, expected 1 (the driver's value grows) or -1 (it falls)")
-    for name, given in (("length", length), ("longest", longest)):
+    for name, given in (("length", length), ("longest", longest), ("tol", tol)):
         if not (np.isfinite(given) and given > 0.0):
             raise SolveError(f"trace: {name} is {given}, expected a positive number")
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)

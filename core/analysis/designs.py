@@ -65,7 +65,7 @@ def solve_designs(
     Raises:
         SolveError: there is no such place, a shape is wrong, a number is not finite, or the nominal mechanism cannot be solved.
     """
-    path, request = asked(mechanism, driver, values, rate, points, (), order, "native", motions)
+    path, request = asked(mechanism, driver, values, rate, points, (), order, tol, "native", motions)
     known = places(mechanism)
     numbers: list[Array] = []
     for place, given in geometry.items():

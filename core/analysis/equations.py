@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from statistics import median
-from typing import Any
+from typing import Any, Never
 
 from .. import primitives as p
 from ..algebra import ZERO, Vec3, vec
@@ -111,6 +111,10 @@ class Style(StrEnum):
     CONVENTIONAL = "conventional"
     MIXED = "mixed"
     RELATIVE = "relative"
+
+    @classmethod
+    def _missing_(cls, value: object) -> Never:
+        raise SolveError(f"there is no style {value!r}; known: {', '.join(cls)}")
 
 
 def constraints(

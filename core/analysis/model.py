@@ -198,7 +198,10 @@ class Model:
         return {name: {"operations": len(each.nodes), "flops": each.flops} for name, each in self.programs.items()}
 
     def executor(self, lanes: int) -> Executor:
-        """The programs bound to that many lanes of this thread; kept, because binding costs as much as running."""
+        """The programs bound to that many lanes of this thread; kept, because binding costs as much as running.
+
+        Whoever asks for as many gets the same memory, and sets all that it reads.
+        """
         return self.bound(lanes, lambda: LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes))
 
     def samples(self, times: Array, drive: Array) -> Array:

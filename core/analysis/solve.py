@@ -42,7 +42,7 @@ def solve(
         points: points whose motion is wanted; all of them unless given.
         bodies: bodies whose motion is wanted, in the paper's variables.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for is not computed.
-        tol: largest accepted constraint residual, relative to the mechanism's size.
+        tol: largest accepted constraint residual, relative to the mechanism's size; positive and finite.
         style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes), "conventional" (full
             products), "mixed" (joint coordinates as further unknowns) or "relative" (joint coordinates of a tree as the only
             ones); the solutions are the same.
@@ -55,7 +55,7 @@ def solve(
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
             argument makes no sense.
     """
-    path, request = asked(mechanism, driver, values, rate, points, bodies, order, style, motions)
+    path, request = asked(mechanism, driver, values, rate, points, bodies, order, tol, style, motions)
     return prepare(mechanism, request, path)(tol)
 
 
@@ -67,6 +67,7 @@ def asked(
     points: Sequence[str] | None,
     bodies: Sequence[str],
     order: int,
+    tol: float,
     style: str,
     motions: Mapping[str, Motion] | None,
 ) -> tuple[Path, Request]:
@@ -78,6 +79,8 @@ def asked(
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
     _require(order in (0, 1, 2), f"order is {order}, expected 0, 1 or 2")
     _require(math.isfinite(rate) and rate != 0.0, f"rate is {rate}, expected driver units per second other than 0; 1 serves")
+    _require(math.isfinite(tol) and tol > 0.0, f"tol is {tol}, expected a positive number; 1e-12 serves")
+    _require(np.ndim(values) == 1, f"values have shape {np.shape(values)}, expected (n,): one driver value for each sample")
     _require(bool(np.isfinite(values).all()), "values are not all finite; give finite driver values")
     for what, names, known in (
         ("driver", [driver, *(motions or {})], mechanism.drivers),

@@ -109,7 +109,7 @@ def examine(case: Case, native: Engine, tol: float) -> Examination:
         os.cpu_count() or 1,
         "machine code" if compiler.available() else "numpy: pip install llvmlite makes it some fifty times faster",
         compiler.vector_width() if compiler.available() else None,
-        str(shelf.folder()),
+        str(shelf.folder() or "nowhere"),
         _cache_problem(),
     )
     return Examination(SCHEMA, about["kincheck"], parts(), machine, _check(case, native, tol))
@@ -174,13 +174,15 @@ def _ended(importing: subprocess.Popen[str]) -> str:
 
 def _cache_problem() -> str:
     """Why compiled code cannot be kept; empty where it can."""
-    folder = shelf.folder()
+    folder, remedy = shelf.folder(), "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is"
+    if folder is None:
+        return f"the user has no home directory; {remedy}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return ""
     except OSError as error:
-        return f"{error.strerror}; every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is"
+        return f"{error.strerror}; {remedy}"
 
 
 def _check(case: Case, native: Engine, tol: float) -> Check:

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from ..errors import CaseError
 from .attempt import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
 from .case import Case, Series
 from .circumstances import results, truth_of
@@ -67,8 +68,13 @@ def run(
         solver: where pairs are solved: in this process, in worker processes, on a cluster.
         made: records made earlier, by a run of the same cases and engines; their pairs are not solved again.
         facts: further circumstances, kept with the results; they come before those of now.
+
+    Raises:
+        CaseError: two cases share their name, or two engines theirs and the mode: records go by names.
     """
     started = datetime.now(UTC)
+    _distinct("cases", [case.name for case in cases])
+    _distinct("engines", [f"{engine.name} ({engine.mode})" for engine in engines])
     records = {_key(record): record for record in made}
     ordered = sorted(engines, key=_native_first)
     wanted = planned(cases, engines)
@@ -95,6 +101,12 @@ def run(
             else:
                 judge(pair, attempt, case.standard)
     return results(cases, [records[key] for key in wanted], started=started, tol=tol, command=command, facts=facts)
+
+
+def _distinct(what: str, names: Sequence[str]) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise CaseError(f"run: there are two {what} named {twice[0]!r}; results go by name: rename one, or leave it out")
 
 
 def planned(cases: Sequence[Case], engines: Sequence[Engine]) -> list[tuple[str, str, str]]:

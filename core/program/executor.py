@@ -172,12 +172,12 @@ class Executor(Protocol):
     def lanes(self) -> int: ...
     @property
     def group(self) -> int:
-        """Lanes that `follow` attempts together."""
+        """Lanes that a track attempts together."""
         ...
 
     @property
     def margin(self) -> int:
-        """Samples that `follow` may read beyond the last."""
+        """Samples that a track may read beyond the last."""
         ...
 
     def clear(self) -> None:
@@ -201,7 +201,7 @@ class Executor(Protocol):
         ...
 
     def run(self, name: str) -> None:
-        """Run one program over all lanes, one of `Plan.single`."""
+        """Run one of `Plan.programs` over all lanes."""
         ...
 
     def attempt(self) -> None:

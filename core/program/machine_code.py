@@ -41,8 +41,9 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
 OFTEN, AGAIN, OPERATIONS = 150, 20, 3000
 """Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more.
-Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups, of which `kincheck run` makes six. For those
-whose tables are in the cache somebody did come back: they are compiled after the second number, in the first sweep."""
+Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups of eight, and six sweeps of `kincheck run` are
+walked to the end. For those whose tables are in the cache somebody did come back: they are compiled after the second number, in the
+first sweep."""
 
 
 class LlvmCode:

@@ -11,10 +11,13 @@ DIGEST = 32
 """Bytes of the checksum at the head of what is kept."""
 
 
-def folder() -> Path:
-    """Where it is; below XDG_CACHE_HOME where that is set."""
-    home = os.environ.get("XDG_CACHE_HOME")
-    return (Path(home) if home else Path.home() / ".cache") / "kincheck"
+def folder() -> Path | None:
+    """Where it is, below XDG_CACHE_HOME where that is set; None for a user without a home, for whom nothing is kept."""
+    given = os.environ.get("XDG_CACHE_HOME")
+    try:
+        return (Path(given) if given else Path.home() / ".cache") / "kincheck"
+    except RuntimeError:
+        return None
 
 
 def kept(content: bytes, make: Callable[[], bytes]) -> bytes:
@@ -22,13 +25,16 @@ def kept(content: bytes, make: Callable[[], bytes]) -> bytes:
     found = find(content)
     if found is None:
         found = make()
-        _write(_entry(content), found)
+        if entry := _entry(content):
+            _write(entry, found)
     return found
 
 
 def find(content: bytes) -> bytes | None:
     """What the content meant before, or None where there is nothing that is whole."""
     entry = _entry(content)
+    if entry is None:
+        return None
     try:
         kept = entry.read_bytes()
     except OSError:
@@ -39,11 +45,13 @@ def find(content: bytes) -> bytes | None:
 
 def known(content: bytes) -> bool:
     """Whether there is something that the content meant before."""
-    return _entry(content).exists()
+    entry = _entry(content)
+    return entry is not None and entry.exists()
 
 
-def _entry(content: bytes) -> Path:
-    return folder() / hashlib.sha256(content).hexdigest()
+def _entry(content: bytes) -> Path | None:
+    here = folder()
+    return here and here / hashlib.sha256(content).hexdigest()
 
 
 def _write(entry: Path, made: bytes) -> None:
