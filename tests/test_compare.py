@@ -139,6 +139,21 @@ def test_no_common_sample_is_null_with_a_reason():
     assert "position: no sample is known to both the engine and closed_form" in found.reason
 
 
+@pytest.mark.parametrize("complete", [True, False])
+def test_a_sample_without_a_value_is_out_of_tolerance_where_all_were_solved(complete):
+    case, right = crank(), crank().reference["x"]
+    holed = Series(right.position, np.where(np.arange(SAMPLES) == 3, np.nan, right.velocity), right.acceleration)
+    found = deviations(case, case.outputs[0], holed, [("closed_form", right)], complete=complete)
+    assert found.position.within
+    assert found.velocity.within is not complete
+    if complete:
+        assert found.reason == "velocity: 1 samples without a value where closed_form has one"
+        said = describe("x", "velocity", found.velocity, "angle", [0.0] * SAMPLES)
+        assert said == "x: velocity has no value at samples where closed_form has one"
+    # what the standard does not have either is no loss
+    assert deviations(case, case.outputs[0], holed, [("closed_form", holed)], complete=True).velocity.within
+
+
 def test_a_deviation_is_described_by_output_quantity_sample_driver_and_tolerance():
     found = deviation(REFERENCE + [0.0, 0.0, 4e-3, 0.0], REFERENCE, 1e-3, 0.0, "closed_form")
     said = describe("half_track_change", "velocity", found, "stroke", [-0.1, 0.0, 0.1, 0.2])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from kincheck.core.errors import CaseError, SolveError
 from kincheck.core.harness.case import Series, Truth
+from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
@@ -36,13 +37,8 @@ def test_the_right_answer_passes_and_is_recorded():
     record = record_of(Fake(settings={"scheme": np.float64(0.5)}))
     assert (record.outcome, record.message) == (Outcome.PASS, "")
     assert record.validated
-    assert (record.case, record.engine, record.mode, record.loop, record.version) == (
-        "crank",
-        "fake",
-        "projection",
-        "python",
-        "1.2",
-    )
+    names = record.case, record.engine, record.mode, record.loop, record.version
+    assert names == ("crank", "fake", "projection", "python", "1.2")
     assert record.driver == {"angle": np.linspace(-1.0, 1.0, SAMPLES).tolist()}
     assert record.outputs["y"].position == exact(crank())[0][:, 1].tolist()
     assert (record.rank, record.dof, record.iterations, record.residual_max) == (6, 1, 3 * SAMPLES, 1e-15)
@@ -250,6 +246,18 @@ def test_what_the_reference_lacks_is_compared_with_the_native_engine():
     # one output met a truth, the other only another engine
     assert not fake.validated
     assert native.truth == "closed_form"
+
+
+def test_an_output_that_has_no_value_where_the_reference_has_one_is_no_pass(monkeypatch):
+    def holed(case, output, trajectory):
+        series = output_series(case, output, trajectory)
+        return replace(series, position=np.where(np.arange(SAMPLES) == 3, np.nan, series.position))
+
+    monkeypatch.setattr("kincheck.core.harness.attempt.output_series", holed)
+    record, missing = record_of(Fake()), record_of(Fake(answer=partial))  # of the second it is said why samples are missing
+    assert record.outcome is Outcome.FAIL
+    assert record.message.startswith("x: position has no value at samples where closed_form has one")
+    assert "has no value" not in missing.message
 
 
 @pytest.mark.parametrize("truth", list(Truth))

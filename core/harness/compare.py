@@ -22,6 +22,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -115,12 +116,15 @@ def _numbers(values: Array) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
-def deviations(case: Case, output: Quantity, found: Series, standards: Sequence[tuple[str, Series]]) -> Deviations:
+def deviations(
+    case: Case, output: Quantity, found: Series, standards: Sequence[tuple[str, Series]], *, complete: bool = False
+) -> Deviations:
     """How far an output is off in position, velocity and acceleration.
 
     Args:
         found: the engine's output.
         standards: what it may be compared with, (name, series), best first; each quantity takes the first that has it.
+        complete: every sample was solved: one without a value where the standard has one is out of tolerance.
     """
     beat = pace(case)
     compared: dict[str, Deviation | None] = {}
@@ -140,8 +144,12 @@ def deviations(case: Case, output: Quantity, found: Series, standards: Sequence[
             reasons.append(f"{quantity}: {names} gives none" if names else f"{quantity}: there is nothing to compare with")
         else:
             name, reference = known[0]
-            compared[quantity] = deviation(values, reference, output.atol * beat**order, output.rtol, name)
-            if compared[quantity] is None:
+            compared[quantity] = off = deviation(values, reference, output.atol * beat**order, output.rtol, name)
+            lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
+            if off is not None and lost:
+                compared[quantity] = msgspec.structs.replace(off, within=False)
+                reasons.append(f"{quantity}: {lost} samples without a value where {name} has one")
+            if off is None:
                 reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
     return Deviations(**compared, reason="; ".join(reasons) or None)
 
@@ -174,7 +182,9 @@ def deviation(values: Array, reference: Array, atol: float, rtol: float, against
 
 
 def describe(output: str, quantity: str, worst: Deviation, driver: str, values: Sequence[float], unit: str = "m") -> str:
-    """One line that says how far off an output is, and where; `unit` is the output's."""
+    """One line that says how far off an output is, and where, or that it has no value somewhere; `unit` is the output's."""
+    if worst.max_abs <= worst.tolerance:
+        return f"{output}: {quantity} has no value at samples where {worst.against} has one"
     unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[quantity]
     return (
         f"{output}: {quantity} is off by {worst.max_abs:.3g} {unit} at sample {worst.worst_step} ({driver} = "

@@ -200,10 +200,11 @@ def _record(pair: Pair, attempt: Attempt, native: _Standard) -> Record:
 def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: Seconds, native: _Standard) -> Record:
     begin = perf_counter()
     values = case.sweep.values.tolist()
-    errors = {output.name: _deviations(case, output.name, answer.outputs[output.name], native) for output in case.outputs}
-    solved, samples = answer.solved, len(values)
+    solved, samples, found = answer.solved, len(values), answer.outputs
+    complete = solved == samples
+    errors = {each.name: _deviations(case, each.name, found[each.name], native, complete=complete) for each in case.outputs}
     messages: list[str] = []
-    if solved < samples:
+    if not complete:
         why = answer.message or "the engine does not say why; ask it to"
         messages.append(f"{solved} of {samples} samples solved: {why}")
     outside = [
@@ -229,7 +230,7 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
         outcome=outcome,
         message="; ".join(messages),
         driver={name: each.tolist() for name, each in case.sweep.moved.items()},
-        outputs={output.name: as_numbers(answer.outputs[output.name], output) for output in case.outputs},
+        outputs={output.name: as_numbers(found[output.name], output) for output in case.outputs},
         errors=errors,
         residual_max=answer.residual if solved else None,
         rank=details.pop("rank", None),
@@ -238,7 +239,7 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
         solved=solved,
         samples=samples,
         seconds=msgspec.structs.replace(seconds, compare=perf_counter() - begin),
-        us_per_step=1e6 * (seconds.warm or 0.0) / samples if solved == samples else None,
+        us_per_step=1e6 * (seconds.warm or 0.0) / samples if complete else None,
         details=details,
     )
 
@@ -251,11 +252,11 @@ def _not_compared(errors: Mapping[str, Deviations]) -> list[str]:
     return [f"{name}: {reason}" for name, reason in reasons.items()]
 
 
-def _deviations(case: Case, name: str, found: Series, native: _Standard) -> Deviations:
+def _deviations(case: Case, name: str, found: Series, native: _Standard, *, complete: bool) -> Deviations:
     output = next(each for each in case.outputs if each.name == name)
     standards = [(str(case.truth), case.reference[name])] if name in case.reference else []
     standards += [(NATIVE, native.outputs[name])] if name in native.outputs else []
-    result = deviations(case, output, found, standards)
+    result = deviations(case, output, found, standards, complete=complete)
     if standards or not native.absent:
         return result
     return msgspec.structs.replace(result, reason=native.absent)
