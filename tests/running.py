@@ -22,5 +22,5 @@ def run_on(programs, block, name="p"):
 
 def forget_recent():
     """What is solved next is made ready anew."""
-    for kept in (model._recent, route._recent, prepare._last_large):
+    for kept in (model._recent, route._recent, prepare._OF_THREAD.large):
         kept.cache_clear()

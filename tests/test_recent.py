@@ -75,6 +75,15 @@ def test_of_a_chain_the_last_path_is_kept(swept):
         np.testing.assert_array_equal(each, found[0])
 
 
+def test_threads_take_turns_at_a_chain_and_each_keeps_its_own(swept):
+    turn = np.linspace(-0.1, 0.2, 9)
+    with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
+        found = [pool.submit(solve, chain(12), "turn", turn).result() for pool in (one, other, one, other)]
+    assert len(swept) == 2
+    for each in found[1:]:
+        np.testing.assert_array_equal(each.points["end"].acceleration, found[0].points["end"].acceleration)
+
+
 def test_large_mechanisms_follow_motions_of_a_users_own_anew(swept):
     @dataclass(frozen=True)
     class Mine(Motion):

@@ -55,7 +55,10 @@ def _recent(mechanism: Mechanism, request: Request) -> Model:
 
 
 def recent_model(mechanism: Mechanism, request: Request) -> Model:
-    """As `compile_model`, and no more than one for the same mechanism and request as long as it is among the last few asked for."""
+    """As `compile_model`, and the same for the same mechanism and request as long as it is among the last few asked for.
+
+    Threads that ask for it at the same time may each make one.
+    """
     return _recent(mechanism, request) if ours(mechanism) else compile_model(mechanism, request)
 
 

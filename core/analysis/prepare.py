@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache, partial
-from threading import get_ident
+from threading import local
 
 from ..mechanism import Mechanism
 from ..motions import Path
@@ -42,7 +42,7 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE and not mechanism.couplers:
         known = ours(mechanism) and path.ours
-        make = _last_large(mechanism, request, get_ident()) if known else _large(mechanism, request)
+        make = (_OF_THREAD.large if known else _large)(mechanism, request)
         if make:
             return make(path)
     return partial(follow, recent_route(mechanism, request, path))
@@ -73,11 +73,14 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     return lambda path: partial(solve_sparse, model, path, request.points, request.bodies, request.order)
 
 
-@lru_cache(maxsize=1)
-def _last_large(mechanism: Mechanism, request: Request, thread: int) -> Callable[[Path], Solver] | None:
+class _OfThread(local):
     """The same, and once for whoever solves one again and again. One only, and of its paths the last: they fill much of the memory.
 
-    Args:
-        thread: which alone uses it: it is solved in place.
+    Each thread has its own, for it is solved in place.
     """
-    return _large(mechanism, request)
+
+    def __init__(self) -> None:
+        self.large = lru_cache(maxsize=1)(_large)
+
+
+_OF_THREAD = _OfThread()

@@ -113,7 +113,7 @@ class Route:
 
 
 def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
-    """A route, and no more than one for the same mechanism, request and path as long as it is among the last few asked for.
+    """A route, and the same for the same mechanism, request and path as long as it is among the last few asked for.
 
     To make one and bind it to lanes takes twenty times as long as to solve it.
     """

@@ -81,7 +81,7 @@ class LlvmCode:
         """Said by whoever has run programs for so many groups of lanes."""
         if not self.walked:
             return
-        self._left -= groups
+        self._left -= groups  # what is lost where two threads do so at once only delays compiling
         if self._left <= 0:
             with self._lock:  # what one thread compiled is not taken away from others that run it
                 if self.walked:
