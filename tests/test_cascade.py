@@ -37,6 +37,7 @@ def assert_alike(found, expected):
             assert np.abs(getattr(found.bodies[name], label) - getattr(motion, label)).max() <= limit
     for name, motion in expected.points.items():
         assert np.abs(found.points[name].acceleration - motion.acceleration).max() <= 3e-12
+    assert [found.details[name] for name in ("rank", "dof")] == [expected.details[name] for name in ("rank", "dof")]
 
 
 # the redundant, the open loop of several, several drivers, a sweep that does not start at the design

@@ -189,6 +189,7 @@ class CascadeSweep:
             return BodyMotion(found[f"r {name}"], found[f"p {name}"], v if order > 1 else None, a if order > 2 else None)
 
         sizes = {f"{len(kind.members)} components": kind.model.sizes for kind in self.cascade.kinds}
+        accounts = [(len(kind.members), kind.model.selection.account) for kind in self.cascade.kinds]
         return Trajectory(
             points={name: motion(name) for name in request.points},
             solved=solved,
@@ -196,6 +197,8 @@ class CascadeSweep:
             residual=float(tests["closure"][solved].max(initial=0.0)) * unit,
             message="; ".join(messages),
             details={
+                "rank": sum(members * account.rank for members, account in accounts),
+                "dof": sum(members * account.dof for members, account in accounts),
                 "components": len(self.cascade.parts),
                 "largest_component": self.cascade.largest,
                 "programs": sizes,
