@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drivers import Driver, JointAngle
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
@@ -60,6 +61,19 @@ def recent_model(mechanism: Mechanism, request: Request) -> Model:
     Threads that ask for it at the same time may each make one.
     """
     return _recent(mechanism, request) if ours(mechanism) else compile_model(mechanism, request)
+
+
+def given_by(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
+    """The numbers of a `Drive` for each driver, in the mechanism's unit of length, shape (5 * drivers, n).
+
+    Args:
+        drive: value from the design, velocity and acceleration [SI], shape (3, drivers, n).
+    """
+    found = np.empty((len(drivers), 5, drive.shape[-1]))
+    for numbers, driver, motion in zip(found, drivers, drive.swapaxes(0, 1), strict=True):
+        numbers[:3] = motion * (1.0 if isinstance(driver, JointAngle) else 1.0 / unit)
+        numbers[3], numbers[4] = np.cos(0.5 * motion[0]), np.sin(0.5 * motion[0])
+    return found.reshape(5 * len(drivers), drive.shape[-1])
 
 
 class Bound:
@@ -213,14 +227,8 @@ class Model:
         Args:
             drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, n).
         """
-        found = np.empty((len(self.sampled), len(times)))
-        found[0] = times
-        for k, name in enumerate(self.request.drivers):
-            angle = self.mechanism.driver(name).type == "joint_angle"
-            rows = found[5 * k + 1 : 5 * k + 6]
-            rows[:3] = drive[:, k] * (1.0 if angle else 1.0 / self.frame.unit)
-            rows[3], rows[4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
-        return found
+        drivers = [self.mechanism.driver(name) for name in self.request.drivers]
+        return np.concatenate([times[None], given_by(drivers, drive, self.frame.unit)])
 
     def moving(self, lane: Array, sample: Array) -> Array:
         """A lane that goes on from where a solved lane stands, with the rates that a sample of the drives gives it there."""

@@ -27,7 +27,7 @@ from .elements import Elements
 from .equations import constraints, measured
 from .factors import Factors, Indices, SingularError
 from .following import ABOUT
-from .model import CLOSED, MAX_ITERATIONS
+from .model import CLOSED, MAX_ITERATIONS, given_by
 from .orientation import Blocks
 from .redundancy import RANK_TOLERANCE
 from .request import CONSISTENT
@@ -127,13 +127,8 @@ class SparseModel:
     def drives(self, path: Path, times: Array) -> Array:
         """What `Elements.evaluate` wants of all drivers at the times, shape (5 * drivers, n)."""
         drivers = self.mechanism.drivers
-        found = np.empty((len(drivers), 5, len(times)))
-        if drivers:
-            drive = path.drive([driver.name for driver in drivers], times)
-            for k, driver in enumerate(drivers):
-                found[k, :3] = drive[:, k] * (1.0 if driver.type == "joint_angle" else 1.0 / self.frame.unit)
-                found[k, 3], found[k, 4] = np.cos(0.5 * drive[0, k]), np.sin(0.5 * drive[0, k])
-        return found.reshape(-1, len(times))
+        drive = path.drive([driver.name for driver in drivers], times) if drivers else np.empty((3, 0, len(times)))
+        return given_by(drivers, drive, self.frame.unit)
 
     def moved(self, state: Array, step: Array) -> Array:
         """The state after a step of the unknowns; the Euler parameters have length one again."""
