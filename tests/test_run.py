@@ -233,6 +233,7 @@ def test_the_samples_that_the_native_engine_misses_are_not_compared():
     ).records
     assert fake.outcome is Outcome.PASS
     assert fake.errors["x"].position.worst_step < 7
+    assert "position: native has no value at 2 of 9 samples: these are compared with nothing" in fake.message
 
 
 def test_what_the_reference_lacks_is_compared_with_the_native_engine():

@@ -6,7 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute, Spherical, Translational
+from kincheck.core.analysis.cascade import Cascade
+from kincheck.core.analysis.cascade_sweep import CascadeSweep
+from kincheck.core.analysis.model import compile_model
+from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.solve import solve
+from kincheck.core.analysis.sparse_sweep import solve_sparse
+from kincheck.core.analysis.sweep import follow
+from kincheck.core.motions import Path, Ramp
 
 from .mechanisms import (
     CRANK,
@@ -192,6 +200,31 @@ def test_an_arm_on_a_ball_and_two_rods():
 
 
 # The ends of travel
+
+
+@pytest.mark.parametrize(
+    ("way", "turn", "solved"),
+    [
+        ("one program", 1000.0, True),
+        ("one program", 1e6, False),
+        ("components", 1000.0, True),
+        ("components", 1e6, False),
+        ("sparse", 100.0, True),  # a part takes it a hundred times as long
+    ],
+)
+def test_a_step_of_many_turns_is_gone_part_by_part_or_refused_as_what_it_is(way, turn, solved):
+    m = slider_crank()
+    path, request = Path({"turn": Ramp(1.0)}, np.array([0.0, turn])), Request(("turn",), ("end",))
+    if way == "components":
+        found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
+    else:
+        found = solve_sparse(m, path, ("end",)) if way == "sparse" else follow(Route(compile_model(m, request), path), 1e-12)
+    assert found.solved.tolist() == [True, solved], found.message
+    assert ("give samples in between" in found.message) is not solved
+    assert "assembly" not in found.message
+    if solved:
+        x = slider_crank_motion(turn).x
+        assert np.abs(found.points["end"].position[1, 0] - x) <= 1e-12  # a thousand radians round at 1e-13
 
 
 @pytest.mark.parametrize(("far", "limit"), [(0.4, 0.29337), (-0.4, -0.31674)])

@@ -13,7 +13,7 @@ from ..program import ITERATIONS
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .cascade import WORST, Cascade, Lanes
 from .cascade_bridge import cross
-from .march import HALVINGS, MAX_ROUNDS, longest
+from .march import HALVINGS, Headway, longest
 from .model import CLOSED
 from .request import SIGMA, accept_by
 from .singularity import CONTINUED, listed
@@ -116,7 +116,7 @@ class CascadeSweep:
 
     def _follow(self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float) -> str:
         """Follow the samples outwards, with what is given there; empty, or why they end."""
-        lanes, at, rounds, refused = self._lanes, 0, 0, list[int]()
+        lanes, at, headway, refused = self._lanes, 0, Headway(here), list[int]()
         sound, start = lanes.anchor, here
         while at < len(times):
             ahead = times[at : at + LANES]
@@ -128,13 +128,15 @@ class CascadeSweep:
                     lanes.go_on()
                 else:
                     lanes.carry(accepted - 1)
-                here, at, rounds = float(ahead[accepted - 1]), at + accepted, 0
+                here, at = float(ahead[accepted - 1]), at + accepted
+                headway = Headway(here)
                 continue
             if lanes.sound:
                 sound, start = lanes.anchor, here
-            rounds += 1
+            if stopped := headway.stopped(here, float(times[at])):
+                return f"cannot be followed beyond {path.where(here)} (wanted {path.where(float(times[at]))}): {stopped}"
             reached = self._divide(here, float(times[at]), path)
-            if reached is not None and rounds <= MAX_ROUNDS:
+            if reached is not None:
                 lane, here = reached
                 lanes.carry(lane)
                 continue
@@ -148,7 +150,8 @@ class CascadeSweep:
                 good = lanes.attempt(times[chunk], path) > 0.0
                 keep(chunk[good], np.flatnonzero(good))
                 refused += chunk[~good].tolist()
-            here, at, rounds = beyond, at + len(beside), 0
+            here, at = beyond, at + len(beside)
+            headway = Headway(here)
         if refused:
             places = listed([path.where(float(times[k])) for k in refused])
             return f"refused at {places}: so near a singular pose that neither side reaches it; keep away from it"

@@ -24,8 +24,8 @@ from .route import AS_THEY_ARE, Route
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
 # passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
 HALVINGS = 40
-# A side that needs more rounds than this without reaching a sample makes no headway.
-MAX_ROUNDS = 200
+# A step that is divided so often, and comes by less than this part of what is left of it nearer to its sample, makes no headway.
+MAX_ROUNDS, HEADWAY = 200, 0.02
 
 
 class March(NamedTuple):
@@ -113,6 +113,29 @@ def longest(margins: Array) -> int | None:
     return int(good[0]) if len(good) else None
 
 
+@dataclass
+class Headway:
+    """How a step that is divided gets on.
+
+    Attributes:
+        since: the time where it stood when that was looked at last.
+        rounds: parts that were gone.
+    """
+
+    since: float
+    rounds: int = 0
+
+    def stopped(self, here: float, wanted: float) -> str:
+        """Count a part, that ended here; empty, or why not to go on."""
+        self.rounds += 1
+        if self.rounds % MAX_ROUNDS:
+            return ""
+        gone, self.since = abs(here - self.since), here
+        if gone >= HEADWAY * abs(wanted - here):
+            return ""
+        return f"{self.rounds} parts of the step were gone, and the next sample is as good as no nearer; give samples in between"
+
+
 class Marcher:
     """A route bound to lanes of this thread, to be gone along again and again."""
 
@@ -148,18 +171,19 @@ class Marcher:
         for stop in self._stops(side) if self.visit else [side.count]:
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
-            rounds = 0
+            headway = Headway(self._stands(self._anchor(number)))
             while at < stop:
                 anchor, wanted = self._anchor(number), float(side.samples[0, at])
                 further, reason = self._divide(anchor, wanted)
-                if further is None or rounds > MAX_ROUNDS:
+                stopped = headway.stopped(self._stands(anchor), wanted)
+                if further is None or stopped:
                     columns = side.first + side.step * np.arange(at, side.count)
                     self.kept[:, columns], self.solved[columns] = np.nan, False
-                    message = self._end(side, at, anchor, reason or "the parts of the step get smaller and smaller")
-                    return End(message, self.route, anchor, wanted)
+                    return End(self._end(side, at, anchor, stopped or reason), self.route, anchor, wanted)
                 self.track.anchors[number] = further[self.model.ahead]
                 came, at = at, self.track.follow(number, at, stop, anew=False)
-                rounds = 0 if at > came else rounds + 1
+                if at > came:
+                    headway = Headway(float(side.samples[0, at - 1]))
             if self.visit:
                 self._stand(number, at)
         return None
@@ -169,6 +193,10 @@ class Marcher:
         found = self.start.copy()
         found[self.model.ahead] = self.track.anchors[number]
         return found
+
+    def _stands(self, lane: Array) -> float:
+        """The time at which a lane stands."""
+        return float(lane[self.slots[FROM + TIME]])
 
     def _stops(self, side: Side) -> list[int]:
         """How many samples of a side have passed where one to visit has."""
@@ -184,7 +212,7 @@ class Marcher:
 
     def _divide(self, anchor: Array, aim: float) -> tuple[Array | None, str]:
         """Go a part of the step to a sample that could not be reached: the lane there, and why the shortest refused is."""
-        here = float(anchor[self.slots[FROM + TIME]])
+        here = self._stands(anchor)
         times: Array = here + (aim - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
         parts = self.model.executor(HALVINGS)
         every = range(len(self.slots))
@@ -202,7 +230,7 @@ class Marcher:
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
         where = self.route.path.where
-        here, wanted = float(anchor[self.slots[FROM + TIME]]), float(side.samples[0, at])
+        here, wanted = self._stands(anchor), float(side.samples[0, at])
         last = f"last reachable sample at {where(float(side.samples[0, at - 1]))}" if at else "no sample reached on this side"
         return (
             f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest singular value there about "

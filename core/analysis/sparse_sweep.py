@@ -15,7 +15,7 @@ from ..mechanism import Mechanism
 from ..motions import Path
 from ..primitives.base import Motion, Pose
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
-from .march import HALVINGS, MAX_ROUNDS
+from .march import HALVINGS, Headway
 from .sparse import FailedError, SparseModel, Stand
 from .together import REMEMBERED
 from .turning import euler_parameters
@@ -186,7 +186,8 @@ class _Sweep:
 
     def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> tuple[Stand, str]:
         """Go to a time, in parts where need be: where that ends, and why before that time."""
-        for _ in range(MAX_ROUNDS):
+        headway = Headway(here.time)
+        while not (stopped := headway.stopped(here.time, time)):
             try:
                 return self.model.reach(here, time, drives, self.tol), ""
             except FailedError:
@@ -194,7 +195,7 @@ class _Sweep:
                     here = self._part(here, path, time)
                 except FailedError as error:
                     return here, str(error)
-        return here, "the parts of the step get smaller and smaller"
+        return here, stopped
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
         """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).

@@ -38,6 +38,8 @@ from .record import Deviation, Deviations, OutputSeries
 
 # D of a mechanism whose points all coincide [m]: keeps the pace finite and is smaller than any mechanism driven in earnest.
 SMALLEST_SIZE = 1e-3
+NOTHING = "these are compared with nothing"
+"""Said of samples that the standard has no value at."""
 
 
 def pace(case: Case) -> float:
@@ -149,6 +151,8 @@ def deviations(
             if off is not None and lost:
                 compared[quantity] = msgspec.structs.replace(off, within=False)
                 reasons.append(f"{quantity}: {lost} samples without a value where {name} has one")
+            if off is not None and (alone := int((np.isfinite(values) & ~np.isfinite(reference)).sum())):
+                reasons.append(f"{quantity}: {name} has no value at {alone} of {len(values)} samples: {NOTHING}")
             if off is None:
                 reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
     return Deviations(**compared, reason="; ".join(reasons) or None)

@@ -16,7 +16,7 @@ from ..errors import CaseError
 from .attempt import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
 from .case import Case, Series
 from .circumstances import results, truth_of
-from .compare import as_numbers, describe, deviations
+from .compare import NOTHING, as_numbers, describe, deviations
 from .engine import Engine
 from .record import Deviations, Outcome, OutputSeries, Record, Results, Seconds
 
@@ -245,8 +245,9 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
 
 
 def _not_compared(errors: Mapping[str, Deviations]) -> list[str]:
-    """A pass must not hide that there was nothing to be judged by."""
-    reasons = {name: each.reason or "" for name, each in errors.items() if each.position is None}
+    """A pass must not hide that there was nothing to be judged by, or not everywhere."""
+    wanting = {name: each for name, each in errors.items() if each.position is None or NOTHING in (each.reason or "")}
+    reasons = {name: each.reason or "" for name, each in wanting.items()}
     if len(reasons) == len(errors) and len(set(reasons.values())) == 1:
         return [*set(reasons.values())]
     return [f"{name}: {reason}" for name, reason in reasons.items()]
