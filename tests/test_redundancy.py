@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve, trace
 from kincheck.core.algebra import ZERO, Quat, vec
 from kincheck.core.analysis.cartesian import Cartesian
 from kincheck.core.analysis.equations import constraints, frames
@@ -85,3 +86,36 @@ def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
         matrix = jacobian(formulation, at)
         least, best = (np.linalg.svd(rows, compute_uv=False)[-1] for rows in (matrix[[*kept]], matrix))
         assert least > 0.4 * best
+
+
+def locomotive(lead):
+    """Two wheels and two coupling rods, the second ahead by that angle: where one rod is at its dead point the other holds."""
+    z, joints = (0.0, 0.0, 1.0), [Revolute(f"axle{k}", "ground", f"wheel{k}", (2.0 * k, 0.0, 0.0), (0.0, 0.0, 1.0)) for k in (0, 1)]
+    for rod, angle in (("left", LEFT), ("right", LEFT + lead)):
+        x, y = 0.4 * np.cos(angle), 0.4 * np.sin(angle)
+        joints += [Revolute(f"{rod}{k}", f"wheel{k}", rod, (2.0 * k + x, y, 0.0), z) for k in (0, 1)]
+    points = [Point("rim", "wheel1", (2.5, 0.0, 0.0))]
+    return Mechanism(
+        "loco", [Body(n) for n in ("wheel0", "wheel1", "left", "right")], joints, points, [JointAngle("turn", "axle0")]
+    )
+
+
+LEFT = 0.9273
+
+
+def test_where_only_the_chosen_rows_depend_on_each_other_there_is_no_singular_pose():
+    """The rod whose rows were chosen comes to its dead points; the mechanism is regular there, for the other rod is not."""
+    turn = np.linspace(0.0, 4.0 * np.pi, 49)
+    found = solve(locomotive(np.pi / 2.0), "turn", turn)
+    assert found.solved.all(), found.message
+    expected = np.column_stack([2.0 + 0.5 * np.cos(turn), 0.5 * np.sin(turn), 0.0 * turn])
+    assert np.abs(found.points["rim"].position - expected).max() <= 1e-13
+    assert "notes" not in found.details
+    assert "singular_poses" not in found.details
+    assert trace(locomotive(np.pi / 2.0), "turn", length=7.0).events == ()
+
+
+def test_where_both_rods_are_at_their_dead_points_there_is_one():
+    found = solve(locomotive(np.pi), "turn", np.linspace(0.0, 4.0 * np.pi, 49))
+    assert all("(bifurcation)" in note for note in found.details["notes"])
+    assert [event.kind for event in trace(locomotive(np.pi), "turn", length=7.0).events][:1] == ["branch point"]

@@ -195,7 +195,9 @@ def _note(walk: Walk, trail: _Trail) -> None:
     if two.sigma < min(one.sigma, three.sigma) or (two.sign != three.sign and two.sigma > three.sigma):
         found = walk.branching(one, three)
         if found is not None and all(abs(found.arc - other.arc) > NODE for other in trail.events):  # it may be seen from both sides
-            trail.events.append(_event(walk, found))
+            event = _event(walk, found)
+            if not event.singularity.regular:
+                trail.events.append(event)
 
 
 def _event(walk: Walk, found: Beside) -> Event:

@@ -23,7 +23,7 @@ from .march import End, March
 from .model import TESTS
 from .request import FROM, SIGMA, TIME
 from .route import Route
-from .singularity import CONTINUED, Singularity, examine, listed, smallest_singular_values, solve_closely
+from .singularity import CONTINUED, REGULAR, Singularity, examine, listed, smallest_singular_values, solve_closely
 
 # Of one march: the others are counted.
 NAMED = 8
@@ -33,8 +33,6 @@ BRIDGED = 64
 LARGEST = 1000
 # A passage is found this near to the sample that it is at, by the time or one.
 BESIDE = 1e-6
-# Above this a smallest singular value explains nothing: rates have all but four of their digits there.
-REGULAR = 1e-2
 
 
 @dataclass
@@ -173,8 +171,9 @@ class _Scrutiny:
         self.found.kept[wanted, k] = found.kept[wanted]
         singularity = examine(self.system, self.system.state(near[:, None]), self.route.sampled(np.array([time])))
         self._say("passed", time, singularity, k)
+        what = "" if singularity.regular else "a singular pose at "
         self.findings.notes.append(
-            f"passes a singular pose at {self._where(time)}: {singularity.words}; {CONTINUED}, interpolated there to "
+            f"passes {what}{self._where(time)}: {singularity.words}; {CONTINUED}, interpolated there to "
             f"{found.off:.1g} of the mechanism's size and of the rates"
         )
         return True
@@ -207,6 +206,8 @@ class _Scrutiny:
     def _crossed(self, passage: Passage) -> None:
         path, time, where = passage.route.path, passage.time, passage.route.path.where
         singularity = examine(self.system, self.system.state(passage.lane[:, None]), passage.route.sampled(np.array([time])))
+        if singularity.regular:  # the motion knows nothing of the choice of rows
+            return
         self._say("crossed", time, singularity, path=path)
         if path.motions is self.route.path.motions:
             places = np.append(self.times, self.route.start)

@@ -23,6 +23,8 @@ from .system import System
 SHARE = 0.1
 # Joint rows that are this much farther from dependence than all rows together: then it is a driver's row that depends on them.
 APART = 10.0
+# Above this a smallest singular value explains nothing: rates have all but four of their digits there.
+REGULAR = 1e-2
 NAMED = 4
 """Names in a message; the record has all."""
 CONTINUED = "the branch followed is the continuation of the motion"
@@ -35,23 +37,37 @@ class Singularity:
     Attributes:
         lock_up: a driver's row depends on the joints'; else the joints' rows on each other.
         sigma: smallest singular value of the kept rows.
+        of_all: of all rows, those that are redundant among them: where that is not small the mechanism is regular, and only the
+            rows that were chosen at the design depend on each other.
         owners: joints and drivers whose rows depend on each other, those that matter most first.
         moves: bodies that move: velocity of a point of theirs [m] and angular velocity [rad], the largest number one.
     """
 
     lock_up: bool
     sigma: float
+    of_all: float
     owners: tuple[str, ...]
     moves: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]]
 
     @property
+    def regular(self) -> bool:
+        """Whether it is the choice of rows that is singular, and not the mechanism."""
+        return self.sigma < REGULAR < self.of_all
+
+    @property
     def kind(self) -> str:
-        """In a word."""
-        return "lock-up" if self.lock_up else "bifurcation"
+        """In a word or two."""
+        return "choice of rows" if self.regular else "lock-up" if self.lock_up else "bifurcation"
 
     @property
     def words(self) -> str:
         """To read, after a place."""
+        if self.regular:
+            return (
+                f"smallest singular value {self.sigma:.3g} of the rows that were chosen at the design position, of "
+                f"{listed(self.owners)}, and {self.of_all:.3g} of all rows: the mechanism is regular there; it has more rows than "
+                "it needs; let the design be nearer, or have joints that constrain nothing twice (kincheck explain names the rows)"
+            )
         what = "a driver's row depends on the joints'" if self.lock_up else "rows of joints depend on each other"
         how = [f"{body} {'turns' if any(turn) else 'moves'}" for body, (_, turn) in self.moves.items()]
         return (
@@ -74,8 +90,10 @@ def listed(names: Sequence[str]) -> str:
 
 def examine(system: System, state: Array, sample: Array) -> Singularity:
     """What is nearest to singular at one pose; shapes (numbers, 1) and (sampled, 1)."""
-    jacobian = system.equations(state, sample).jacobian[0]
+    found = system.equations(state, sample)
+    jacobian = found.jacobian[0]
     y, sigma, z = np.linalg.svd(jacobian)
+    of_all = np.linalg.svd(np.concatenate([jacobian, found.redundant[0]]), compute_uv=False)[-1]
     joints = jacobian[~system.driven]
     held = np.linalg.svd(joints, compute_uv=False).min(initial=np.inf)
     weights: dict[str, float] = {}
@@ -84,6 +102,7 @@ def examine(system: System, state: Array, sample: Array) -> Singularity:
     return Singularity(
         lock_up=bool(held > APART * sigma[-1]),
         sigma=float(sigma[-1]),
+        of_all=float(of_all),
         owners=tuple(_shares(weights)),
         moves=_moves(system, state[:, 0], z[-1]),
     )

@@ -31,11 +31,13 @@ class Equations:
         phi: residuals, shape (m, n).
         jacobian: by the unknowns, shape (m, n, n).
         nu: right-hand sides of the velocity equations: the residuals' loss by time where the pose stands, shape (m, n).
+        redundant: Jacobian of the rows that are left out, shape (m, dropped, n).
     """
 
     phi: Array
     jacobian: Array
     nu: Array
+    redundant: Array
 
     @property
     def closure(self) -> Array:
@@ -66,7 +68,8 @@ class System:
         self._state = [slot for slots in self._names.values() for slot in slots]
         self._phi, self._nu, self._gamma, self._step = (vector(name, self.unknowns) for name in ("phi", "nu", "gamma", "step"))
         every, phi, nu = formulation.rows(at), formulation.phi(at), formulation.nu(at)
-        rows = [every[k] for k in kept]
+        rows = [every[k] for k in (*kept, *tracer.selection.dropped)]
+        self._rows = len(rows)
         self._entries = np.array([(i, j) for i, row in enumerate(rows) for j in row])
         self._values = [tracer.layout.scalar(f"entry {i} {j}") for i, j in self._entries.tolist()]
         gamma = formulation.gamma(at, [tracer.tape.input(k) for k in vector(RATE, self.unknowns)])
@@ -94,9 +97,10 @@ class System:
         executor = self._at(state, sample)
         executor.run("rows")
         m = state.shape[1]
-        jacobian = np.zeros((m, self.unknowns, self.unknowns))
-        jacobian[:, self._entries[:, 0], self._entries[:, 1]] = executor.get(self._values).T
-        return Equations(executor.get(self._phi).T, jacobian, executor.get(self._nu).T)
+        rows = np.zeros((m, self._rows, self.unknowns))
+        rows[:, self._entries[:, 0], self._entries[:, 1]] = executor.get(self._values).T
+        jacobian, redundant = rows[:, : self.unknowns], rows[:, self.unknowns :]
+        return Equations(executor.get(self._phi).T, jacobian, executor.get(self._nu).T, redundant)
 
     def gamma(self, state: Array, sample: Array, rate: Array) -> Array:
         """Right-hand sides of the acceleration equations at rates of the unknowns, shape (m, n)."""
