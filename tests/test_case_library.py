@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
-from kincheck.cases import andrews_squeezer, bricard, hooke_joint, modelica_four_bar, planar_slider_crank
+from kincheck.cases import andrews_squeezer, bennett, bricard, hooke_joint, modelica_four_bar, planar_slider_crank
 from kincheck.cases.jet import Jet, steady
 from kincheck.cases.vectors import Circle
 from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, solve
@@ -91,6 +91,7 @@ def test_closed_forms_are_differentiated_rightly(name: str):
         ("hooke_joint", 3),
         ("double_cardan", 1),
         ("bricard", 1),
+        ("bennett", 3),
         ("andrews_squeezer", 9),
         ("iftomm_n_four_bar", 9),
         ("gough_platform", 0),
@@ -132,6 +133,17 @@ def test_bricard_closes():
     assert np.linalg.norm(points["P5"], axis=1) == pytest.approx(np.ones(3), abs=1e-15)
     start = {"P2": (1, -1, 0), "P3": (1, -1, 1), "P4": (0, -1, 1), "P5": (0, 0, 1)}
     assert {name: tuple(np.round(xyz[0], 15)) for name, xyz in points.items()} == start
+
+
+def test_bennett_closes():
+    """The follower's pin stays a link's length from the hinge on the ground, and square to it; at the design it is rational."""
+    hinge, axis = np.array([-0.3, 0.0, 0.0]), np.array([0.0, 0.6, 0.8])
+    pins = {name: np.stack([jet.x for jet in xyz], axis=1) for name, xyz in bennett.motion(angles(0, 77, 180, 301)).items()}
+    arm = pins["follower_pin"] - hinge
+    assert np.linalg.norm(arm, axis=1) == pytest.approx(np.full(4, bennett.B), abs=1e-15)
+    assert arm @ axis == pytest.approx(np.zeros(4), abs=1e-15)
+    assert np.linalg.norm(pins["follower_pin"] - pins["crank_pin"], axis=1) == pytest.approx(np.full(4, bennett.A), abs=1e-15)
+    assert pins["follower_pin"][0] * 130.0 == pytest.approx([9.0, 16.0, -12.0], abs=1e-13)
 
 
 # Andrews' squeezer: the equations and both states are those of the Bari test set for initial value problems, problem andrews

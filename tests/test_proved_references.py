@@ -53,6 +53,18 @@ def test_printed_numbers_are_the_closed_form_to_all_digits(made):
     assert found.proved == len(case.sweep.values)
 
 
+def test_rows_are_chosen_for_the_sample_where_those_of_the_design_are_singular():
+    """The Bennett loop at quarter turns; at the second and the fourth they depend on each other. One solution, its rows said."""
+    case = kincheck.cases.load("bennett")
+    case = replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 90.0, 180.0, 270.0])), reference={})
+    found, errors = prove_case(case, digits=30, numbers="double", tol=TOL)
+    assert found.proved == 4
+    assert [sample.left_out is None for sample in found.samples] == [True, False, True, False]
+    assert all(len(sample.left_out) == len(found.redundant) for sample in found.samples if sample.left_out)
+    assert found.samples[1].left_out != found.redundant
+    assert max(error.largest[0] for error in errors) < 1e-14
+
+
 def test_native_errors_are_round_off(made):
     for error in made[1]:
         assert all(0.0 <= each < 1e-15 for each in error.largest)

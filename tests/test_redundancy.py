@@ -88,19 +88,19 @@ def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
         assert least > 0.4 * best
 
 
-def locomotive(lead):
+LEFT = 0.9273
+
+
+def locomotive(lead, first=LEFT):
     """Two wheels and two coupling rods, the second ahead by that angle: where one rod is at its dead point the other holds."""
     z, joints = (0.0, 0.0, 1.0), [Revolute(f"axle{k}", "ground", f"wheel{k}", (2.0 * k, 0.0, 0.0), (0.0, 0.0, 1.0)) for k in (0, 1)]
-    for rod, angle in (("left", LEFT), ("right", LEFT + lead)):
+    for rod, angle in (("left", first), ("right", first + lead)):
         x, y = 0.4 * np.cos(angle), 0.4 * np.sin(angle)
         joints += [Revolute(f"{rod}{k}", f"wheel{k}", rod, (2.0 * k + x, y, 0.0), z) for k in (0, 1)]
     points = [Point("rim", "wheel1", (2.5, 0.0, 0.0))]
     return Mechanism(
         "loco", [Body(n) for n in ("wheel0", "wheel1", "left", "right")], joints, points, [JointAngle("turn", "axle0")]
     )
-
-
-LEFT = 0.9273
 
 
 def test_where_only_the_chosen_rows_depend_on_each_other_there_is_no_singular_pose():

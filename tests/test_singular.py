@@ -7,7 +7,7 @@ import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
 from kincheck.core import Distance, JointDisplacement, Point, Translational
-from kincheck.core.analysis import followed
+from kincheck.core.analysis import system
 from kincheck.core.analysis.continuity import doubtful
 from kincheck.core.analysis.march import longest, march
 from kincheck.core.analysis.model import compile_model
@@ -45,7 +45,7 @@ def chain_end(loops, turn):
 def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, monkeypatch):
     """The estimate says a fifth of sigma; equations for that are traced for the first sweep only."""
     case, traced = probe(Joint.registry["revolute_spherical"]), list[System]()
-    monkeypatch.setattr(followed, "System", lambda model: traced.append(System(model)) or traced[-1])
+    monkeypatch.setattr(system, "System", lambda model: traced.append(System(model)) or traced[-1])
     model = compile_model(case.mechanism, Request((case.sweep.driver,), case.points, compiled=compiled))
     route, tol = Route(model, case.sweep.path), 2e-13
     estimates = march(route, tol).kept[model.rows[SIGMA].start]

@@ -133,7 +133,7 @@ def test_the_papers_equations_hold(name, write, style):
     for k in range(len(values)):
         path = naive.along(naive.sample(found, k))
         phi, phi_t, phi_tt = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
-        assert np.abs(naive.residuals(mechanism, path(0.0))).max() <= 2e-15
+        assert np.abs(naive.residuals(mechanism, path(0.0))).max() <= 4e-15  # some roundings of coordinates of 2 m
         assert np.abs(phi).max() <= 4e-15
         # speeds reach 4 m/s, accelerations 10 m/s^2; the circle of 0.1 s costs one and two digits
         assert np.abs(phi_t).max() <= 1e-13

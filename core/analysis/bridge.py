@@ -21,7 +21,7 @@ from .model import TESTS, Model
 from .request import FROM, ORIENTATION, RATE, SIGMA, TIME
 from .route import Route
 from .singularity import solve_closely
-from .system import System
+from .system import system_of
 
 # The motion from each of the eight to the next [units of the mechanism's size, rad]. Long ways cost accuracy by the motion's
 # curvature, short ones by the poses' own nearness to the singular one; the first that is accurate enough is taken.
@@ -55,11 +55,10 @@ def onward(route: Route, lane: Array, times: Array) -> Route:
     return Route(route.model, Path(route.path.motions, times, route.path.design), arrived(route.model, lane), since)
 
 
-def bridge(system: System, route: Route, lane: Array, time: float, tol: float, near: Array | None = None) -> Bridge | None:
+def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | None = None) -> Bridge | None:
     """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not known well enough.
 
     Args:
-        system: the equations of the route's model.
         near: a lane that stands there, where the motion was followed to, at or right before the singular pose: it must be on the
             same curve. Without one, only what is interpolated may be believed, and not that the motion goes on.
     """
@@ -75,7 +74,7 @@ def bridge(system: System, route: Route, lane: Array, time: float, tol: float, n
         own = WORSE * float((np.maximum(closure, EPSILON) / sigma).max())
         differences = np.abs(whole @ (EIGHT - SIX))
         off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in _scales(model, whole, speed))])
-        if off <= AMPLIFIED * tol and (near is None or _on_curve(system, route, lanes, near)):
+        if off <= AMPLIFIED * tol and (near is None or _on_curve(route, lanes, near)):
             kept = whole @ EIGHT
             tests = slice(model.rows[TESTS[0]].start, None)
             kept[tests] = whole[tests, 3]
@@ -96,9 +95,9 @@ def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, 
     return np.hstack([before.kept, beyond.kept]), np.stack(lanes, axis=1)
 
 
-def _on_curve(system: System, route: Route, lanes: Array, near: Array) -> bool:
+def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
     """Whether the pose of a lane at the middle time is that of the polynomial through eight others."""
-    time = near[[route.model.slots[FROM + TIME]]]
+    system, time = system_of(route.model), near[[route.model.slots[FROM + TIME]]]
     solved = solve_closely(system, system.state(near[:, None]), route.sampled(time))
     eight = system.state(lanes)
     off, known = np.abs(eight @ EIGHT - solved.state[:, 0]), COVERED * np.abs(eight @ (EIGHT - SIX))

@@ -12,20 +12,21 @@ out of J need not hold for the changed geometry: its residual then says how much
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..algebra import Vec3, vec
 from ..mechanism import Mechanism
 from ..motions import Path
-from ..primitives.base import GROUND_POSE, Drive, Motion
+from ..primitives.base import GROUND_POSE, Motion
 from ..trajectory import Array, Trajectory
 from .cartesian import Cartesian
+from .choice import chosen
 from .equations import Frames, constraints
 from .formulation import Configuration
 from .geometry import placed, places
-from .model import compile_model
+from .model import compile_model, standing_drives
 from .poses import displaced, jacobian, state_of
 from .request import Request
 from .screws import Screw, screws
@@ -57,14 +58,16 @@ class Pose:
 
     Attributes:
         value: of the swept driver or time, as the sweep has it.
+        owners: joint or driver and primitive of each solved row: where those chosen at design are worse than need be, others are.
         smallest, largest: singular values of the solved rows, lengths in mechanism sizes.
-        orientation: sign of their determinant, against that at design.
+        orientation: sign of their determinant, against that at design; of all rows if there are more, followed from pose to pose.
         direction: the motion that the rows determine least.
         points: gradients by point.
         contradicted: by how much each redundant row would not hold, by the numbers of the places, shape (redundant rows, numbers).
     """
 
     value: float
+    owners: Sequence[tuple[str, str]]
     smallest: float
     largest: float
     orientation: float
@@ -85,13 +88,11 @@ class Conditioning:
     Attributes:
         trajectory: of the whole sweep, with its message where it cannot be followed.
         poses: at the samples that were looked at; those not reached are left out.
-        owners: joint or driver and primitive of each solved row.
         numbers: place and component of each number of the geometry, and the length of its vector for a direction, else 1.
     """
 
     trajectory: Trajectory
     poses: Sequence[Pose]
-    owners: Sequence[tuple[str, str]]
     numbers: Sequence[tuple[str, int, float]]
 
 
@@ -111,24 +112,24 @@ def conditioning(
     drivers, bodies = tuple(path.motions), tuple(body.name for body in mechanism.moving)
     model = compile_model(mechanism, Request(drivers, (), bodies, order=0))
     found = sweep(model, path, tol)
-    frame, kept, dropped = model.frame, list(model.selection.kept), list(model.selection.dropped)
+    frame = model.frame
     drive = path.drive(drivers, path.times)[0]
     reached = np.flatnonzero(found.solved)
     at = {int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()}
     at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
     geometry = _slopes(mechanism, varied)
-    looked: list[Pose] = []
-    owners: Sequence[tuple[str, str]] = ()
-    still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
-    design = float(np.linalg.slogdet(jacobian(still, still.configuration(still.design))[kept])[0])
-    for k in sorted(at & set(reached.tolist())):
+    looked, matrices = list[Pose](), list[Array]()
+    seen = sorted(at & set(reached.tolist()))
+    for k in seen:
         change = dict(zip(drivers, drive[:, k].tolist(), strict=True))
-        drives = {name: _drive(mechanism, frame, name, value) for name, value in change.items()}
+        drives = standing_drives(mechanism, frame.unit, change)
         formulation = Cartesian(constraints(mechanism, frame, drives), frame.moving)
-        owners = [formulation.owners[row] for row in kept]
         pose = displaced(mechanism, frame, {name: (found.bodies[name].r[k], found.bodies[name].p[k]) for name in bodies})
         configuration = formulation.configuration(_floats(state_of(formulation, mechanism, frame, pose, change)))
         matrix = jacobian(formulation, configuration)
+        matrices.append(matrix)
+        kept = list(chosen(matrix, [model.selection.kept], len(mechanism.drivers), formulation.conditions))
+        dropped = [row for row in range(len(matrix)) if row not in kept]
         solved, rest = matrix[kept], matrix[dropped]
         U, sizes, V = np.linalg.svd(solved)
         inverse = (V.T / sizes) @ U.T
@@ -140,16 +141,35 @@ def conditioning(
         looked.append(
             Pose(
                 float(values[k]),
+                [formulation.owners[row] for row in kept],
                 float(sizes[-1]),
                 float(sizes[0]),
-                float(np.linalg.slogdet(solved)[0]) * design,
+                1.0,
                 screws(formulation, configuration, frame, V[-1]),
                 {name: _gradient(mechanism, frame, formulation, configuration, geometry, name, metres, shift) for name in points},
                 by_geometry[dropped] + rest @ shift,
             )
         )
     numbers = [(place, k, _length(place, value)) for place, value in _varied(mechanism, varied).items() for k in range(len(value))]
-    return Conditioning(found, looked, owners, numbers)
+    still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
+    turned = _orientations(matrices, jacobian(still, still.configuration(still.design)), nearest)
+    return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], numbers)
+
+
+def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> list[float]:
+    """Signs of determinants against that at design, from pose to pose, beginning at the one nearest to design.
+
+    Of a tall matrix there is none, but of the product A^T B of two that are near each other: it is the sum over all choices of rows
+    of the products of their determinants, and of square ones the product itself.
+    """
+    found, n = np.ones(len(matrices)), len(matrices)
+    for way in (range(nearest, n), range(nearest, -1, -1)):
+        before, sign = design, 1.0
+        for k in way:
+            sign *= float(np.linalg.slogdet(before.T @ matrices[k])[0])
+            before, found[k] = matrices[k], sign
+    return found.tolist()
 
 
 def _is_length(formulation: Cartesian, rows: Array) -> Array:
@@ -178,11 +198,6 @@ def _slopes(mechanism: Mechanism, varied: Sequence[str]) -> dict[str, tuple[Slop
     count = _count(mechanism, varied)
     unit_rows = iter(np.eye(count))
     return {place: tuple(Slope(x, next(unit_rows)) for x in value) for place, value in _varied(mechanism, varied).items()}
-
-
-def _drive(mechanism: Mechanism, frame: Frames, name: str, value: float) -> Drive:
-    c = value if mechanism.driver(name).type == "joint_angle" else value / frame.unit
-    return Drive(c, 0.0, 0.0, float(np.cos(0.5 * value)), float(np.sin(0.5 * value)))
 
 
 def _floats(state: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:

@@ -28,6 +28,11 @@ AMPLIFIED = 1e3
 # The estimate of sigma (`Elimination.sigma`) is 0.16 to 4 times as much over the case library: a bound by sigma is worse
 # than by the estimate by up to this. Where there are only pivots (sparse systems), which are 1.3 to 17 times as much, by more.
 WORSE, WORSE_BY_PIVOTS = 10.0, 30.0
+# Where there are more rows than are solved, others are looked for where a step fails and sigma is below this part of the largest
+# that it has had; if none are better, where it is this part of that.
+LOW = 0.1
+# So much less is allowed of errors that other rows may not have.
+SHARPER = 1e-2
 EPSILON = float(np.finfo(np.float64).eps)
 # A motion is followed towards a singular pose as long as rounding leaves its rates uncertain by less than the first part, estimated
 # from sigma: nearer it seems to turn any way, also into another motion that crosses it there. Away from one it is followed only
@@ -35,14 +40,31 @@ EPSILON = float(np.finfo(np.float64).eps)
 FOLLOWED, TURNED = 1e-2, 1e-5
 
 
-def doubtful(sigma: float | Array, closure: float | Array, tol: float) -> bool | NDArray[np.bool_]:
+def doubtful(sigma: float | Array, closure: float | Array, tol: float, order: int = 1) -> bool | NDArray[np.bool_]:
     """Which samples need scrutiny: their residuals and estimates of sigma allow errors too large.
 
     The error of rates is that of the pose over sigma once more. Where sigma itself is known the same margin is kept: without it
     accelerations two thousandths of a radian from a singular pose were off by 1e-8, solved closely by 1e-10.
+
+    Args:
+        order: 2 for accelerations, whose error is that of rates over sigma once more.
     """
-    limit = AMPLIFIED * tol * (sigma * sigma)
+    limit = AMPLIFIED * tol * sigma ** (1 + order)
     return (WORSE * closure > limit) | (limit < WORSE * EPSILON)
+
+
+def in_question(sigma: float | Array, closure: float | Array, tol: float, largest: float | None) -> bool | NDArray[np.bool_]:
+    """Which samples are doubtful, or may be better by other rows than those that are solved.
+
+    What the mechanism itself makes of rounding cannot be helped, a choice of rows can: from them more is asked.
+
+    Args:
+        largest: estimate of sigma along the motion, if there are more rows than are solved.
+    """
+    found = doubtful(sigma, closure, tol)
+    if largest is None:
+        return found
+    return found | (doubtful(sigma, closure, SHARPER * tol, order=2) & (sigma < LOW * largest))
 
 
 def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float | Array, size: float) -> NDArray[np.bool_]:

@@ -1,25 +1,27 @@
-"""What was followed of a motion, part by part: a singular pose that the motion passes ends one part, and begins the next."""
+"""What was followed of a motion, part by part: a singular pose that the motion passes ends one part, and begins the next; so does
+one where only the rows are singular that it was followed by."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..motions import Path
 from ..trajectory import Array
 from .bridge import bridge, onward
-from .continuity import doubtful
+from .choice import BETTER, NEAR, Choice
+from .continuity import LOW, doubtful, in_question
 from .march import End, March, arrived, march
 from .request import FROM, LARGEST_SIGMA, SIGMA, TIME
 from .route import Route
-from .system import System
 
-# A motion that ends with a smallest singular value above this part of the largest that it has had does not end at a singular pose.
-NEAR = 1e-2
 # Each takes some milliseconds to be passed. A motion that has so many is one of thousands of turns.
 MOST = 1000
+# A sample takes a millisecond to find that no rows are better there; where so many have none it is the mechanism that is singular.
+WITHOUT = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +53,12 @@ class Stuck:
 
     Attributes:
         sample: which.
+        route: on which the passage is.
         before, near: lanes: a good one before the passage, and the last one there.
     """
 
     sample: int
+    route: Route
     before: Array
     near: Array
 
@@ -63,63 +67,122 @@ class Followed:
     """A march, and its going on beyond its ends.
 
     Attributes:
-        system: the equations.
         found: the samples; those beyond ends are put in as they are reached.
         parts: the first is the route asked for.
         part_of: the part of each sample, shape (n,).
+        choice: of rows.
         ends: those that remain.
         passages, stuck: what was passed.
     """
 
     def __init__(self, route: Route, found: March, tol: float) -> None:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
-        # tracing it anew takes longer than all else here
-        self.system = route.model.bound("system", lambda: System(route.model))
+        self.choice = Choice(route.model)
         self.parts = [Part(route, np.arange(len(self.times)))]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []
         self.passages: list[Passage] = []
         self.stuck: list[Stuck] = []
+        self.renewed = 0
         self._stood: dict[int, Array] = {}
 
     @property
     def doubtful(self) -> NDArray[np.bool_]:
         """Samples that were reached and may be wrong, shape (n,)."""
-        closure, sigma = (self.found.kept[self.route.model.rows[name].start] for name in ("closure", SIGMA))
-        return self.found.solved & doubtful(sigma, closure, self.tol)
+        return self.found.solved & doubtful(*self._tests, self.tol)
+
+    @property
+    def in_question(self) -> NDArray[np.bool_]:
+        """Those, and samples that may be better by other rows, shape (n,)."""
+        model = self.route.model
+        largest = np.fmax.reduce(self.found.kept[model.rows[LARGEST_SIGMA].start]) if model.selection.dropped else None
+        return self.found.solved & in_question(*self._tests, self.tol, largest)
+
+    @property
+    def _tests(self) -> tuple[Array, Array]:
+        sigma, closure = (self.found.kept[self.route.model.rows[name].start] for name in (SIGMA, "closure"))
+        return sigma, closure
 
     def go_on(self) -> None:
         """Pass the singular poses at ends, one after the other, where the motion passes them."""
         waiting = list(self.found.ends)
         while waiting:
             end = waiting.pop(0)
-            further = self._beyond(end) if len(self.passages) < MOST else None
+            further = self._beyond(end)
             if further is None:
                 self.ends.append(end)
             else:
                 waiting = [*further, *waiting]
 
+    def renew(self, lanes: Mapping[int, Array]) -> None:
+        """Follow samples by rows that are chosen there, from lanes that stand at them."""
+        left: list[int] = list(lanes)
+        routes = {k: self.parts[int(self.part_of[k])].route for k in left}
+        without = 0
+        while left and without < WITHOUT:
+            here = left[0]
+            standing = self.choice.anew(routes[here], lanes[here])
+            if standing is None:
+                without += 1
+                left = left[1:]
+            else:
+                samples = np.array(left)
+                self._follow(Route(standing.model, self._path(samples), standing.lane, float(self.times[here])), samples)
+                self.renewed += 1
+                left = [k for k in left[1:] if self.in_question[k]]
+
     def _beyond(self, end: End) -> list[End] | None:
         """What ends the motion beyond an end; None where it does not go on."""
-        slots = self.route.model.slots
-        if end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]:
+        slots = end.route.model.slots
+        if not end.early and end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]:
             return None
-        here, number = self._time(end.lane), self._number(end.route)
+        here, number = _time(end.route, end.lane), self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0
+        standing = self.choice.anew(end.route, end.lane) if self.renewed < MOST else None
+        if standing is not None:
+            self.renewed += 1
+            if number is None:
+                return self._arrive(Route(standing.model, end.route.path, standing.lane, here))
+            missing = self._missing(number, side, end.wanted)
+            ends = self._follow(Route(standing.model, self._path(missing), standing.lane, here), missing)
+            return [each for each in ends if side * (each.wanted - here) >= 0.0]
+        if end.early:
+            return self._further(end, side)
+        if len(self.passages) == MOST:
+            return None
         lane = self.before(here, side, number) if number is not None else end.route.departure
-        passed = bridge(self.system, end.route, lane, here, self.tol, end.lane) if lane is not None else None
+        passed = bridge(end.route, lane, here, self.tol, end.lane) if lane is not None else None
         if passed is None:
             return None
         self.passages.append(Passage(end.lane, here, end.route))
         if number is None:
             return self._arrive(onward(end.route, passed.beyond, end.route.path.times))
-        start = self.parts[number].route.start
-        missing = np.flatnonzero(~self.found.solved & (side * (self.times - start) >= side * (end.wanted - start)))
-        ends = self._follow(onward(self.route, passed.beyond, self.times[missing]), missing)
-        beyond = self._time(passed.beyond)
+        missing = self._missing(number, side, end.wanted)
+        ends = self._follow(onward(end.route, passed.beyond, self.times[missing]), missing)
+        beyond = _time(end.route, passed.beyond)
         short = {k for k in missing.tolist() if not self.found.solved[k] and side * (self.times[k] - beyond) < 0.0}
-        self.stuck += [Stuck(k, lane, end.lane) for k in sorted(short)] if lane is not None else []
+        self.stuck += [Stuck(k, end.route, lane, end.lane) for k in sorted(short)] if lane is not None else []
         return [each for each in ends if side * (each.wanted - beyond) >= 0.0]
+
+    def _further(self, end: End, side: float) -> list[End]:
+        """Go along a route again, and where it left off on."""
+        samples, slots = self.parts[self._number(end.route) or 0].samples, end.route.model.slots
+        low = LOW * float(end.lane[slots[FROM + SIGMA]] / end.lane[slots[FROM + LARGEST_SIGMA]])
+        found = march(end.route, self.tol, low=low)
+        further = found.solved & ~self.found.solved[samples]
+        taken = samples[further]
+        self.found.kept[:, taken], self.found.solved[taken] = found.kept[:, further], True
+        return [each for each in found.ends if side * (each.wanted - end.route.start) >= 0.0]
+
+    def _missing(self, number: int, side: float, wanted: float) -> NDArray[np.intp]:
+        """The samples that a part did not reach on a side, from the first that was wanted on."""
+        start = self.parts[number].route.start
+        return np.flatnonzero(~self.found.solved & (side * (self.times - start) >= side * (wanted - start)))
+
+    def _path(self, samples: NDArray[np.intp]) -> Path:
+        """The path at samples."""
+        path = self.route.path
+        return Path(path.motions, self.times[samples], path.design)
 
     def _arrive(self, way: Route) -> list[End]:
         """Go on to the first sample, and from there."""
@@ -127,13 +190,17 @@ class Followed:
         found = march(way, self.tol, {last})
         if not found.solved.all():
             return list(found.ends)
-        lane = arrived(self.route.model, found.visited[last])
-        return self._follow(Route(self.route.model, self.route.path, lane, float(self.times[0])), np.arange(len(self.times)))
+        lane = arrived(way.model, found.visited[last])
+        return self._follow(Route(way.model, self.route.path, lane, float(self.times[0])), np.arange(len(self.times)))
 
     def _follow(self, route: Route, samples: NDArray[np.intp]) -> list[End]:
-        found = march(route, self.tol)
-        self.found.kept[:, samples], self.found.solved[samples] = found.kept, found.solved
-        self.part_of[samples] = len(self.parts)
+        """Put what a route reaches of samples in their place, where there was nothing or it was much nearer to singular."""
+        found, sigma = march(route, self.tol, low=LOW), self.route.model.rows[SIGMA].start
+        nearer = BETTER * self.found.kept[sigma, samples] < found.kept[sigma]
+        reached = found.solved & (nearer | ~self.found.solved[samples])
+        taken = samples[reached]
+        self.found.kept[:, taken], self.found.solved[taken] = found.kept[:, reached], True
+        self.part_of[taken] = len(self.parts)
         self.parts.append(Part(route, samples))
         return list(found.ends)
 
@@ -163,5 +230,7 @@ class Followed:
         """Of the part that is followed on a route; None on the way to the first sample."""
         return next((k for k, part in enumerate(self.parts) if part.route is route), None)
 
-    def _time(self, lane: Array) -> float:
-        return float(lane[self.route.model.slots[FROM + TIME]])
+
+def _time(route: Route, lane: Array) -> float:
+    """At which a lane stands on a route."""
+    return float(lane[route.model.slots[FROM + TIME]])

@@ -6,6 +6,7 @@ the solution; they stay as a diagnostic, evaluated at every sample.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,15 +106,15 @@ def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     return found
 
 
-def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:
-    """The rows of a formulation to solve for, drivers first.
+def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation, wanted: Sequence[int] = ()) -> Selection:
+    """The rows of a formulation to solve for: those wanted, or if none are those independent at the design, drivers first.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
     """
     found, drivers = driven_account(mechanism, frame), len(mechanism.drivers)
     matrix = design_jacobian(formulation)
-    kept = independent_rows(matrix, drivers, formulation.conditions)
+    kept = wanted or independent_rows(matrix, drivers, formulation.conditions)
     if len(kept) < formulation.unknowns:
         raise SolveError(_locked(mechanism, formulation, matrix))
     dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))

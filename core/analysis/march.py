@@ -61,24 +61,28 @@ class End:
         route: on which: the one asked for, or the way to its first sample.
         lane: all slots of the last pose that was reached.
         wanted: time of the sample that was not.
+        early: see `march`: no part of the step was tried.
     """
 
     message: str
     route: Route
     lane: Array
     wanted: float
+    early: bool = False
 
 
-def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bool = False) -> March:
+def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bool = False, low: float = 0.0) -> March:
     """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance.
 
     Args:
         visit: samples at which the lane that stands there is wanted, and beyond which nothing is.
         crossing: accept steps across singular poses, whatever is there.
+        low: leave off at a step that fails where the smallest singular value is below this part of the largest that it has had,
+            if there are more rows than are solved: others may be better.
     """
     model = route.model
     if route.from_design:
-        return marcher(route, tol, crossing=crossing).run(visit)
+        return marcher(route, tol, crossing=crossing).run(visit, low)
     way = Route(model, route.path.lead_in(), route.design)
     last = len(way.path.times) - 1
     found = marcher(way, tol, crossing=crossing).run({last})
@@ -87,7 +91,7 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
         end = replace(found.ends[0], message=f"on the way to the first sample: {found.messages[0]}")
         return March(np.full((len(found.kept), n), np.nan), found.worst, np.zeros(n, np.bool_), (end,))
     start = model.moving(arrived(model, found.visited[last]), route.origin)
-    return Marcher(route, start, accept_by(tol, crossing=crossing)).run(visit)
+    return Marcher(route, start, accept_by(tol, crossing=crossing)).run(visit, low)
 
 
 def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
@@ -150,12 +154,13 @@ class Marcher:
         self.track = self.executor.track(route.sides, self.start[self.model.ahead], len(self.every))
         self.counts = [side.count for side in route.sides]
 
-    def run(self, visit: Collection[int] = ()) -> March:
+    def run(self, visit: Collection[int] = (), low: float = 0.0) -> March:
         """See `march`."""
         if self.model.geometry:  # the lanes know their variant
             self.executor.put(range(len(self.start)), self.start[:, None])
         self.kept, self.solved = self.track.begin(), self.every.copy()
         self.visit, self.visited = visit, dict[int, Array]()
+        self.low = low if self.model.selection.dropped else 0.0
         reached = [0] * len(self.counts) if visit else self.track.run()
         ends: list[End] = []
         if reached != self.counts:
@@ -175,12 +180,13 @@ class Marcher:
             headway = Headway(self._stands(self._anchor(number)))
             while at < stop:
                 anchor, wanted = self._anchor(number), float(side.samples[0, at])
-                further, reason = self._divide(anchor, wanted)
+                early = bool(anchor[self.slots[FROM + SIGMA]] < self.low * anchor[self.slots[FROM + LARGEST_SIGMA]])
+                further, reason = (None, "") if early else self._divide(anchor, wanted)
                 stopped = headway.stopped(self._stands(anchor), wanted)
                 if further is None or stopped:
                     columns = side.first + side.step * np.arange(at, side.count)
                     self.kept[:, columns], self.solved[columns] = np.nan, False
-                    return End(self._end(side, at, anchor, stopped or reason), self.route, anchor, wanted)
+                    return End(self._end(side, at, anchor, stopped or reason), self.route, anchor, wanted, early)
                 self.track.anchors[number] = further[self.model.ahead]
                 came, at = at, self.track.follow(number, at, stop, anew=False)
                 if at > came:

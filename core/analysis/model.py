@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +12,12 @@ from numpy.typing import NDArray
 from ..drivers import Driver, JointAngle
 from ..errors import SolveError
 from ..mechanism import Mechanism
+from ..primitives.base import Drive
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
 from ..program.compiler import available
 from ..trajectory import Array
 from . import following
+from .bound import Bound
 from .components import Section
 from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
 from .tracing import Tracing, ours, traced
@@ -26,7 +27,7 @@ MAX_ITERATIONS = 12
 RECENT = 8
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
-Made = TypeVar("Made")
+NONE_VARIED = np.empty((0, 1))
 TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
 TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
@@ -76,18 +77,11 @@ def given_by(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
     return found.reshape(5 * len(drivers), drive.shape[-1])
 
 
-class Bound:
-    """What is made of something, by key and thread: made once, and kept."""
-
-    def __init__(self) -> None:
-        self._found: dict[Any, Any] = {}
-
-    def __call__(self, key: Hashable, make: Callable[[], Made]) -> Made:
-        """What was made under this key for this thread before; or is made now."""
-        key = threading.get_ident(), key
-        if key not in self._found:
-            self._found[key] = make()
-        return self._found[key]
+def standing_drives(mechanism: Mechanism, unit: float, change: Mapping[str, float]) -> dict[str, Drive]:
+    """Drivers by name that stand at values from the design [SI]."""
+    values = np.array([[*change.values()], *np.zeros((2, len(change)))])[..., None]
+    numbers = given_by([mechanism.driver(name) for name in change], values, unit).reshape(-1, 5).tolist()
+    return {name: Drive(*each) for name, each in zip(change, numbers, strict=True)}
 
 
 class Model:
@@ -100,7 +94,7 @@ class Model:
         sampled: the places of what is given at every sample: the time, and five numbers of each moving driver.
         geometry: the places of the numbers of all varied places.
         given: name of a vector that tells how a given body moves -> its value at rest at design.
-        design: all slots of a lane that stands at the design position.
+        design: all slots of a lane that stands at the design position; NaN where the rows were chosen elsewhere.
         bound: what is made of it for a thread.
         rows: name of a motion or test -> its rows among what is kept of a sample.
         kept: how many rows there are.
@@ -144,7 +138,7 @@ class Model:
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self._plan) if compiled else None
         self.bound = Bound()
-        self.design = self._solve_design()
+        self.design = np.full(len(self.slots), np.nan) if request.rows else self._solve_design()
 
     def _wanted(self) -> list[str]:
         """Names of the vectors asked for, those of one motion side by side."""
@@ -272,10 +266,16 @@ class Model:
 
     def stand(self, executor: Executor, geometry: Array) -> NDArray[np.bool_]:
         """Put the lanes of an executor where `standing` says; which of them close there."""
+        return self.stand_at(executor, self.state, self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))), geometry)
+
+    def stand_at(
+        self, executor: Executor, state: Mapping[str, Sequence[float] | Array], sample: Array, geometry: Array = NONE_VARIED
+    ) -> NDArray[np.bool_]:
+        """Put the lanes of an executor where a sample of the drives has them, near a state; which of them close there."""
         executor.clear()
-        for name, value in (*self.state.items(), *self.given.items()):
+        for name, value in (*state.items(), *self.given.items()):
             executor.put(self.vectors[name], np.array(value)[:, None])
-        executor.put(self.sampled, self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))))
+        executor.put(self.sampled, sample)
         if len(geometry):
             executor.put(self.geometry, geometry)
             executor.run("prepare")

@@ -51,7 +51,11 @@ class Tracer:
         self.mechanism, self._section = mechanism, section
         self.frame = section.frame(mechanism) if section else frames(mechanism)
         self.given: Mapping[str, Given] = {name: Given() for name in section.given} if section else {}
-        self.selection = (select_section if section else select_rows)(mechanism, self.frame, self._formulate({}))
+        formulation = self._formulate({})
+        if section:
+            self.selection = select_section(mechanism, self.frame, formulation)
+        else:
+            self.selection = select_rows(mechanism, self.frame, formulation, request.rows)
         self.geometry = {place: places(mechanism)[place] for place in request.varied}
         given = {place: self.vector(place, len(value)) for place, value in self.geometry.items()}
         slots = {slot for place in given for slot in self.layout.vectors[place]}

@@ -17,10 +17,11 @@ from ..primitives.base import GROUND_POSE, Drive, Pose
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array, BodyMotion, Trajectory
 from .cartesian import Cartesian
+from .choice import chosen_at
 from .enclosure import Enclosure, UnprovedError, enclose
 from .equations import Constraint, Frames, constraints, frames
 from .exact import Reading, equations, exact_mechanism
-from .model import compile_model
+from .model import compile_model, standing_drives
 from .request import Request
 from .sweep import sweep
 
@@ -38,6 +39,7 @@ class Proofs:
         native: the native solution, from which the proofs start; they do not rest on it.
         rows: the equations that the proofs are about, as "joint: primitive".
         redundant: those that were left out, because the others say the same at the design position.
+        others: by sample, those left out where the choice at the design is worse than need be.
     """
 
     samples: Sequence[Enclosure | UnprovedError]
@@ -45,6 +47,7 @@ class Proofs:
     native: Trajectory
     rows: Sequence[str]
     redundant: Sequence[str]
+    others: Mapping[int, Sequence[str]]
 
 
 def prove(
@@ -69,22 +72,37 @@ def prove(
     poses = _states(mechanism, native, path.times)
     samples: list[Enclosure | UnprovedError] = []
     seconds: list[float] = []
+    others: dict[int, Sequence[str]] = {}
+    names = [f"{owner}: {primitive}" for owner, primitive in Cartesian(constraints(mechanism, model.frame, {}), ()).owners]
     with precision(bits):
-        traced = equations(exact_mechanism(mechanism, reading), tuple(drives), points, model.selection.kept)
-        units = [1 if mechanism.driver(name).type == "joint_angle" else Fraction(traced.frame.unit) for name in drives]
-        for k, solved in enumerate(native.solved):
+        exact, kept = exact_mechanism(mechanism, reading), model.selection.kept
+        traced = {kept: equations(exact, tuple(drives), points, kept)}
+        unit = traced[kept].frame.unit
+        units = [1 if mechanism.driver(name).type == "joint_angle" else Fraction(unit) for name in drives]
+        for k, reached in enumerate(native.solved):
             started = perf_counter()
             driven = [[_ball(x / unit) for x in drives[name][k]] for name, unit in zip(drives, units, strict=True)]
             try:
-                if not solved:
+                if not reached:
                     raise UnprovedError(f"there is no approximate pose to start from: {native.message}")
-                samples.append(enclose(traced, points, poses[k], driven, bits))
+                change = {name: float(drives[name][k][0]) for name in drives}
+                rows = _rows(mechanism, change, poses[k], kept) if model.selection.dropped else kept
+                if rows != kept:
+                    others[k] = [names[row] for row in range(len(names)) if row not in rows]
+                    traced.setdefault(rows, equations(exact, tuple(drives), points, rows))
+                samples.append(enclose(traced[rows], points, poses[k], driven, bits))
             except UnprovedError as error:
                 samples.append(error)
             seconds.append(perf_counter() - started)
-    names = [f"{owner}: {primitive}" for owner, primitive in Cartesian(constraints(mechanism, model.frame, {}), ()).owners]
-    rows, redundant = ([names[k] for k in each] for each in (model.selection.kept, model.selection.dropped))
-    return Proofs(samples, seconds, native, rows, redundant)
+    solved, redundant = ([names[k] for k in each] for each in (kept, model.selection.dropped))
+    return Proofs(samples, seconds, native, solved, redundant, others)
+
+
+def _rows(mechanism: Mechanism, change: Mapping[str, float], state: Array, kept: tuple[int, ...]) -> tuple[int, ...]:
+    """The rows to prove a sample by: those kept, or where they are worse than need be others."""
+    frame = frames(mechanism)
+    found = constraints(mechanism, frame, standing_drives(mechanism, frame.unit, change))
+    return chosen_at(Cartesian(found, frame.moving), state.tolist(), kept, len(mechanism.drivers))
 
 
 def _ball(x: Fraction) -> Ball:

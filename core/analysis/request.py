@@ -26,6 +26,7 @@ class Request:
         varied: places of the geometry (see `places`) that are inputs of the programs; all others are constants in them.
         last_iteration: of a sample, the one that starts from a residual below this [units of the mechanism's size]; a sparse system
             iterates as long as it gains by it.
+        rows: of the formulation, which are solved; those that are independent at the design position unless given.
     """
 
     drivers: tuple[str, ...]
@@ -37,6 +38,7 @@ class Request:
     state: bool = False
     varied: tuple[str, ...] = ()
     last_iteration: float = LAST_ITERATION
+    rows: tuple[int, ...] = ()
 
 
 RATE, RATE_T = "rate", "rate_t"

@@ -12,8 +12,9 @@ from ..mechanism import Mechanism
 from ..motions import Path
 from ..program import Side
 from ..trajectory import Array
+from .bound import Bound
 from .following import weights_of_groups, weights_of_samples
-from .model import RECENT, Bound, Model, recent_model
+from .model import RECENT, Model, recent_model
 from .request import Request
 from .tracing import ours
 

@@ -7,6 +7,7 @@ factors, and its errors are computed; where they are too large it is interpolate
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,14 +17,16 @@ from numpy.typing import NDArray
 from ..motions import Path
 from ..trajectory import Array
 from .bridge import bridge
+from .choice import BETTER
 from .continuation import limit_ahead
 from .continuity import AMPLIFIED, WORSE
 from .followed import Followed, Passage
 from .march import End, March
-from .model import TESTS
+from .model import TESTS, Model
 from .request import FROM, SIGMA, TIME
 from .route import Route
 from .singularity import CONTINUED, REGULAR, Singularity, examine, listed, smallest_singular_values, solve_closely
+from .system import System, system_of
 
 # Of one march: the others are counted.
 NAMED = 8
@@ -45,6 +48,7 @@ class Findings:
         poses: the singular poses, for the record.
         retried: samples that were solved again.
         sigma: smallest singular value among those.
+        renewed: how often rows were chosen anew.
     """
 
     notes: list[str] = field(default_factory=list[str])
@@ -52,6 +56,7 @@ class Findings:
     poses: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     retried: int = 0
     sigma: float = np.inf
+    renewed: int = 0
 
     @property
     def details(self) -> dict[str, Any]:
@@ -59,6 +64,8 @@ class Findings:
         found: dict[str, Any] = {}
         if self.retried:
             found |= {"retried_samples": self.retried, "smallest_singular_value": self.sigma}
+        if self.renewed:
+            found["rows_chosen_anew"] = self.renewed
         if self.poses:
             found["singular_poses"] = self.poses
         return found | ({"notes": self.notes} if self.notes else {})
@@ -75,23 +82,23 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
     scrutiny.passages()
     for end in scrutiny.followed.ends:
         scrutiny.end(end)
+    scrutiny.findings.renewed = scrutiny.followed.renewed
     return scrutiny.findings
 
 
 class _Scrutiny:
     def __init__(self, followed: Followed) -> None:
         self.followed, self.route, self.found, self.tol = followed, followed.route, followed.found, followed.tol
-        self.model, self.system, self.times = self.route.model, followed.system, self.route.path.times
-        self.limit = AMPLIFIED * self.tol
+        self.rows, self.times = self.route.model.rows, self.route.path.times
+        self.limit, self.orders = AMPLIFIED * self.tol, self.route.model.orders
         self.findings = Findings()
 
     def too_large(self) -> Findings:
         """Say that nothing was examined."""
-        count = int(self.followed.doubtful.sum())
+        count, unknowns = int(self.followed.doubtful.sum()), len(self.route.model.selection.kept)
         if count:
             self.findings.notes.append(
-                f"{count} samples seem to be nearly singular, and were not examined: {self.system.unknowns} unknowns are "
-                f"more than {LARGEST}"
+                f"{count} samples seem to be nearly singular, and were not examined: {unknowns} unknowns are more than {LARGEST}"
             )
         self.findings.messages += self.found.messages
         return self.findings
@@ -99,41 +106,61 @@ class _Scrutiny:
     # Samples
 
     def samples(self) -> None:
-        """Solve doubtful samples closely; interpolate or refuse those that remain in doubt."""
-        indices = np.flatnonzero(self.followed.doubtful)
+        """Follow samples by better rows, solve those in doubt closely, and interpolate or refuse those that remain in doubt."""
+        indices, doubtful = np.flatnonzero(self.followed.in_question), self.followed.doubtful
         if not len(indices):
             return
         visited = self.followed.visit(indices.tolist())
-        self._lost([k for k in indices.tolist() if k not in visited])
-        if not visited:
-            return
-        indices = np.array(sorted(visited), np.intp)
-        lanes = np.stack([visited[k] for k in indices.tolist()], axis=1)
-        state, sample = self.system.state(lanes), self.route.sampled(self.times[indices])
-        # the estimate says too little of many unknowns: most of their samples are beyond doubt by sigma itself
-        self.found.kept[self.model.rows[SIGMA].start, indices] = smallest_singular_values(self.system, state, sample)
-        left = np.flatnonzero(self.followed.doubtful[indices])
-        if not len(left):
-            return
-        indices, lanes, state, sample = indices[left], lanes[:, left], state[:, left], sample[:, left]
-        solved = solve_closely(self.system, state, sample)
-        outputs = self.system.outputs(solved.state, sample, solved.rate, solved.rate_t)
+        self._lost([k for k in indices.tolist() if k not in visited and doubtful[k]])
+        better: dict[int, Array] = {}
+        for model, samples in self._by_model(visited):
+            # the estimate says too little of many unknowns: most of their samples are beyond doubt by sigma itself
+            system, lanes = system_of(model), self._lanes(visited, samples)
+            sigma, of_all = smallest_singular_values(system, system.state(lanes), self.route.sampled(self.times[samples]))
+            self.found.kept[self.rows[SIGMA].start, samples] = sigma
+            wanted = self.followed.in_question[samples] & (of_all > BETTER * sigma)
+            better |= {k: visited[k] for k in samples[wanted].tolist()}
+        self.followed.renew(better)
+        doubtful = self.followed.doubtful
+        for model, samples in self._by_model(k for k in visited if doubtful[k]):
+            self._closely(system_of(model), samples, self._lanes(visited, samples))
+
+    def _by_model(self, samples: Iterable[int]) -> Iterator[tuple[Model, NDArray[np.intp]]]:
+        """Samples by the model that they were followed by."""
+        found: dict[Model, list[int]] = {}
+        for k in sorted(samples):
+            found.setdefault(self._followed_on(k).model, []).append(k)
+        for model, each in found.items():
+            yield model, np.array(each, np.intp)
+
+    def _followed_on(self, k: int) -> Route:
+        return self.followed.parts[int(self.followed.part_of[k])].route
+
+    def _lanes(self, visited: Mapping[int, Array], samples: NDArray[np.intp]) -> Array:
+        return np.stack([visited[k] for k in samples.tolist()], axis=1)
+
+    def _closely(self, system: System, indices: NDArray[np.intp], lanes: Array) -> None:
+        """Solve samples closely."""
+        state, sample = system.state(lanes), self.route.sampled(self.times[indices])
+        solved = solve_closely(system, state, sample)
+        outputs = system.outputs(solved.state, sample, solved.rate, solved.rate_t)
         closure, leftover, branch = (outputs.pop(name)[0] for name in ("closure", "leftover", "branch"))
-        kept, rows = self.found.kept, self.model.rows
+        kept, rows = self.found.kept, self.rows
         # closely solved is nearly where it was; anything else is another solution
         moved = np.abs(solved.state - state).max(axis=0)
         near = moved <= np.maximum(self.limit, WORSE * kept[rows["closure"].start, indices] / solved.sigma)
-        good = (solved.error[: self.model.orders].max(axis=0) <= self.limit) & near & (closure <= self.tol) & (branch > 0.0)
+        good = (solved.error[: self.orders].max(axis=0) <= self.limit) & near & (closure <= self.tol) & (branch > 0.0)
         for name, values in [*outputs.items(), ("closure", closure), ("leftover", leftover)]:
             kept[rows[name], indices[good]] = values[..., good]
-        self.findings.retried, self.findings.sigma = len(indices), float(solved.sigma.min())
+        self.findings.retried += len(indices)
+        self.findings.sigma = min(self.findings.sigma, float(solved.sigma.min()))
         doubted: list[int] = np.flatnonzero(~good).tolist()
         # a motion passes singular poses one by one; where all its samples are nearly singular there is nothing to pass
         tried = doubted if len(doubted) <= BRIDGED else []
         passed = {at for at in tried if self._passed(int(indices[at]), lanes[:, at])}
         refused = [at for at in doubted if at not in passed]
         if refused:
-            self._refuse(indices[refused], state[:, refused], sample[:, refused], solved.error[: self.model.orders, refused])
+            self._refuse(system, indices[refused], state[:, refused], sample[:, refused], solved.error[: self.orders, refused])
 
     def _lost(self, samples: list[int]) -> None:
         """Refuse doubtful samples that are not reached a second time: rounding alone had them accepted."""
@@ -147,29 +174,29 @@ class _Scrutiny:
         """Interpolate samples beside passages that neither side could reach, or refuse them."""
         stuck = [each for each in self.followed.stuck if not self.found.solved[each.sample]]
         for each in stuck[:BRIDGED]:
-            self.found.solved[each.sample] = self._bridged(each.sample, each.before, each.near, passed=True)
+            self.found.solved[each.sample] = self._bridged(each.route, each.sample, each.before, each.near, passed=True)
         for each in stuck:
             k = each.sample
             if not self.found.solved[k]:
-                state, sample = self.system.state(each.near[:, None]), self.route.sampled(self.times[[k]])
-                self._refuse(np.array([k]), state, sample, np.full((1, 1), self.tol**0.5))
+                system, sample = system_of(each.route.model), self.route.sampled(self.times[[k]])
+                self._refuse(system, np.array([k]), system.state(each.near[:, None]), sample, np.full((1, 1), self.tol**0.5))
 
     def _passed(self, k: int, near: Array) -> bool:
         """Put what the motion has on both sides of a sample in its place, where it goes on."""
         time, number = float(self.times[k]), int(self.followed.part_of[k])
         side = 1.0 if time >= self.followed.parts[number].route.start else -1.0
         lane = self.followed.before(time, side, number)
-        return lane is not None and self._bridged(k, lane, near)
+        return lane is not None and self._bridged(self._followed_on(k), k, lane, near)
 
-    def _bridged(self, k: int, lane: Array, near: Array, *, passed: bool = False) -> bool:
-        time = float(self.times[k])
-        found = bridge(self.system, self.route, lane, time, self.tol, None if passed else near)
+    def _bridged(self, route: Route, k: int, lane: Array, near: Array, *, passed: bool = False) -> bool:
+        time, system = float(self.times[k]), system_of(route.model)
+        found = bridge(route, lane, time, self.tol, None if passed else near)
         if found is None:
             return False
-        tests = self.model.rows[TESTS[0]].start
+        tests = self.rows[TESTS[0]].start
         wanted = slice(None if passed else tests)  # a sample that was reached has tests of its own
         self.found.kept[wanted, k] = found.kept[wanted]
-        singularity = examine(self.system, self.system.state(near[:, None]), self.route.sampled(np.array([time])))
+        singularity = examine(system, system.state(near[:, None]), self.route.sampled(np.array([time])))
         self._say("passed", time, singularity, k)
         what = "" if singularity.regular else "a singular pose at "
         self.findings.notes.append(
@@ -178,12 +205,12 @@ class _Scrutiny:
         )
         return True
 
-    def _refuse(self, indices: NDArray[np.intp], state: Array, sample: Array, error: Array) -> None:
+    def _refuse(self, system: System, indices: NDArray[np.intp], state: Array, sample: Array, error: Array) -> None:
         self.found.kept[:, indices], self.found.solved[indices] = np.nan, False
         for at, k in enumerate(indices.tolist()):
-            self._say("refused", float(self.times[k]), examine(self.system, state[:, [at]], sample[:, [at]]), k)
+            self._say("refused", float(self.times[k]), examine(system, state[:, [at]], sample[:, [at]]), k)
         worst = int(error.max(axis=0).argmax())
-        singularity = examine(self.system, state[:, [worst]], sample[:, [worst]])
+        singularity = examine(system, state[:, [worst]], sample[:, [worst]])
         uncertain = f"the pose uncertain by {error[0, worst]:.2g} of the mechanism's size"
         uncertain += f", rates by {error[1:, worst].max():.2g} of their own" if len(error) > 1 else ""
         places = listed([self._where(float(self.times[k])) for k in indices.tolist()])
@@ -205,7 +232,8 @@ class _Scrutiny:
 
     def _crossed(self, passage: Passage) -> None:
         path, time, where = passage.route.path, passage.time, passage.route.path.where
-        singularity = examine(self.system, self.system.state(passage.lane[:, None]), passage.route.sampled(np.array([time])))
+        system = system_of(passage.route.model)
+        singularity = examine(system, system.state(passage.lane[:, None]), passage.route.sampled(np.array([time])))
         if singularity.regular:  # the motion knows nothing of the choice of rows
             return
         self._say("crossed", time, singularity, path=path)
@@ -221,11 +249,12 @@ class _Scrutiny:
 
     def end(self, end: End) -> None:
         """Say what stopped a side: a limit point ahead of its last pose, or what that pose is nearest to."""
-        time, path = float(end.lane[self.model.slots[FROM + TIME]]), end.route.path
-        state = self.system.state(end.lane[:, None])
-        ahead = limit_ahead(self.system, path, state, time, 1 if end.wanted > time else -1, self.tol)
+        model, path = end.route.model, end.route.path
+        system, time = system_of(model), float(end.lane[model.slots[FROM + TIME]])
+        state = system.state(end.lane[:, None])
+        ahead = limit_ahead(system, path, state, time, 1 if end.wanted > time else -1, self.tol)
         if ahead is None:
-            singularity = examine(self.system, state, end.route.sampled(np.array([time])))
+            singularity = examine(system, state, end.route.sampled(np.array([time])))
             regular = f"the pose is regular there, smallest singular value {singularity.sigma:.3g}"
             self.findings.messages.append(
                 f"{end.message}; there, {singularity.words}" if singularity.sigma < REGULAR else f"{end.message}; {regular}"

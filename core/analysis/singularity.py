@@ -152,9 +152,12 @@ DIFFERENCE = EPSILON ** (1.0 / 3.0)
 POLISH = 12
 
 
-def smallest_singular_values(system: System, state: Array, sample: Array) -> Array:
-    """Of the rows at states, shape (m,)."""
-    return np.linalg.svd(_finite(system.equations(state, sample).jacobian), compute_uv=False)[:, -1].astype(np.float64)
+def smallest_singular_values(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
+    """Of the kept rows at states, and of all rows; shape (m,) each."""
+    found = system.equations(state, sample)
+    every = np.concatenate([found.jacobian, found.redundant], axis=1)
+    kept, of_all = (np.linalg.svd(_finite(rows), compute_uv=False)[:, -1].astype(np.float64) for rows in (found.jacobian, every))
+    return kept, of_all
 
 
 def solve_closely(system: System, state: Array, sample: Array) -> Solved:

@@ -11,7 +11,7 @@ import numpy as np
 from ..motions import Path
 from ..program import ITERATIONS
 from ..trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
-from .continuity import doubtful
+from .continuity import LOW, in_question
 from .march import march
 from .model import Model
 from .request import SIGMA
@@ -25,12 +25,12 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 
 def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
-    model, rows, found, message = route.model, route.model.rows, march(route, tol), ""
+    model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
     closure, leftover, sigma = found.worst
     findings: Mapping[str, Any] = {}
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
-    elif found.ends or doubtful(sigma, closure, tol):
+    elif found.ends or in_question(sigma, closure, tol, math.inf if model.selection.dropped else None):
         from .scrutiny import scrutinise  # rarely needed
 
         scrutiny = scrutinise(route, found, tol)

@@ -45,6 +45,11 @@ class Equations:
         return np.nan_to_num(np.abs(self.phi).max(axis=1), nan=np.inf)
 
 
+def system_of(model: Model) -> System:
+    """The equations of a model; kept with it, because to trace them anew takes longer than what they are for."""
+    return model.bound("system", lambda: System(model))
+
+
 class System:
     """The equations of a model whose geometry is given in numbers.
 
@@ -52,6 +57,7 @@ class System:
 
     Attributes:
         owners: joint or driver of every kept row.
+        conditions: see `Formulation`.
         driven: which kept rows are drivers', shape (n,).
         unknowns: n.
     """
@@ -61,6 +67,7 @@ class System:
         tracer, kept = self._tracer, self._tracer.selection.kept
         formulation, at, vector = tracer.formulation, tracer.at, tracer.layout.vector
         self.unknowns = tracer.unknowns
+        self.conditions = formulation.conditions
         self.owners = [formulation.owners[k][0] for k in kept]
         joint_rows = len(formulation.owners) - len(model.mechanism.drivers)
         self.driven: NDArray[np.bool_] = np.array(kept) >= joint_rows

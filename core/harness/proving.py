@@ -34,10 +34,11 @@ GUARD_BITS = 100
 SPARE_DIGITS = 2
 
 NOTE = (
-    "Krawczyk's test in ball arithmetic: the equations `rows` have exactly one solution in the box of radius `alone` around it, "
-    "the native pose is in that box, and all printed numbers are within 10^-digits of those of the solution. The numbers of the "
-    "mechanism and the swept values are taken exactly as `numbers` says, directions and lengths made of them in ball arithmetic. "
-    "Motions of further drivers, directions of outputs and the pi in the lead of a screw are their doubles."
+    "Krawczyk's test in ball arithmetic: the equations `rows`, or all but those that a sample has `left_out`, have exactly one "
+    "solution in the box of radius `alone` around it, the native pose is in that box, and all printed numbers are within "
+    "10^-digits of those of the solution. The numbers of the mechanism and the swept values are taken exactly as `numbers` says, "
+    "directions and lengths made of them in ball arithmetic. Motions of further drivers, directions of outputs and the pi in the "
+    "lead of a screw are their doubles."
 )
 
 Column = Sequence[Ball | None]
@@ -82,7 +83,7 @@ def prove_case(case: Case, *, digits: int, numbers: str, tol: float) -> tuple[Re
                 values[output.name] = _values(case, output, found, numbers)
             except (TypeError, AttributeError) as error:
                 reasons[output.name] = f"computes what balls cannot: {error}"
-        samples = [_sample(each, k, values, digits) for k, each in enumerate(found.samples)]
+        samples = [_sample(each, k, values, digits, found.others.get(k)) for k, each in enumerate(found.samples)]
         outputs = {
             output.name: _series(output, values.get(output.name), reasons.get(output.name), samples, digits)
             for output in case.outputs
@@ -156,7 +157,9 @@ def _jet(*columns: Sequence[Exact]) -> Jet:
     return Jet(x, v, a)
 
 
-def _sample(found: Enclosure | UnprovedError, k: int, values: Mapping[str, Sequence[Column]], digits: int) -> Sample:
+def _sample(
+    found: Enclosure | UnprovedError, k: int, values: Mapping[str, Sequence[Column]], digits: int, others: Sequence[str] | None
+) -> Sample:
     """The proof, unless what it says of an output is not as sharp as was asked for."""
     if isinstance(found, UnprovedError):
         return Sample(proved=False, reason=str(found))
@@ -172,6 +175,7 @@ def _sample(found: Enclosure | UnprovedError, k: int, values: Mapping[str, Seque
         branch=min((float(each.lower()) for each in found.branch), default=None),
         redundant=max((_upper(each) for each in found.left_out), default=None),
         contradicted=sum(not each.contains(0) for each in found.left_out),
+        left_out=None if others is None else list(others),
     )
 
 

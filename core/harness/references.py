@@ -50,6 +50,7 @@ class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         branch: a lower bound of all branch tests; none where the equations have no spurious zero.
         redundant: an upper bound of the rows that are left out, at the solution; none without any.
         contradicted: left-out rows that are proved not to be zero: the geometry, as rounded, closes only without them.
+        left_out: those rows, where they are others than `Reference.redundant`.
     """
 
     proved: bool
@@ -59,6 +60,7 @@ class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     branch: float | None = None
     redundant: float | None = None
     contradicted: int = 0
+    left_out: list[str] | None = None
 
 
 class Reference(msgspec.Struct, frozen=True, kw_only=True):

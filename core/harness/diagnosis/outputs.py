@@ -86,7 +86,7 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
         "otherwise, 10 for accelerations"
     )
     share = float(by_rows[k][row]) / shifts[k] if shifts[k] else 0.0
-    name = "{}: {}".format(*found.owners[row])
+    name = "{}: {}".format(*found.poses[k].owners[row])
     floor = ROUND_OFF * (shifts[k] + size)
     return Budget(output.name, output.unit, shift, floor, found.poses[k].value, name, share, suggested, why, output.atol)
 

@@ -10,10 +10,12 @@ import numpy as np
 
 from ...algebra import Vec3
 from ...analysis.cartesian import Cartesian
+from ...analysis.choice import chosen_at
 from ...analysis.enclosure import enclose
 from ...analysis.equations import constraints, frames
 from ...analysis.exact import as_double, equations, exact_mechanism
 from ...analysis.freedom import select_rows
+from ...analysis.model import standing_drives
 from ...drivers import JointAngle
 from ...program.ball_executor import flint, precision
 from ...trajectory import Array
@@ -37,10 +39,13 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
     path = system.path
     drives = system.sampled(np.array([sample]))[:, :, 0]
     frame = frames(mechanism)
-    kept = select_rows(mechanism, frame, Cartesian(constraints(mechanism, frame, {}), frame.moving)).kept
+    still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    pose = _state(truth, at, [*still.design], frame.unit, frame.origins)
+    change = {name: float(drives[0, system.names.index(name)]) for name in path.motions}
+    there = Cartesian(constraints(mechanism, frame, standing_drives(mechanism, frame.unit, change)), frame.moving)
+    kept = chosen_at(there, pose.tolist(), select_rows(mechanism, frame, still).kept, len(mechanism.drivers))
     with precision(BITS):
         traced = equations(exact_mechanism(mechanism, as_double), tuple(path.motions), points, kept)
-        pose = _state(truth, at, [*traced.state], traced.frame.unit, frame.origins)
         driven = [
             [
                 flint().arb(_exact(x)) / (1.0 if isinstance(mechanism.driver(name), JointAngle) else traced.frame.unit)

@@ -63,7 +63,7 @@ def _kite(rng: Rng, samples: int) -> Specimen:
 
 
 def _bennett(rng: Rng, samples: int) -> Specimen:
-    """Four skew hinges that move because sin(alpha) / a = sin(beta) / b."""
+    """Four skew hinges that move because sin(alpha) / a = sin(beta) / b, all the way round."""
     alpha, beta = float(rng.uniform(0.4, 1.2)), float(rng.uniform(1.3, 2.2))
     a = float(rng.uniform(0.3, 0.6))
     b = a * np.sin(beta) / np.sin(alpha)
@@ -77,7 +77,7 @@ def _bennett(rng: Rng, samples: int) -> Specimen:
         raise ArithmeticError("the Bennett loop does not close")
     mechanism = _ring("bennett", hinges)
     return Specimen(
-        f"bennett, alpha {alpha:.3g}, beta {beta:.3g}", partial(as_case, mechanism, "turn", np.linspace(-0.7, 0.7, samples))
+        f"bennett, alpha {alpha:.3g}, beta {beta:.3g}", partial(as_case, mechanism, "turn", np.linspace(-7.0, 7.0, samples))
     )
 
 
