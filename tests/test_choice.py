@@ -7,7 +7,7 @@ import pytest
 from kincheck import cases
 from kincheck.cases import bennett
 from kincheck.cases.jet import Jet
-from kincheck.core.analysis import choice, followed
+from kincheck.core.analysis import choice, followed, scrutiny
 from kincheck.core.analysis.choice import Choice, chosen
 from kincheck.core.analysis.conditioning import conditioning
 from kincheck.core.analysis.followed import Followed
@@ -144,6 +144,20 @@ def test_a_sample_in_question_only_that_is_not_reached_again_stays(monkeypatch):
     monkeypatch.setattr(followed, "in_question", lambda *a, **k: found.append(question(*a, **k).sum()) or question(*a, **k))
     assert solve(locomotive(np.pi / 2.0), "turn", turn).solved.all()
     assert found[0] == 1
+
+
+def test_what_cannot_be_better_is_asked_once(monkeypatch):
+    """The Bricard linkage comes near its dead centre, which no choice of rows changes."""
+    asked, values = list[int](), scrutiny.smallest_singular_values
+    monkeypatch.setattr(scrutiny, "smallest_singular_values", lambda *given: asked.append(1) or values(*given))
+    case = cases.load("bricard")
+    route = Route(recent_model(case.mechanism, Request(("hinge",), ("P3",))), case.sweep.path)
+    first, second = (follow(route, 1e-12) for _ in range(2))
+    assert len(asked) == 1
+    assert first.details == second.details
+    assert "rows_chosen_anew" not in first.details
+    follow(route, 1e-13)
+    assert len(asked) == 2
 
 
 def test_the_best_rows_known_are_taken_again_where_they_are_good_enough():

@@ -108,6 +108,11 @@ class Route:
         """What is made of it."""
         return Bound()
 
+    @cached_property
+    def settled(self) -> set[float]:
+        """The tolerances at which its samples were found to be as good as any rows make them: that need not be asked again."""
+        return set()
+
     def sampled(self, times: Array) -> Array:
         """What is given at the times, shape (sampled, n)."""
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))

@@ -108,18 +108,19 @@ class _Scrutiny:
     def samples(self) -> None:
         """Follow samples by better rows, solve those in doubt closely, and interpolate or refuse those that remain in doubt."""
         indices, doubtful = np.flatnonzero(self.followed.in_question), self.followed.doubtful
-        if not len(indices):
-            return
-        visited = self.followed.visit(indices.tolist())
+        visited = self.followed.visit(indices.tolist()) if len(indices) else {}
         self._lost([k for k in indices.tolist() if k not in visited and doubtful[k]])
         better: dict[int, Array] = {}
         for model, samples in self._by_model(visited):
             # the estimate says too little of many unknowns: most of their samples are beyond doubt by sigma itself
             system, lanes = system_of(model), self._lanes(visited, samples)
             sigma, of_all = smallest_singular_values(system, system.state(lanes), self.route.sampled(self.times[samples]))
-            self.found.kept[self.rows[SIGMA].start, samples] = sigma
-            wanted = self.followed.in_question[samples] & (of_all > BETTER * sigma)
+            wanted = of_all > BETTER * sigma
             better |= {k: visited[k] for k in samples[wanted].tolist()}
+            judged = wanted | doubtful[samples]
+            self.found.kept[self.rows[SIGMA].start, samples[judged]] = sigma[judged]
+        if not (better or doubtful.any() or self.found.ends):
+            self.route.settled.add(self.tol)
         self.followed.renew(better)
         doubtful = self.followed.doubtful
         for model, samples in self._by_model(k for k in visited if doubtful[k]):

@@ -27,10 +27,11 @@ def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
     model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
     closure, leftover, sigma = found.worst
+    largest = math.inf if model.selection.dropped else None
     findings: Mapping[str, Any] = {}
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
-    elif found.ends or in_question(sigma, closure, tol, math.inf if model.selection.dropped else None):
+    elif found.ends or (tol not in route.settled and in_question(sigma, closure, tol, largest)):
         from .scrutiny import scrutinise  # rarely needed
 
         scrutiny = scrutinise(route, found, tol)
