@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from kincheck.core import Body, ConstantVelocity, JointAngle, Mechanism, Point, Revolute
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
+from kincheck.core.analysis.solve import solve
+from kincheck.core.motions import Ramp
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
 from kincheck.core.primitives.conventional import LockTest
 from kincheck.core.primitives.paper import PaperDot12
@@ -58,12 +61,33 @@ def test_branch_of_dot11(rng):
 
 
 def test_branch_of_constant_velocity():
-    """A turn of 180 degrees about the shaft has no twist either; bent to a right angle the branch is still the intended one."""
+    """A half turn about an axis near the shaft has no twist either; bent to 175 degrees the branch is still the intended one."""
     shafts = p.ConstantVelocity(X, Y, X, Y)
-    for turn, right in ((rotation(Y, 1.5), True), (rotation(Vec3(0.6, 0.8, 0.0), -1.5), True), (rotation(Z, np.pi), False)):
+    bends = [rotation(axis, angle) for axis in (X, Y, Vec3(0.6, 0.8, 0.0)) for angle in (0.0, 1.5, -1.5, 2.2, 3.05)]
+    half_turns = [rotation(axis, np.pi) for axis in (Z, Vec3(0.6, 0.0, 0.8), Vec3(0.0, -0.96, 0.28))]
+    for turn, right in [*((turn, True) for turn in bends), *((turn, False) for turn in half_turns)]:
         over = Pose.of(ZERO, turn)
         assert abs(shafts.phi(GROUND_POSE, over)[0]) < 1e-15
-        assert (shafts.branch(GROUND_POSE, over)[0] > 0.1) == right
+        assert (shafts.branch(GROUND_POSE, over)[0] > 0.0) == right
+
+
+def test_a_shaft_is_bent_up_to_where_it_is_folded():
+    """Two shafts of one speed, the second on a carrier that is turned from straight to 175 degrees: their turns stay the same."""
+    joints = [
+        Revolute("spin", "ground", "first", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("bend", "ground", "carrier", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Revolute("bearing", "carrier", "second", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        ConstantVelocity("cv", "first", "second", (0.0, 0.0, 0.0), ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))),
+    ]
+    bodies = [Body(name) for name in ("first", "carrier", "second")]
+    drivers = [JointAngle("turn", "spin"), JointAngle("fold", "bend")]
+    mechanism = Mechanism("shafts", bodies, joints, [Point("rim", "second", (1.0, 0.0, 0.0))], drivers)
+    fold = np.radians(np.linspace(0.0, 175.0, 36))
+    found = solve(mechanism, "fold", fold, motions={"turn": Ramp(0.7)})
+    assert found.solved.all(), found.message
+    s, c = np.sin(0.7 * fold), np.cos(0.7 * fold)
+    expected = np.column_stack([c, s * np.cos(fold), s * np.sin(fold)])
+    assert np.abs(found.points["rim"].position - expected).max() <= 1e-12
 
 
 def test_of_the_native_primitives_these_need_a_branch_test(rng):

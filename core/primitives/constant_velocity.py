@@ -6,15 +6,15 @@ With f_i, g_i across shaft i and f_j, g_j across shaft j, the twist between the 
     rows, gamma                            the same difference of theirs, exact everywhere
 
 phi is -4 e0 e3 of the relative Euler parameters: besides the zero twist e3 = 0 it is zero where e0 = 0, a relative turn of 180
-degrees. There the trace of the relative rotation is -1; with zero twist it is 1 + 2 cos(bend), positive up to a bend of 120
-degrees, beyond what such a joint can do. The trace is the branch test.
+degrees. The branch test is  f_i . f_j + g_i . g_j = 2 (e0^2 - e3^2):  1 + cos(bend) with zero twist, positive up to where the
+shafts are folded and both zeros meet; not positive on the other. (The trace of the relative rotation is so up to 120 degrees only.)
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import ZERO, Scalar, Vec3, cross
+from ..algebra import ZERO, Scalar, Vec3
 from .base import Motion, Pose, Primitive, Row
 from .dot10 import Dot10
 
@@ -47,6 +47,5 @@ class ConstantVelocity(Primitive):
         return (plus - minus,)
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        pairs = ((self.f_i, self.f_j), (self.g_i, self.g_j), (cross(self.f_i, self.g_i), cross(self.f_j, self.g_j)))
-        f, g, h = (i.turn(a) @ j.turn(b) for a, b in pairs)
-        return (f + g + h,)
+        f, g = (i.turn(a) @ j.turn(b) for a, b in ((self.f_i, self.f_j), (self.g_i, self.g_j)))
+        return (f + g,)

@@ -26,7 +26,7 @@ WALKS, STRIDES = 48, 24
 # Steps at a time, how many times at most, and the progress in all below which they lead nowhere.
 STRIDE, LEGS, PROGRESS = 6, 12, 0.2 * STEP
 # An aim may be out of reach by the straightest way and still on the branch: so many others are tried.
-AIMS = 6
+AIMS = 24
 ARRIVED = STEP
 
 
