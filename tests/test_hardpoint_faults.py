@@ -112,6 +112,7 @@ TABLE_FAULTS = {
         Supplied(WISHBONE, "mm", "rearward,left,up"),
         ["wheel_center", "y = -0.76 m", "expected the left side", "--axes"],
     ),
+    "backwards": ((), Supplied(WISHBONE, "mm", "forward,right,up"), ["uca_front", "uca_rear", "in front of that", "--axes"]),
     "upside down": ((), Supplied(WISHBONE, "mm", "rearward,right,down"), ["uca_outer", "lca_outer", "expected it above"]),
     "travel": ((), Supplied(WISHBONE, "mm", "adams", "5cm"), ["--travel", "'5cm'", "METRES"]),
     "separated travel": ((), Supplied(WISHBONE, "mm", "adams", "0.0_5"), ["--travel", "'0.0_5'", "METRES"]),

@@ -80,13 +80,38 @@ FAULTS = {
     "unknown joint": ((COUPLING, COUPLING.replace("left_driver_", "left_drivr_")), ["joint2", "'left_drivr_joint'"]),
     "joint with itself": ((COUPLING, COUPLING.replace("left", "right")), ["couples the joint 'right_driver_joint' with itself"]),
     "no tendon": ((FIRST, '<tendon tendon1="spilt"/>' + FIRST), ["tendon1", "'spilt'", "'split'"]),
-    "spatial tendon": (("<fixed", '<spatial name="rope"/><fixed'), ["tendon1", "'rope' is a spatial tendon"]),
+    "no turning": (
+        (FIRST, '<weld body1="right_driver" body2="left_driver" torquescale="0"/>' + FIRST),
+        ["torquescale", "<connect>"],
+    ),
+    "misspelt compiler": (('angle="radian"', 'angel="radian"'), ["<compiler>", "'angel'", "did you mean 'angle'?"]),
+    "attribute of the world": (("<worldbody>", '<worldbody childclass="driver">'), ["<worldbody>", "'childclass'"]),
+    "aligned": ((BASE, '<body><freejoint align="true"/></body>' + BASE), ["<freejoint>", "inertia", 'align="false"']),
+    "all aligned": (('angle="radian"', 'angle="radian" alignfree="true"'), ["<freejoint>", "inertia", "alignfree of <compiler>"]),
+    "ground": ((BASE, '<body name="ground"><joint/></body>' + BASE), ["<body> 'ground'", "rename the body"]),
+    "tendon over more": (
+        ("<fixed", '<spatial name="rope"><site site="right_pad"/></spatial><fixed'),
+        ["goes over site", "two sites"],
+    ),
+    "tendon nowhere": (
+        ("<fixed", '<spatial name="rope"><site site="right_pad"/><site site="left_pod"/></spatial><fixed'),
+        ["site: found 'left_pod'", "'left_pad'"],
+    ),
+    "tendon of a body": (
+        ("<fixed", '<spatial name="rope"><site site="right_pad"/><site site="right_pad"/></spatial><fixed'),
+        ["<spatial> 'rope'", "between two points of 'right_follower'"],
+    ),
+    "spatial tendon": (("<fixed", '<spatial name="rope"/><fixed'), ["tendon2", "'rope' is a spatial tendon"]),
     "three in a tendon": (('coef="0.5"/>', 'coef="0.5"/><joint joint="right_coupler_joint" coef="1"/>'), ["couples 3 joints"]),
     "flex": ((FIRST, '<flex flex="cloth"/>' + FIRST), ["<flex>", "no joint for it"]),
     "locked and coupled": ((COUPLING, '<joint joint1="left_driver_joint"/>' + COUPLING), ["'left_driver_joint', which is locked"]),
 }
 ALSO = {
-    "spatial tendon": (FIRST, '<tendon tendon1="rope"/>' + FIRST),
+    "all aligned": (BASE, "<body><freejoint/></body>" + BASE),
+    "tendon over more": (FIRST, '<tendon tendon1="rope"/>' + FIRST),
+    "tendon nowhere": (FIRST, '<tendon tendon1="rope"/>' + FIRST),
+    "tendon of a body": (FIRST, '<tendon tendon1="rope"/>' + FIRST),
+    "spatial tendon": (FIRST, '<tendon tendon1="split" tendon2="rope"/>' + FIRST),
     "three in a tendon": (FIRST, '<tendon tendon1="split"/>' + FIRST),
     "weld turned": (
         '<body name="right_pad" ',

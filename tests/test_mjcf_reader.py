@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.algebra import Quat, vec
+from kincheck.core.algebra import Quat, X, Y, Z, vec
+from kincheck.core.errors import CaseError
 from kincheck.core.harness.case import Truth
 from kincheck.core.harness.cli import main
 from kincheck.core.harness.reading.files import load
@@ -93,6 +94,8 @@ def agree(file):
             assert np.isclose(joint.ref, loaded.qpos0[loaded.joint(name).qposadr[0]], rtol=0, atol=EXACT), name
     for name, (_, place) in tree.sites.items():
         assert np.allclose([*place.at], data.site(name).xpos, rtol=0, atol=EXACT), name
+        for column, axis in enumerate((X, Y, Z)):
+            assert np.allclose([*place.direction(axis)], data.site(name).xmat.reshape(3, 3)[:, column], rtol=0, atol=EXACT), name
     return tree
 
 
@@ -118,13 +121,15 @@ def test_classes_of_joints_and_bodies_without_joints(tmp_path):
     <mujoco>
       <default class="main"><joint axis="0 1 0" pos="0 0 0.1"/>
         <default class="outer"><joint axis="1 0 0" type="slide"/>
-          <default class="inner"><joint pos="0.2 0 0"/></default>
+          <default class="inner"><joint pos="0.2 0 0"/><site euler="0 30 0"/></default>
+          <site quat="1 2 3 4"/>
         </default>
       </default>
       <worldbody>
         <body name="main"><joint name="main"/></body>
         <body name="by_body" childclass="outer"><joint name="by_body"/>
           <body name="part" pos="0 0 1"><site name="tip" pos="0.1 0 0"/>
+            <site name="turned" zaxis="1 2 0"/><site name="inner" class="inner"/>
             <body name="own" pos="0 1 0"><joint name="own" class="inner" type="hinge"/><joint name="again"/>
               <body name="ball" childclass="inner"><joint name="ball" type="ball"/></body>
             </body>
@@ -152,10 +157,12 @@ def linkage(equality, more=""):
             <body name="end" pos="0.8 0 0"><joint name="reach" type="slide" axis="1 0 0"/><site name="tip" pos="0.1 0 0"/></body>
           </body>
         </body>
-        <body name="lever" pos="1.4 0 0.2"><joint name="lever" axis="0 1 0"/><joint name="out" type="slide" axis="0 0 1"/></body>
+        <body name="lever" pos="1.4 0 0.2"><joint name="lever" axis="0 1 0"/><joint name="out" type="slide" axis="0 0 1"/>
+          <site name="side" pos="0 0 0.5"/></body>
         <body name="cross" pos="2 0 0"><joint name="cross_1" axis="1 0 0"/><joint name="cross_2" axis="0 1 0"/></body>
       </worldbody>
       <tendon><fixed name="sum"><joint joint="crank" coef="2"/><joint joint="lever" coef="-0.5"/></fixed>
+        <spatial name="length"><site site="pin"/><site site="side"/></spatial>
         <fixed name="one"><joint joint="lever" coef="3"/></fixed>
         <fixed name="both"><joint joint="reach" coef="3"/><joint joint="out" coef="0.5"/></fixed></tendon>
       <equality>{equality}</equality>{more}
@@ -177,6 +184,8 @@ EQUALITIES = {
     "tendon": ('<tendon tendon1="sum"/>', "lever"),
     "tendon of one": ('<tendon tendon1="one"/>', "lever"),
     "two tendons": ('<tendon tendon1="sum" tendon2="one" polycoef="0 0.5"/>', "lever"),
+    "rod": ('<tendon tendon1="length"/>', "lever"),
+    "locked, whatever the coefficients of nothing": ('<joint joint1="lever" polycoef="0 1 2"/>', "lever"),
     "tendon of slides": ('<tendon tendon1="both"/>', "out"),
 }
 
@@ -215,6 +224,20 @@ def test_sites(tmp_path, kind):
     assert distance < EXACT
 
 
+def test_bodies_made_of_several_joints_are_no_others(tmp_path):
+    """The body between two joints of one body has a name that none of the file has."""
+    text = """
+    <mujoco><worldbody>
+      <body name="arm"><joint name="x" type="slide"/><joint name="y" axis="0 1 0"/></body>
+      <body name="arm.x"><joint name="z" axis="1 0 0"/></body><body name="arm.x'"></body>
+    </worldbody></mujoco>"""
+    tree = agree(model(tmp_path, text))
+    assert list(tree.moving) == ["arm.x''", "arm", "arm.x"]
+    assert tree.joints["z"].inner == "arm.x"
+    with pytest.raises(CaseError, match="the model has 3 degrees of freedom"):
+        load(model(tmp_path, text), Supplied(drive=("y:0:1",), hold=("x",)))
+
+
 def test_inactive_equalities_are_left_out(tmp_path):
     gear = '<joint joint1="lever" joint2="crank" active="false"/>'
     for text in (linkage(gear), linkage(gear.replace("false", "true"), '<option><flag equality="disable"/></option>')):
@@ -240,6 +263,17 @@ def test_a_rod_on_a_ball_and_a_connect_does_not_spin(tmp_path):
     assert case.mechanism.joint("ball").type == "distance"
     assert "body 'rod' and its turn about itself" in case.source
     residual, distance = mujoco_errors(mujoco, file, case, range(6))
+    assert residual < EXACT
+    assert distance < EXACT
+
+
+def test_what_was_exported_is_read(tmp_path):
+    """The strut: its tie rod is a tendon between two sites there, and a distance again here."""
+    file = tmp_path / "strut.xml"
+    assert main(["export", "mcpherson_strut", "--to", "mjcf", "--out", str(file)]) == 0
+    case = load(file, Supplied(drive=("lca_pivot:-0.1:0.1:3",)))
+    assert [joint.type for joint in case.mechanism.joints].count("distance") == 1
+    residual, distance = mujoco_errors(mujoco, file, case, range(3))
     assert residual < EXACT
     assert distance < EXACT
 

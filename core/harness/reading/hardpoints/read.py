@@ -127,6 +127,15 @@ def _require_left_and_upright(
             named[WHEEL],
             f"is at y = {at[WHEEL][1]:.6g} m, left being positive, expected the left side; {advice}, or give the left points",
         )
+    for rear in (role for role in at if role.endswith("_rear")):
+        front = f"{rear.removesuffix('_rear')}_front"
+        if front in at and at[front][0] <= at[rear][0]:
+            raise fault(
+                table.file,
+                named[front],
+                f"is at x = {at[front][0]:.6g} m, forward being positive, and {named[rear]} at {at[rear][0]:.6g} m, expected it in "
+                f"front of that; {advice}",
+            )
     high, low = (at[role][2] for role in (template.upper, template.lower))
     if high <= low:
         raise fault(

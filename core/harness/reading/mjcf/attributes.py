@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-_ORIENTATION = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
-_FRAME = ("name", "childclass", "pos", *_ORIENTATION)
+ORIENTATION = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
+_FRAME = ("name", "childclass", "pos", *ORIENTATION)
 _SOFT = ("solref", "solimp", "class", "active", "name")
 _FORCES = ("springdamper", "springyield", "stiffness", "springref", "armature", "damping", "frictionloss")
 _LIMITS = ("range", "limited", "actuatorfrcrange", "actuatorfrclimited", "actuatorgravcomp", "margin", "solreflimit", "solimplimit")
 _JOINT = ("type", "group", "pos", "axis", "ref", "user", "solreffriction", "solimpfriction", *_FORCES, *_LIMITS)
 
+_COMPILER = (
+    *("alignfree", "angle", "assetdir", "autolimits", "balanceinertia", "boundinertia", "boundmass", "conflict", "coordinate"),
+    *("discardvisual", "eulerseq", "fitaabb", "fusestatic", "inertiafromgeom", "inertiagrouprange", "meshdir", "passthrough"),
+    *("savecanonical", "savecompiled", "saveinertial", "settotalmass", "strippath", "texturedir", "usethread"),
+)
+
 KNOWN = {
+    "compiler": _COMPILER,
+    "worldbody": (),
     "body": (*_FRAME, "mocap", "gravcomp", "user", "sleep", "fuse", "simple"),
     "frame": _FRAME,
     "joint": ("name", "class", *_JOINT),
     "freejoint": ("name", "group", "align"),
-    "site": ("name", "class", "type", "group", "pos", *_ORIENTATION, "material", "mesh", "size", "fromto", "rgba", "user"),
+    "site": ("name", "class", "type", "group", "pos", *ORIENTATION, "material", "mesh", "size", "fromto", "rgba", "user"),
     "connect": (*_SOFT, "body1", "body2", "anchor", "site1", "site2"),
     "weld": (*_SOFT, "body1", "body2", "relpose", "anchor", "torquescale", "site1", "site2"),
     "equality joint": (*_SOFT, "joint1", "joint2", "polycoef"),

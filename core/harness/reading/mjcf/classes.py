@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from ..document import remedy, shown
-from .attributes import KNOWN
+from .attributes import KNOWN, ORIENTATION
 from .elements import Element
 
 MAIN = "main"
@@ -25,7 +25,13 @@ class Classes:
         name = element.attributes.get("class", childclass)
         if name not in self.attributes:
             raise element.fault(f"class: found {shown(name)}, expected a default class; {remedy(name, self.attributes)}")
-        return replace(element, attributes={**self.attributes[name].get(kind, {}), **element.attributes})
+        return replace(element, attributes=_over(self.attributes[name].get(kind, {}), element.attributes))
+
+
+def _over(inherited: Mapping[str, str], own: Mapping[str, str]) -> dict[str, str]:
+    """Attributes, the own ones first; an orientation takes the place of another, however either is written."""
+    turned = any(key in own for key in ORIENTATION)
+    return {**{key: value for key, value in inherited.items() if not (turned and key in ORIENTATION)}, **own}
 
 
 def read_classes(root: Element) -> Classes:
@@ -41,7 +47,7 @@ def read_classes(root: Element) -> Classes:
         for child in element.children:
             if child.tag in READ:
                 child.require_known(KNOWN[READ[child.tag]])
-                own.setdefault(child.tag, {}).update(child.attributes)
+                own[child.tag] = _over(own.get(child.tag, {}), child.attributes)
         found[name] = own
         for child in element.only("default"):
             below = child.attributes.get("class", "")

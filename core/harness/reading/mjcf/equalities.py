@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from ....algebra import Quat, Vec3, vec
 from ..document import remedy, shown
@@ -40,7 +41,21 @@ class Relation:
     element: Element
 
 
-def read_equalities(root: Element, tree: Tree) -> Iterator[Connect | Relation]:
+@dataclass(frozen=True)
+class Rod:
+    """Two points that keep their distance at qpos0, global there, each on a body of the mechanism."""
+
+    name: str
+    i: str
+    j: str
+    points: tuple[Vec3, Vec3]
+    element: Element
+
+
+Equality: TypeAlias = Connect | Relation | Rod
+
+
+def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
     """The active equalities, in order.
 
     Raises:
@@ -80,6 +95,9 @@ def _connect(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
 
 
 def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
+    (scale,) = element.numbers("torquescale", (1,), (1.0,))
+    if scale == 0.0:
+        raise element.fault("torquescale: found 0, which leaves all turning free, expected more; write it as <connect>")
     if "site1" in element.attributes:
         (i, here), (j, there) = _sites(element, tree)
         wanted = Place()
@@ -101,17 +119,21 @@ def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
 
 
 def _joint(name: str, element: Element, tree: Tree, _: _Tendons) -> Relation:
-    slope = _slope(element)
     first = _axial(element, "joint1", element.attributes.get("joint1"), tree)
-    if "joint2" not in element.attributes:
+    if "joint2" not in element.attributes:  # there is nothing that higher coefficients could be of
+        _require_closed(element, abs(_coefficients(element)[0]), "rad or m off")
         return Relation(name, {first: 1.0}, element)
+    slope = _slope(element)
     second = _axial(element, "joint2", element.attributes["joint2"], tree)
     if first == second:
         raise element.fault(f"couples the joint {first!r} with itself, expected two; correct joint2")
     return Relation(name, _nonzero({first: 1.0, second: -slope}), element)
 
 
-def _tendon(name: str, element: Element, tree: Tree, tendons: _Tendons) -> Relation:
+def _tendon(name: str, element: Element, tree: Tree, tendons: _Tendons) -> Relation | Rod:
+    single = tendons.get(element.attributes.get("tendon1", ""))
+    if single is not None and single.tag == "spatial" and "tendon2" not in element.attributes:
+        return _rod(name, element, single, tree)
     slope = _slope(element)
     weights: dict[str, float] = {}
     for key, factor in (("tendon1", 1.0), ("tendon2", -slope)):
@@ -123,12 +145,32 @@ def _tendon(name: str, element: Element, tree: Tree, tendons: _Tendons) -> Relat
         found = tendons[tendon]
         if found.tag != "fixed":
             problem = f"{key}: {tendon!r} is a spatial tendon, whose length is not linear in joint coordinates"
-            raise element.fault(f"{problem}, expected a fixed one; kincheck has no joint for it: remove the equality")
+            raise element.fault(f"{problem}, expected a fixed one; only alone, and between two sites, is there a joint for it")
         for wrap in found.only("joint"):
             joint = _axial(wrap, "joint", wrap.attributes.get("joint"), tree)
             (coefficient,) = wrap.numbers("coef", (1,))
             weights[joint] = weights.get(joint, 0.0) + factor * coefficient
     return Relation(name, _nonzero(weights), element)
+
+
+def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
+    """A spatial tendon of constant length."""
+    if [child.tag for child in tendon.children] != ["site", "site"]:
+        way = ", ".join(child.tag for child in tendon.children) or "nothing"
+        raise element.fault(f"tendon1: {tendon} goes over {way}, expected two sites; there is no joint for others")
+    _require_closed(element, abs(_coefficients(element)[0]), "m off")
+    ends: list[tuple[str, Place]] = []
+    for child in tendon.children:
+        site = child.attributes.get("site", "")
+        if site not in tree.sites:
+            raise child.fault(f"site: found {shown(site)}, expected a site; {remedy(site, tree.sites)}")
+        ends.append(tree.sites[site])
+    (i, here), (j, there) = ends
+    apart = there.at - here.at
+    if i == j or not apart @ apart > 0.0:
+        what = f"is between two points of {i!r}" if i == j else "has no length in the pose of the file"
+        raise element.fault(f"tendon1: {tendon} {what}, expected two points of two bodies; remove the equality, or write <connect>")
+    return Rod(name, i, j, (here.at, there.at), element)
 
 
 _READERS = {"connect": _connect, "weld": _weld, "joint": _joint, "tendon": _tendon}
@@ -144,7 +186,7 @@ def _nonzero(weights: Mapping[str, float]) -> dict[str, float]:
 
 def _slope(element: Element) -> float:
     """The factor of a polynomial that is linear and goes through the pose of the file."""
-    constant, slope, *higher = (*element.numbers("polycoef", (1, 2, 3, 4, 5), (0.0, 1.0)), 0.0, 0.0)[:5]
+    constant, slope, *higher = (*_coefficients(element), 0.0, 0.0)[:5]
     if len(element.attributes.get("polycoef", "0 1").split()) == 1:
         slope = 1.0  # what is left out of polycoef keeps its default
     if any(higher):
@@ -153,6 +195,10 @@ def _slope(element: Element) -> float:
         )
     _require_closed(element, abs(constant), "rad or m off")
     return slope
+
+
+def _coefficients(element: Element) -> tuple[float, ...]:
+    return element.numbers("polycoef", (1, 2, 3, 4, 5), (0.0, 1.0))
 
 
 def _axial(element: Element, key: str, name: str | None, tree: Tree) -> str:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, rotation_less_identity, vec
 from ....mechanism import Vector
 from ..document import shown
+from .attributes import KNOWN, ORIENTATION
 from .elements import Element
 
 _AXES = {"x": X, "y": Y, "z": Z}
-_GIVEN_BY = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,12 @@ class Compiler:
     Attributes:
         degrees: angles are in degrees, as they are unless the model says otherwise.
         sequence: three letters, the axes of Euler angles: small ones turn with the body, capital ones stand still.
+        align: the frames of free bodies are moved to their inertia, unless a joint says otherwise.
     """
 
     degrees: bool = True
     sequence: str = "xyz"
+    align: bool = False
 
     def angle(self, value: float) -> float:
         """An angle of the file [rad]."""
@@ -40,12 +42,14 @@ def read_compiler(root: Element) -> Compiler:
     """
     found = Compiler()
     for element in root.only("compiler"):
+        element.require_known(KNOWN["compiler"])
         degrees = element.choice("angle", ("degree", "radian"), "degree" if found.degrees else "radian") == "degree"
         sequence = element.attributes.get("eulerseq", found.sequence)
         if len(sequence) != 3 or not all(letter.lower() in _AXES for letter in sequence):
             raise element.fault(f"eulerseq: found {shown(sequence)}, expected three of x, y, z, X, Y, Z; correct it")
         element.choice("coordinate", ("local",), "local")
-        found = Compiler(degrees, sequence)
+        align = element.choice("alignfree", ("true", "false"), "true" if found.align else "false") == "true"
+        found = Compiler(degrees, sequence, align)
     return found
 
 
@@ -95,7 +99,7 @@ def read_place(element: Element, compiler: Compiler) -> Place:
         CaseError: several orientations, or one that is none: zero or parallel axes, a zero quaternion.
     """
     at = vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0)))
-    given = [name for name in _GIVEN_BY if name in element.attributes]
+    given = [name for name in ORIENTATION if name in element.attributes]
     if len(given) > 1:
         raise element.fault(f"found {' and '.join(given)}, expected one orientation; remove the others")
     return Place(at, _orientation(element, given[0], compiler) if given else IDENTITY)

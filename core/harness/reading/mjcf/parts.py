@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from ....joints import Coupler, Distance, Fixed, Gear, Joint, RackPinion, Revolute, Spherical, Translational
 from ....mechanism import GROUND
 from .driving import Driving
-from .equalities import Connect, Relation
+from .equalities import Connect, Equality, Relation, Rod
 from .frames import Place, coordinates
 from .tree import ModelJoint, Tree
 
@@ -30,13 +30,13 @@ class Parts:
     left_out: list[str] = field(default_factory=list[str])
 
     def name(self, wanted: str) -> str:
-        """A name for a joint that none has yet: equalities and joints of a model may share names."""
-        while wanted in self.joints or wanted in self.couplers:
+        """A name that nothing has yet: equalities, joints and bodies of a model may share names."""
+        while wanted in self.joints or wanted in self.couplers or wanted in self.bodies:
             wanted += "'"
         return wanted
 
 
-def parts_of(tree: Tree, equalities: Sequence[Connect | Relation], driving: Driving) -> Parts:
+def parts_of(tree: Tree, equalities: Sequence[Equality], driving: Driving) -> Parts:
     """The parts of a model.
 
     Raises:
@@ -57,6 +57,9 @@ def parts_of(tree: Tree, equalities: Sequence[Connect | Relation], driving: Driv
     for each in equalities:
         if isinstance(each, Relation):
             _couple(tree, parts, each)
+        elif isinstance(each, Rod):
+            name = parts.name(each.name)
+            parts.joints[name] = Distance(name, each.i, each.j, (coordinates(each.points[0]), coordinates(each.points[1])))
         elif id(each) not in replaced:
             name = parts.name(each.name)
             kind = Fixed if each.weld else Spherical
@@ -75,7 +78,7 @@ def _joint(joint: ModelJoint) -> Joint:
             return Spherical(*ends, point)
 
 
-def _rods(tree: Tree, equalities: Sequence[Connect | Relation], driving: Driving) -> Mapping[str, tuple[ModelJoint, Connect]]:
+def _rods(tree: Tree, equalities: Sequence[Equality], driving: Driving) -> Mapping[str, tuple[ModelJoint, Connect]]:
     """Bodies between a ball joint and one connect, by the joint's name: they can turn about themselves, which nothing drives."""
     connects: dict[str, list[Connect]] = {}
     for each in equalities:

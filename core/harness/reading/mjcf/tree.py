@@ -51,6 +51,7 @@ class Tree:
         massless: the names of those.
         free: by name, of the joint or of its body, bodies that no joint holds.
         sites: by name, the body of the mechanism they are on, and their global places.
+        names: of all bodies of the file that have one.
         left_out: how many there are of what has no meaning for kinematics, by what it is called.
     """
 
@@ -64,6 +65,7 @@ class Tree:
     free: dict[str, str] = field(default_factory=dict[str, str])
     sites: dict[str, tuple[str, Place]] = field(default_factory=dict[str, tuple[str, Place]])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
+    names: set[str] = field(default_factory=set[str])
 
     def read(self, around: Element, place: Place, body: str, childclass: str) -> None:
         """What is in a body, or in a frame of it; `place` is that of the body or frame, `body` one of the mechanism.
@@ -94,7 +96,9 @@ class Tree:
 
     def _body(self, element: Element, around: Place, outer: str, childclass: str) -> None:
         element.require_known(KNOWN["body"])
-        name = element.attributes.get("name", f"body{len(self.places)}")
+        name = element.attributes.get("name", self._unused(f"body{len(self.places)}"))
+        if name == GROUND:
+            raise element.fault(f"name: found {shown(name)}, which is what does not move in a mechanism; rename the body")
         if name in self.places:
             raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the bodies")
         place = around.then(read_place(element, self.compiler))
@@ -124,7 +128,7 @@ class Tree:
             name = element.attributes.get("name", body if len(elements) == 1 else f"{body}.{k + 1}")
             if name in self.joints or (kind == "free" and name in self.free):
                 raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the joints")
-            inner = body if last else f"{body}.{name}"
+            inner = body if last else self._unused(f"{body}.{name}")
             self.moving[inner] = place
             if not last:
                 self.massless.add(inner)
@@ -138,9 +142,22 @@ class Tree:
                 self.joints[name] = self._joint(name, kind, element, place, outer, inner)
             outer = inner
 
+    def _unused(self, wanted: str) -> str:
+        """A name for a body that the file does not name: none of its own names."""
+        while wanted in self.names:
+            wanted += "'"
+        return wanted
+
     def _kind(self, element: Element) -> str:
         element.require_known(KNOWN[element.tag])
-        return "free" if element.tag == "freejoint" else element.choice("type", ("hinge", "slide", "ball", "free"), "hinge")
+        kind = "free" if element.tag == "freejoint" else element.choice("type", ("hinge", "slide", "ball", "free"), "hinge")
+        align = element.choice("align", ("true", "false", "auto"), "auto")
+        if kind == "free" and (align == "true" or (align == "auto" and self.compiler.align)):
+            raise element.fault(
+                "its body's frame is moved to its inertia (align, or alignfree of <compiler>), where anchors and relpose mean "
+                'something else, expected the frame of the file; set align="false" and give them in that'
+            )
+        return kind
 
     def _joint(self, name: str, kind: str, element: Element, place: Place, outer: str, inner: str) -> ModelJoint:
         for attribute, what in DYNAMIC.items():
@@ -172,5 +189,7 @@ def read_tree(root: Element, classes: Classes, compiler: Compiler) -> Tree:
     """The tree of a model."""
     tree = Tree(classes, compiler)
     for world in root.only("worldbody"):
+        world.require_known(KNOWN["worldbody"])
+        tree.names |= {each.attributes["name"] for each in world.below() if each.tag == "body" and "name" in each.attributes}
         tree.read(world, HERE, GROUND, MAIN)
     return tree
