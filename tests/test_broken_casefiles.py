@@ -52,6 +52,10 @@ BROKEN = {
     "underflowing axis": (("axis = [1.0, 0.0, 0.0]", "axis = [1e-200, 0, 0]"), ["joints.guide.axis[0]", "1e-200"]),
     "huge integer": (("steps = 3", f"steps = 0x1{'0' * 5000}"), ["sweep.steps", "huge integer"]),
     "no driver": (('[drivers.push]\ntype = "joint_displacement"\njoint = "guide"', "[drivers]"), ["drivers", "no driver"]),
+    "driven twice": (
+        ("[drivers.push]", '[drivers.pull]\ntype = "joint_displacement"\njoint = "guide"\n[drivers.push]'),
+        ["drivers.push.joint", "'guide'", "translation 'pull' drives already", "remove one"],
+    ),
     "driver of nothing": (('driver = "push"', 'driver = "pull"'), ["sweep.driver", "'pull'", "push"]),
     "driven joint": (
         ('joint = "guide"', 'joint = "guid"'),

@@ -30,7 +30,13 @@ def read_drivers(file: Path, tables: Mapping[str, Any]) -> list[Driver]:
         raise fault(file, "drivers", "found no driver, expected at least one that moves; add [drivers.NAME]")
     if TIME in tables:
         raise fault(file, join("drivers", TIME), f"found the name {TIME!r}, which [sweep] has for time itself; rename the driver")
-    return [_driver(file, join("drivers", name), name, value) for name, value in tables.items()]
+    found = [_driver(file, join("drivers", name), name, value) for name, value in tables.items()]
+    driven: dict[tuple[str, str], str] = {}
+    for each in found:
+        if isinstance(each, JointDriver) and (other := driven.setdefault((each.joint, each.freedom), each.name)) != each.name:
+            problem = f"found {shown(each.joint)}, whose {each.freedom} {other!r} drives already, expected another joint"
+            raise fault(file, join(join("drivers", each.name), "joint"), f"{problem}; remove one of the drivers")
+    return found
 
 
 def _driver(file: Path, key: str, name: str, value: object) -> Driver:

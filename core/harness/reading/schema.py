@@ -26,7 +26,8 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
                          type = "sine": amplitude, frequency [Hz], (phase) = 0: amplitude sin(2 pi frequency t + phase)
                          type = "table": times [s], values: the natural cubic spline through them, which must cover the sweep
     [sweep]              (driver), start, stop, steps: samples with both ends; (rate) = 1, in driver units per second
-                         driver: it goes from start to stop at the rate; time is zero where it has its design value
+                         driver: its samples from start to stop; it moves at the rate, whose sign says which way, and has its design
+                         value at time zero
                          no driver, or "time": start and stop are times [s], there is no rate, and the motions move everything
                          both are solved from the design position outwards, or from the first sample, to which all drivers go
                          straight where their motions do not pass through the design at time zero
