@@ -8,6 +8,7 @@ from kincheck.core.algebra import Quat, X, Y, Z, vec
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.case import Truth
 from kincheck.core.harness.cli import main
+from kincheck.core.harness.commands.export import keep_texts
 from kincheck.core.harness.reading.files import load
 from kincheck.core.harness.reading.mjcf.classes import read_classes
 from kincheck.core.harness.reading.mjcf.elements import parse_xml
@@ -276,6 +277,13 @@ def test_what_was_exported_is_read(tmp_path):
     residual, distance = mujoco_errors(mujoco, file, case, range(3))
     assert residual < EXACT
     assert distance < EXACT
+
+
+def test_a_name_that_is_a_path_is_no_place_to_write_to(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    keep_texts({".xml": "<mujoco/>"}, "../../out of/here", None)
+    assert [file.name for file in (tmp_path / "here").iterdir()] == [".._.._out of_here.xml"]
 
 
 def test_every_engine_reads_the_gripper_from_the_command_line(capsys):

@@ -1,8 +1,11 @@
 """The pytest plugin, in a repository of somebody else: pytest is run there, in a process of its own."""
 
+import json
 import re
 import subprocess
 import sys
+import tomllib
+from codecs import BOM_UTF8
 
 import kincheck.core
 import pytest
@@ -126,3 +129,14 @@ def test_every_public_name_is_found_though_none_is_loaded_at_first():
     assert [name for name in kincheck.core.__all__ if not hasattr(kincheck.core, name)] == []
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         kincheck.core.nothing  # noqa: B018
+
+
+def test_case_files_are_found_however_they_are_written(repository):
+    """The schema anywhere in a line of JSON, behind a byte order mark, or in a file with capital letters."""
+    case = tomllib.loads(BASE + INLINE)
+    (repository / "sorted.json").write_text(json.dumps(dict(sorted(case.items()))))
+    (repository / "marked.toml").write_bytes(BOM_UTF8 + (BASE + INLINE).encode())
+    (repository / "LOUD.TOML").write_text(BASE + INLINE)
+    out, _ = pytest_there(repository, "--kincheck", "--collect-only", "-q")
+    assert all(name in out for name in ("sorted.json", "marked.toml", "LOUD.TOML", "slider.toml"))
+    assert not any(name in out for name in ("data.json", "pyproject.toml"))

@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from .engine import Engine
     from .record import Record
 
-SCHEMA = re.compile(rb"""^[\s{]*["']?schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
-"""The line that makes a TOML or JSON file a case file, of whatever version: an unknown one is to be told, not passed by."""
+SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
+"""What makes a TOML or JSON file a case file, of whatever version: an unknown one is to be told, not passed by."""
+SUFFIXES = ".toml", ".json"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -55,7 +56,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Take what is a case file."""
-    if parent.config.getoption("--kincheck") and file_path.suffix in (".toml", ".json") and SCHEMA.search(file_path.read_bytes()):
+    if (
+        parent.config.getoption("--kincheck")
+        and file_path.suffix.lower() in (".toml", ".json")
+        and SCHEMA.search(file_path.read_bytes())
+    ):
         return CaseFile.from_parent(parent, path=file_path)  # pyright: ignore[reportUnknownMemberType]
     return None
 

@@ -10,6 +10,7 @@ from ...errors import KincheckError
 from . import foreign
 from .export import keep_texts
 from .house import House, Status, unknown
+from .run import whole
 
 if TYPE_CHECKING:
     from ..assemblies import Survey
@@ -31,7 +32,7 @@ def add(commands: Any) -> None:
         help="of the swept driver as the sweep has it, in SI units; default: the design position",
     )
     listing.add_argument("--samples", type=_count, default=200, metavar="N", help="random starts; default %(default)s")
-    listing.add_argument("--seed", type=int, default=0, metavar="N", help="of the random starts; default %(default)s")
+    listing.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random starts; default %(default)s")
     listing.add_argument("--json", metavar="FILE", help="write the assemblies with all poses as JSON; - for standard output")
     listing.add_argument("--export", metavar="FORMAT", help="write the mechanism, started in one of them: mjcf, exudyn or urdf")
     listing.add_argument("--number", type=int, default=1, metavar="K", help="which one to export; default 1, the first of the list")

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from .house import House, Status
+from .run import whole
 
 
 def add(commands: Any) -> None:
@@ -15,7 +16,7 @@ def add(commands: Any) -> None:
     checking = commands.add_parser("check-joint", help="check a joint type of your own", description=_check_joint.__doc__)
     checking.set_defaults(do=_check_joint)
     checking.add_argument("joint", metavar="MODULE:CLASS", help="the class, in a module of this folder or an installed one")
-    checking.add_argument("--seed", type=int, default=0, metavar="N", help="of the random poses; default %(default)s")
+    checking.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random poses; default %(default)s")
 
 
 def _check_joint(options: argparse.Namespace, house: House) -> int:

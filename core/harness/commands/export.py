@@ -52,7 +52,8 @@ def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, *, quiet: 
         KincheckError: a file cannot be written, or without `out` would be written over.
     """
     first = next(iter(texts))
-    main: Path = out or Path(name + first)
+    # a name may be anything, also a path
+    main: Path = out or Path("".join(each if each.isalnum() or each in "-_. ()'" else "_" for each in name) + first)
     files = {main if ending == first else main.with_suffix(ending): text for ending, text in texts.items()}
     for file in files:
         if out is None and file.exists():

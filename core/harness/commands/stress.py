@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from .house import House, Status, unknown
-from .run import MODES, TOL, positive
+from .run import MODES, TOL, positive, whole
 
 if TYPE_CHECKING:
     from ..engine import Engine
@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
     stress.add_argument("--family", nargs="+", action="extend", default=[], metavar="NAME", help="default: all families")
     stress.add_argument("--list", action="store_true", help="list the families")
     stress.add_argument("--samples", type=_count, default=SAMPLES, metavar="N", help="over all families; default %(default)s")
-    stress.add_argument("--seed", type=int, default=0, metavar="S", help="of the random mechanisms; default %(default)s")
+    stress.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the random mechanisms; default %(default)s")
     stress.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native")
     stress.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
     stress.add_argument(

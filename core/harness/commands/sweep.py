@@ -15,7 +15,7 @@ from ...errors import KincheckError
 from ..console import complain
 from . import foreign
 from .house import House, Status, unknown
-from .run import TOL, positive
+from .run import TOL, positive, whole
 
 if TYPE_CHECKING:
     from ..attempt import Solver
@@ -38,14 +38,14 @@ def add(commands: Any) -> None:
     sweep.set_defaults(do=_sweep)
     sweep.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
     sweep.add_argument("--vary", type=Path, required=True, metavar="FILE", help="what varies, and by how much (kincheck-vary/1)")
-    sweep.add_argument("--samples", type=_whole(1), metavar="N", help="variants that are drawn")
-    sweep.add_argument("--seed", type=_whole(0), default=0, metavar="S", help="of the draws; default %(default)s")
+    sweep.add_argument("--samples", type=whole(1), metavar="N", help="variants that are drawn")
+    sweep.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the draws; default %(default)s")
     sweep.add_argument("--output", nargs="+", action="extend", default=[], metavar="NAME", help="only these outputs; default: all")
     sweep.add_argument(
         "--order", type=int, choices=(0, 1, 2), default=0, help="derivatives of the outputs by time too; default %(default)s"
     )
     sweep.add_argument("--tol", type=positive, default=TOL, metavar="X", help=f"largest constraint residual; default {TOL:g}")
-    sweep.add_argument("--jobs", type=_whole(1), metavar="N", help="threads; default: half the processors")
+    sweep.add_argument("--jobs", type=whole(1), metavar="N", help="threads; default: half the processors")
     sweep.add_argument("--scheduler", metavar="ADDRESS", help="solve on the workers of this dask.distributed scheduler instead")
     sweep.add_argument(
         "--check",
@@ -54,7 +54,7 @@ def add(commands: Any) -> None:
     )
     sweep.add_argument(
         "--replay",
-        type=_whole(0),
+        type=whole(0),
         nargs="+",
         metavar="INDEX",
         help="solve only these variants of the seed, each as a case of its own, as kincheck run does; with --check its engine too",
@@ -63,19 +63,6 @@ def add(commands: Any) -> None:
     sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
     sweep.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
     foreign.add_options(sweep)
-
-
-def _whole(least: int) -> Any:
-    def read(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            number = least - 1
-        if number < least:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of {least} or more; give one")
-        return number
-
-    return read
 
 
 def _sweep(options: argparse.Namespace, house: House) -> int:
@@ -92,7 +79,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     names = ("results.json", "report.html") if options.replay else FILES
     delivery.check_destinations(problems, out=options.out, json=options.json, names=names)
     if options.store is not None:
-        delivery.check_destinations(problems, out=None, json=None, markdown=options.store)
+        delivery.check_destinations(problems, out=None, json=None, store=options.store)
     if options.scheduler is not None and options.jobs is not None:
         problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
     if options.replay and options.samples is not None:

@@ -7,10 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..history.series import Entry, History, Pair, calibration, own_seconds
-from ..record import Outcome, Record
+from ..reading.tolerance import DEFAULT_ATOL
+from ..record import Outcome, OutputSeries, Record
 from ..reporting.wording import MOTIONS, motion_unit, number
 from .findings import Change, Finding, Kind
-from .limits import DRIFT, ENOUGH, TIME_FLOOR, drifted
+from .limits import DRIFT, ENOUGH, TIME_FLOOR, UNJUDGED, drifted
 from .subject import Subject
 
 CIRCUMSTANCES = ("kincheck", "python", "numpy", "tol", "host", "processor", "platform")
@@ -33,6 +34,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             continue
         findings += _outcomes(record, old)
         findings += _lost(record, old)
+        findings += _moved(record, old)
         findings += _errors(record, old)
         entries = history.pairs.get(pair, ())
         findings += _slower(
@@ -82,8 +84,9 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
         why = f": {_said(now)}" if now.outcome is not Outcome.PASS else ""
         yield _finding(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
         return
-    if (now.solved or 0) < (before.solved or 0) and now.samples == before.samples:
-        yield _finding(Kind.LOST, now, f"{now.solved} of {now.samples} samples solved, {before.solved} before")
+    if (now.solved or 0) < (before.solved or 0):
+        asked = "" if now.samples == before.samples else f" of {before.samples}"
+        yield _finding(Kind.LOST, now, f"{now.solved} of {now.samples} samples solved, {before.solved}{asked} before")
     for output, old in before.errors.items():
         new = now.errors.get(output)
         gone = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
@@ -96,6 +99,41 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
             now,
             f"no longer validated: judged against {now.truth.replace('_', ' ')}, before {before.truth.replace('_', ' ')}",
         )
+
+
+def _moved(now: Record, before: Record) -> Iterator[Finding]:
+    """Outputs whose values are others than they were, or samples: where there is no reference nothing else would show it."""
+    if not (now.driver and before.driver):
+        return
+    if now.driver != before.driver:
+        yield _finding(Kind.MOVED, now, "solved at other values of the drivers than before")
+        return
+    for output, old in before.outputs.items():
+        for motion in MOTIONS:
+            off = _apart(_values(old, motion), _values(now.outputs.get(output), motion))
+            judged = getattr(now.errors.get(output), motion, None)
+            # as far as two values can be that are within a tolerance of one standard
+            limit = 2.0 * judged.tolerance if judged else DEFAULT_ATOL + UNJUDGED * _largest(before, motion)
+            if off > limit:
+                unit = motion_unit(old.unit, motion)
+                told = f"{output} {motion} differs by up to {number(off)} {unit} from what it was"
+                yield _finding(Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion)
+                break
+
+
+def _values(series: OutputSeries | None, motion: str) -> Sequence[float | None]:
+    return getattr(series, motion, None) or ()
+
+
+def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
+    """The largest difference, over the samples that both have."""
+    return max((abs(x - y) for x, y in zip(a, b, strict=False) if x is not None and y is not None), default=0.0)
+
+
+def _largest(record: Record, motion: str) -> float:
+    """The largest value of any output."""
+    values = (x for output in record.outputs.values() for x in _values(output, motion))
+    return max((abs(x) for x in values if x is not None), default=0.0)
 
 
 def _reached(record: Record, phase: str) -> bool:

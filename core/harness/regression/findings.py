@@ -10,10 +10,11 @@ import msgspec
 
 
 class Kind(StrEnum):
-    """What a finding says. The first four are regressions."""
+    """What a finding says. The first five are regressions."""
 
     FAILURE = "new failure"
     LOST = "lost"
+    MOVED = "another motion"
     DRIFTED = "accuracy drifted"
     SLOWER = "slower"
     FIXED = "fixed"
@@ -24,12 +25,13 @@ class Kind(StrEnum):
     @property
     def regression(self) -> bool:
         """Whether something is worse than it was."""
-        return self in (Kind.FAILURE, Kind.LOST, Kind.DRIFTED, Kind.SLOWER)
+        return self in (Kind.FAILURE, Kind.LOST, Kind.MOVED, Kind.DRIFTED, Kind.SLOWER)
 
 
 WHY: Mapping[Kind, str] = {
     Kind.FAILURE: "these results were right, or at least not wrong, and are not to be relied on now",
     Kind.LOST: "what is no longer reached or compared is no longer checked: a fault there would go unseen",
+    Kind.MOVED: "the case is another than it was, or its solution is of another assembly",
     Kind.DRIFTED: "within tolerance, but a decimal digit worse: something computes differently than it did",
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
     Kind.FIXED: "they failed in the run compared with",

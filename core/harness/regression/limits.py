@@ -19,6 +19,9 @@ DRIFT = 10.0
 DRIFT_FLOOR = 1e-6
 """Of the tolerance: what is below matters to nobody. At the usual 1e-9 m this is 1e-15 m, a few last places of a metre."""
 
+UNJUDGED = 1e-6
+"""Of the largest value: what differs by more, where nothing judges it, is another motion. Round-off is a millionth of that."""
+
 TIME = 1.75
 """Ratio of times, at least. On two processors shared by five busy processes, the loads of others kept out of the times, 25 equal
 runs of 20 pairs: 99.9 % of all 6000 ratios of two runs are below 1.75, and the largest ratio to the median of the runs is 1.71."""

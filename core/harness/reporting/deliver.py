@@ -22,6 +22,7 @@ def check_destinations(
     json: str | None,
     junit: Path | None = None,
     markdown: Path | None = None,
+    store: Path | None = None,
     names: Sequence[str] = ("results.json", "report.html"),
 ) -> None:
     """Find out before the work, not after it, what cannot be written; makes the folder `out`, for files of these names."""
@@ -34,7 +35,7 @@ def check_destinations(
     files = [] if out is None else [("--out", out / name) for name in names]
     files += [("--json", Path(json))] if json not in (None, "-") else []
     files += [("--junit", junit)] if junit is not None else []
-    files += [("--markdown", markdown)] if markdown is not None else []
+    files += [(option, file) for option, file in (("--markdown", markdown), ("--store", store)) if file is not None]
     for option, path in files:
         if path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
             problems.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
