@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import KincheckError
 from . import foreign
 from .export import keep_texts
-from .house import House, Status, unknown
-from .run import whole
+from .house import House, Status, unknown, whole
 
 if TYPE_CHECKING:
     from ..assemblies import Survey

@@ -6,8 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from .house import House, Status
-from .run import whole
+from .house import House, Status, whole
 
 
 def add(commands: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import difflib
 import os
 from collections.abc import Callable, Sequence
@@ -120,3 +121,18 @@ def unknown(what: str, name: str, known: Sequence[str]) -> str:
     """What to say of a name that is none of the known ones."""
     close = difflib.get_close_matches(name, known, n=1)
     return f"there is no {what} {name!r}; " + (f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}")
+
+
+def whole(least: int) -> Callable[[str], int]:
+    """A whole number of so much or more, as an option gives it."""
+
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = least - 1
+        if number < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of {least} or more; give one")
+        return number
+
+    return read

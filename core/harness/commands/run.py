@@ -6,7 +6,7 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
@@ -83,21 +83,6 @@ def add(commands: Any) -> None:
         action="store_true",
         help="go on with the last run in the history of the same cases, engines, tolerance, limits and versions that has no end",
     )
-
-
-def whole(least: int) -> Callable[[str], int]:
-    """A whole number of so much or more, as an option gives it."""
-
-    def read(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            number = least - 1
-        if number < least:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of {least} or more; give one")
-        return number
-
-    return read
 
 
 def positive(text: str) -> float:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
-from .house import House, Status, unknown
-from .run import MODES, TOL, positive, whole
+from .house import House, Status, unknown, whole
+from .run import MODES, TOL, positive
 
 if TYPE_CHECKING:
     from ..engine import Engine

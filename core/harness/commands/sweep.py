@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from ...errors import KincheckError
 from ..console import complain
 from . import foreign
-from .house import House, Status, unknown
-from .run import TOL, positive, whole
+from .house import House, Status, unknown, whole
+from .run import TOL, positive
 
 if TYPE_CHECKING:
     from ..attempt import Solver
