@@ -1,5 +1,7 @@
 """A motion that is another than it was is reported: where there is no reference nothing else would show it."""
 
+import math
+
 import msgspec
 import pytest
 from kincheck.core.harness.record import OutputSeries
@@ -52,6 +54,14 @@ def test_another_sweep_is_said(path):
     kinds, messages, _ = found_after(path, driver={"turn": [0.0, 0.25, 0.5]})
     assert kinds == [(Kind.MOVED, *FIRST)]
     assert messages == ["solved at other values of the drivers than before"]
+
+
+def test_the_last_digit_of_a_driver_is_no_other_sweep(path):
+    assert found_after(path, driver={"turn": [0.0, math.nextafter(0.5, 1.0), 1.0]})[0] == []
+
+
+def test_another_driver_is_another_sweep(path):
+    assert found_after(path, driver={"push": DRIVER["turn"]})[0] == [(Kind.MOVED, *FIRST)]
 
 
 def test_fewer_samples_are_lost_though_all_are_solved(path):

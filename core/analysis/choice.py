@@ -7,14 +7,17 @@ knows nothing of it, and the motion goes on by rows that are chosen there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..mechanism import Mechanism
 from ..trajectory import Array
-from .formulation import Condition, Formulation
-from .model import Model, recent_model
+from .cartesian import Cartesian
+from .equations import constraints, frames
+from .formulation import Condition
+from .model import Model, recent_model, standing_drives
 from .poses import jacobian
 from .redundancy import independent_rows
 from .request import CONSISTENT, FROM, LARGEST_SIGMA, TIME
@@ -67,9 +70,10 @@ class Choice:
         sigma = _sigma(matrix, rows)
         if not sigma > least:
             return None
-        if rows not in known:
-            self.models.append(recent_model(model.mechanism, replace(model.request, rows=rows)))
-        best = known.get(rows, self.models[-1])
+        best = known.get(rows)
+        if best is None:
+            best = recent_model(model.mechanism, replace(model.request, rows=rows))
+            self.models.append(best)
         stands = _standing(best, {name: lane[model.vectors[FROM + name]] for name in model.state}, sample, NEAR * sigma)
         return None if stands is None else Standing(best, stands)
 
@@ -88,11 +92,18 @@ def chosen(matrix: Array, known: Sequence[tuple[int, ...]], drivers: int, condit
     return rows if len(rows) == len(best) else best  # where the mechanism is singular there are fewer
 
 
-def chosen_at(formulation: Formulation, state: Sequence[float], known: tuple[int, ...], drivers: int) -> tuple[int, ...]:
-    """As `chosen`, where the scalars of a configuration are given, in the order of `Formulation.design`."""
-    numbers = iter(state)
-    at = formulation.configuration({name: [float(next(numbers)) for _ in value] for name, value in formulation.design.items()})
-    return chosen(jacobian(formulation, at), [known], drivers, formulation.conditions)
+def chosen_at(mechanism: Mechanism, change: Mapping[str, float], state: Array, known: tuple[int, ...]) -> tuple[int, ...]:
+    """As `chosen`, at a pose of the native formulation.
+
+    Args:
+        change: of the moving drivers from the design [SI].
+        state: the scalars of the pose, in the order of `Cartesian.design`.
+    """
+    frame = frames(mechanism)
+    formulation = Cartesian(constraints(mechanism, frame, standing_drives(mechanism, frame.unit, change)), frame.moving)
+    numbers = iter(state.tolist())
+    at = formulation.configuration({name: [next(numbers) for _ in value] for name, value in formulation.design.items()})
+    return chosen(jacobian(formulation, at), [known], len(mechanism.drivers), formulation.conditions)
 
 
 def _sigma(matrix: Array, rows: Sequence[int]) -> float:

@@ -146,8 +146,8 @@ class Followed:
             missing = self._missing(number, side, end.wanted)
             ends = self._follow(Route(standing.model, self._path(missing), standing.lane, here), missing)
             return [each for each in ends if side * (each.wanted - here) >= 0.0]
-        if end.early:
-            return self._further(end, side)
+        if end.early and number is not None:  # the way to the first sample is gone to its end
+            return self._further(end, number, side)
         if len(self.passages) == MOST:
             return None
         lane = self.before(here, side, number) if number is not None else end.route.departure
@@ -164,9 +164,9 @@ class Followed:
         self.stuck += [Stuck(k, end.route, lane, end.lane) for k in sorted(short)] if lane is not None else []
         return [each for each in ends if side * (each.wanted - beyond) >= 0.0]
 
-    def _further(self, end: End, side: float) -> list[End]:
+    def _further(self, end: End, number: int, side: float) -> list[End]:
         """Go along a route again, and where it left off on."""
-        samples, slots = self.parts[self._number(end.route) or 0].samples, end.route.model.slots
+        samples, slots = self.parts[number].samples, end.route.model.slots
         low = LOW * float(end.lane[slots[FROM + SIGMA]] / end.lane[slots[FROM + LARGEST_SIGMA]])
         found = march(end.route, self.tol, low=low)
         further = found.solved & ~self.found.solved[samples]

@@ -21,7 +21,7 @@ from .choice import chosen_at
 from .enclosure import Enclosure, UnprovedError, enclose
 from .equations import Constraint, Frames, constraints, frames
 from .exact import Reading, equations, exact_mechanism
-from .model import compile_model, standing_drives
+from .model import compile_model
 from .request import Request
 from .sweep import sweep
 
@@ -86,23 +86,17 @@ def prove(
                 if not reached:
                     raise UnprovedError(f"there is no approximate pose to start from: {native.message}")
                 change = {name: float(drives[name][k][0]) for name in drives}
-                rows = _rows(mechanism, change, poses[k], kept) if model.selection.dropped else kept
+                rows = chosen_at(mechanism, change, poses[k], kept) if model.selection.dropped else kept
+                if rows not in traced:
+                    traced[rows] = equations(exact, tuple(drives), points, rows)
                 if rows != kept:
                     others[k] = [names[row] for row in range(len(names)) if row not in rows]
-                    traced.setdefault(rows, equations(exact, tuple(drives), points, rows))
                 samples.append(enclose(traced[rows], points, poses[k], driven, bits))
             except UnprovedError as error:
                 samples.append(error)
             seconds.append(perf_counter() - started)
     solved, redundant = ([names[k] for k in each] for each in (kept, model.selection.dropped))
     return Proofs(samples, seconds, native, solved, redundant, others)
-
-
-def _rows(mechanism: Mechanism, change: Mapping[str, float], state: Array, kept: tuple[int, ...]) -> tuple[int, ...]:
-    """The rows to prove a sample by: those kept, or where they are worse than need be others."""
-    frame = frames(mechanism)
-    found = constraints(mechanism, frame, standing_drives(mechanism, frame.unit, change))
-    return chosen_at(Cartesian(found, frame.moving), state.tolist(), kept, len(mechanism.drivers))
 
 
 def _ball(x: Fraction) -> Ball:

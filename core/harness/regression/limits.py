@@ -22,6 +22,9 @@ DRIFT_FLOOR = 1e-6
 UNJUDGED = 1e-6
 """Of the largest value: what differs by more, where nothing judges it, is another motion. Round-off is a millionth of that."""
 
+SAME_SAMPLE = 1e-12
+"""Of a driver's largest value: thousands of its last places, and no step of a sweep that anybody would take."""
+
 TIME = 1.75
 """Ratio of times, at least. On two processors shared by five busy processes, the loads of others kept out of the times, 25 equal
 runs of 20 pairs: 99.9 % of all 6000 ratios of two runs are below 1.75, and the largest ratio to the median of the runs is 1.71."""

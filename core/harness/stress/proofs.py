@@ -15,7 +15,6 @@ from ...analysis.enclosure import enclose
 from ...analysis.equations import constraints, frames
 from ...analysis.exact import as_double, equations, exact_mechanism
 from ...analysis.freedom import select_rows
-from ...analysis.model import standing_drives
 from ...drivers import JointAngle
 from ...program.ball_executor import flint, precision
 from ...trajectory import Array
@@ -42,8 +41,7 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
     still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     pose = _state(truth, at, [*still.design], frame.unit, frame.origins)
     change = {name: float(drives[0, system.names.index(name)]) for name in path.motions}
-    there = Cartesian(constraints(mechanism, frame, standing_drives(mechanism, frame.unit, change)), frame.moving)
-    kept = chosen_at(there, pose.tolist(), select_rows(mechanism, frame, still).kept, len(mechanism.drivers))
+    kept = chosen_at(mechanism, change, pose, select_rows(mechanism, frame, still).kept)
     with precision(BITS):
         traced = equations(exact_mechanism(mechanism, as_double), tuple(path.motions), points, kept)
         driven = [
