@@ -123,12 +123,11 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
 
 def _same_samples(now: Record, before: Record) -> bool:
     """Whether all drivers have the values they had, but for the last digits of sines and splines on another processor."""
-    if {name: len(values) for name, values in now.driver.items()} != {name: len(values) for name, values in before.driver.items()}:
+    here, there = now.driver, before.driver
+    if {name: len(values) for name, values in here.items()} != {name: len(values) for name, values in there.items()}:
         return False
-    return all(
-        _apart(values, before.driver[name]) <= SAME_SAMPLE * max(map(abs, values), default=0.0)
-        for name, values in now.driver.items()
-    )
+    sizes = {name: max(map(abs, values), default=0.0) for name, values in here.items()}
+    return all(_apart(values, there[name]) <= SAME_SAMPLE * sizes[name] for name, values in here.items())
 
 
 def _values(series: OutputSeries | None, motion: str) -> Sequence[float | None]:
