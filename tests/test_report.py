@@ -237,8 +237,9 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
 
 
 def test_an_empty_run_says_so(tmp_path: Path) -> None:
-    assert headline([]) == "Nothing was compared"
-    assert "Nothing was compared" in report(Results(run={}, records=[]), tmp_path).text
+    empty = Results(run={}, records=[])
+    assert headline(empty) == "Nothing was compared"
+    assert "Nothing was compared" in report(empty, tmp_path).text
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_records(path, stop):
         assert store.run(second.run).status == "finished"
 
 
-def test_only_the_same_run_without_an_end_is_resumed(path):
+def test_only_the_same_run_without_an_end_is_resumed(path, monkeypatch):
     case = crank()
     stopped, _ = kept(path, [case], ENGINES, stop=1)
     others = {
@@ -123,6 +123,10 @@ def test_only_the_same_run_without_an_end_is_resumed(path):
     }
     for cases, engines in others.values():
         assert not kept(path, cases, engines, resume=True)[0].resumed
+    for git in ({"commit": "b" * 40, "changed": False}, None):
+        with monkeypatch.context() as elsewhere:
+            elsewhere.setattr("kincheck.core.harness.circumstances.git_state", lambda _, git=git: git)
+            assert not kept(path, [case], ENGINES, resume=True)[0].resumed  # other code may give other records
     assert kept(path, [crank()], ENGINES, resume=True)[0].run == stopped.run  # equal, and made anew
     assert not kept(path, [case], ENGINES, resume=True)[0].resumed  # it has an end now
 

@@ -31,14 +31,18 @@ def results(
     tol: float,
     command: str,
     facts: Mapping[str, Any] | None = None,
+    plan: Sequence[tuple[str, str, str]] = (),
 ) -> Results:
     """The records, with what a reader needs to repeat the run: versions, machine, settings, cases and their references.
 
     Args:
         facts: further circumstances; they come before those found here, for a run that began in another process.
+        plan: the pairs that there were to be, of a run that ended before it had them all.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
-    return Results(run=known | {"engines": versions(records)}, records=list(records), references=references(cases))
+    return Results(
+        run=known | {"engines": versions(records), **missing(plan, records)}, records=list(records), references=references(cases)
+    )
 
 
 def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, command: str) -> dict[str, Any]:
@@ -67,6 +71,13 @@ def versions(records: Sequence[Record]) -> dict[str, str | None]:
         if record.version is not None and record.version not in found[record.engine]:  # one that crashed may not have told it
             found[record.engine].append(record.version)
     return {engine: " and ".join(each) or None for engine, each in found.items()}
+
+
+def missing(plan: Sequence[tuple[str, str, str]], records: Sequence[Record]) -> dict[str, Any]:
+    """Case, engine and mode of the pairs that a run was to make and did not, as `run` has them; empty where all are there."""
+    made = {(record.case, record.engine, record.mode) for record in records}
+    pairs = [list(pair) for pair in plan if pair not in made]
+    return {"missing": pairs} if pairs else {}
 
 
 def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:

@@ -197,7 +197,7 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
     """A run.
 
     Attributes:
-        run: its circumstances: versions, machine, settings, and what the cases are.
+        run: its circumstances: versions, machine, settings, what the cases are, and where it ended early, what is missing.
         records: one per (case, engine) pair.
         references: the true values of each case that has any, by case and output.
         scenes: the mechanism of each case, by case; a run made without them has none.
@@ -208,6 +208,11 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
     records: list[Record]
     references: dict[str, dict[str, OutputSeries]] = {}
     scenes: dict[str, Scene] = {}
+
+    @property
+    def missing(self) -> list[tuple[str, str, str]]:
+        """Case, engine and mode of the pairs that were asked for and have no record: the run ended before them."""
+        return [(case, engine, mode) for case, engine, mode in self.run.get("missing", [])]
 
 
 def to_json(results: msgspec.Struct) -> bytes:

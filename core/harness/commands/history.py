@@ -120,8 +120,8 @@ def _print_trends(history: History) -> None:
     from ..history.trends import largest_length, run_name
     from ..printing import columns, page
     from ..regression.steps import steps
-    from ..regression.wording import product, step_says
-    from ..reporting.wording import number
+    from ..regression.wording import step_says
+    from ..reporting.wording import number, product
 
     console = page(None)
     for (case, engine, mode), entries in history.pairs.items():

@@ -29,14 +29,17 @@ def add(commands: Any) -> None:
     )
     report.set_defaults(do=_report)
     report.add_argument(
-        "run", nargs="?", metavar="RUN", help="number of a run in the history, or a results.json; default: the latest"
+        "run",
+        nargs="?",
+        metavar="RUN",
+        help="number of a run in the history, or a results.json; default: the latest that is not under way",
     )
     report.add_argument(
         "--against",
         default="last-green",
         metavar="RUN",
-        help="the same, or last-green (the latest earlier run in which nothing went wrong), or BRANCH-baseline (the latest earlier "
-        "run of that branch, without changes to its files); default %(default)s",
+        help="the same, or last-green (the latest earlier run in which nothing went wrong, and no engine was missing that is there "
+        "otherwise), or BRANCH-baseline (the latest earlier run of that branch, without changes to its files); default %(default)s",
     )
     add_history(report, "the history of the runs, their steps and their spread")
     report.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(OUT)} there")

@@ -81,7 +81,8 @@ def add(commands: Any) -> None:
     run.add_argument(
         "--resume",
         action="store_true",
-        help="go on with the last run in the history of the same cases, engines, tolerance, limits and versions that has no end",
+        help="go on with the last run in the history of the same cases, engines, tolerance, limits, versions and commit "
+        "that has no end",
     )
 
 
@@ -155,7 +156,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
             problems.append(f"{how}: {len(records)} of {len(plan)} records were made and are kept")
             stopped = True
             records.sort(key=lambda each: plan.index((each.case, each.engine, each.mode)))
-            results = running.results(cases, records, started=started, **common)
+            results = running.results(cases, records, started=started, plan=plan, **common)
     if options.out or options.json or keeping:
         from ..scene import with_scenes
 

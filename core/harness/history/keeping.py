@@ -65,7 +65,7 @@ def keep(
     settings: Mapping[str, Any],
     resume: bool,
 ) -> Keeping:
-    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits and versions.
+    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits, versions and commit.
 
     Args:
         settings: further circumstances.
@@ -75,16 +75,17 @@ def keep(
         HistoryError: the file cannot be read or written.
     """
     started = datetime.now(UTC)
-    known = circumstances(cases, started=started, tol=tol, command=command)
+    facts = circumstances(cases, started=started, tol=tol, command=command) | plain({**settings, **conditions()})
     plan = planned(cases, engines)
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
-    identity = digest(cases, plan, tol, limits, [known[name] for name in ("kincheck", "python", "numpy")])
+    git: Mapping[str, Any] = facts["git"] or {}
+    code = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed")]
+    identity = digest(cases, plan, tol, limits, code)
     store = Store(path)
     try:
         earlier = store.resume_run(identity) if resume else None
         if earlier is not None:
             return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
-        facts = known | plain({**settings, **conditions()})
         run = store.begin_run(identity, plan, facts)
     except BaseException:
         store.close()

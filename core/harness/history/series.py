@@ -116,6 +116,17 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
     return [row for row in store.runs() if row.status == "finished" and row.id in good and (before is None or row.id < before)]
 
 
+def present(store: Store, run: int) -> set[Pair]:
+    """The pairs of a run whose engine was there.
+
+    Raises:
+        HistoryError: the file cannot be read.
+    """
+    query = "SELECT case_name, engine, mode FROM records WHERE run_id = ? AND outcome != ?"
+    with store.explained("read"):
+        return {*store.connection.execute(query, (run, Outcome.UNAVAILABLE)).fetchall()}
+
+
 def calibration(run: RunRow | Mapping[str, Any]) -> float | None:
     """Seconds of the fixed piece of work in that run; None where it was not measured."""
     facts = run.circumstances if isinstance(run, RunRow) else run

@@ -25,7 +25,7 @@ from typing import Any, Literal, Self, TypeAlias
 import msgspec
 
 from ...errors import KincheckError
-from ..circumstances import versions
+from ..circumstances import missing, versions
 from ..record import Record, Results
 from .owner import alive, owner
 from .schema import MIGRATIONS, check, migrate
@@ -109,6 +109,13 @@ class Store:
                     return self.run(run)
         return None
 
+    def at_work(self, run: int) -> bool:
+        """Whether a process is writing that run now: one without an end and without a process was ended by force."""
+        with self.explained("read"):
+            query = "SELECT owner FROM runs WHERE id = ? AND status = 'running'"
+            row = self.connection.execute(query, (run,)).fetchone()
+        return row is not None and alive(row[0])
+
     def add_record(self, run: int, record: Record) -> None:
         """Keep a record. A pair that has one keeps that: it is never there twice."""
         seconds = record.seconds
@@ -175,14 +182,14 @@ class Store:
         return sorted(records, key=lambda each: place[each.case, each.engine, each.mode])
 
     def results(self, run: int) -> Results:
-        """A run as the command wrote it; of one without an end, what there is."""
-        records = self.records(run)
+        """A run as the command wrote it; of one without an end, what there is, and in `run["missing"]` what is not."""
+        row, records = self.run(run), self.records(run)
         attached: dict[str, dict[str, Any]] = {}
         with self.explained("read"):
             query = "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest) WHERE run_id = ?"
             for kind, case, content in self.connection.execute(query, (run,)):
                 attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
-        facts = self.run(run).circumstances | {"engines": versions(records)}
+        facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
         whole: dict[str, Any] = {"run": facts, "records": [], **attached}
         return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
 
@@ -219,6 +226,7 @@ class Store:
                 connection.close()
                 if how != "mode=ro":
                     raise
+                self._check_whole()
                 continue
             except BaseException:
                 connection.close()
@@ -228,6 +236,15 @@ class Store:
                 return self._writable()
             return connection
         raise AssertionError("the second way either connects or raises")
+
+    def _check_whole(self) -> None:
+        """What was written last may be beside the file still, and cannot be read where nothing can be written."""
+        beside = self.path.with_name(f"{self.path.name}-wal")
+        if beside.is_file() and beside.stat().st_size:
+            raise HistoryError(
+                f"history {self.path}: its latest records are in {beside.name} still, and the folder cannot be written, which "
+                "putting them together takes; copy both files to a folder that can be"
+            )
 
     @contextmanager
     def _transaction(self) -> Generator[None]:

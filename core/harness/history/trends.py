@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..reporting.measures import Past
+from ..reporting.wording import product
 from .series import Entry, History
 from .store import RunRow
 
@@ -15,7 +16,7 @@ def trends(history: History) -> dict[str, list[Past]]:
     found: dict[str, list[Past]] = {}
     place = {run: k for k, run in enumerate(history.runs)}
     for (case, engine, mode), entries in history.pairs.items():
-        name = engine if mode == "projection" else f"{engine} · {mode}"
+        name = product(engine, mode)
         for entry in entries:
             row = history.runs[entry.run]
             found.setdefault(case, []).append(Past(run_name(row), name, largest_length(entry, case, row), entry.us_per_step))
@@ -30,10 +31,15 @@ def run_name(row: RunRow) -> str:
 
 def largest_length(entry: Entry, case: str, row: RunRow) -> float | None:
     """The largest position error of the outputs that are lengths [m]; None where none was compared."""
-    outputs: Mapping[str, Mapping[str, Any]] = row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
     lengths = [
         deviations.position.max_abs
         for name, deviations in entry.errors.items()
-        if deviations.position is not None and outputs.get(name, {}).get("unit", "m") == "m"
+        if deviations.position is not None and unit_of(row, case, name) == "m"
     ]
     return max(lengths, default=None)
+
+
+def unit_of(row: RunRow, case: str, output: str) -> str:
+    """The unit of an output in that run; metres where the run does not say."""
+    outputs: Mapping[str, Mapping[str, Any]] = row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
+    return outputs.get(output, {}).get("unit", "m")

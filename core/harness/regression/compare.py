@@ -9,7 +9,7 @@ from typing import Any
 from ..history.series import Entry, History, Pair, calibration, own_seconds
 from ..reading.tolerance import DEFAULT_ATOL
 from ..record import Outcome, OutputSeries, Record
-from ..reporting.wording import MOTIONS, motion_unit, number
+from ..reporting.wording import MOTIONS, UNMADE, motion_unit, number
 from .findings import Change, Finding, Kind
 from .limits import DRIFT, ENOUGH, SAME_SAMPLE, TIME_FLOOR, UNJUDGED, drifted
 from .subject import Subject
@@ -40,8 +40,15 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
         findings += _slower(
             record, _usual(before, old, entries, history, same_machine(now.facts, before.facts)), now.facts, slowest
         )
-    findings += [_finding(Kind.ABSENT, old, f"{old.outcome} there") for old in earlier.values()]
+    asked = set(now.results.missing)
+    findings += [_finding(Kind.ABSENT, old, f"{old.outcome} there") for pair, old in earlier.items() if pair not in asked]
     return findings
+
+
+def unmade(now: Subject) -> list[Finding]:
+    """The pairs that the run was to make and did not: whatever it is compared with, nothing checks them."""
+    pairs = now.results.missing
+    return [Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=UNMADE) for case, engine, mode in pairs]
 
 
 def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:

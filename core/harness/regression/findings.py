@@ -90,6 +90,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         quantity: position, velocity or acceleration (errors), time, or outcome.
         output: of the error with the largest step; null for time and outcome.
+        unit: of that output; empty for an error that has none, for time and outcome.
         first: number of the first run of the new level; `started` is when it began.
         last: number of the last run of the level before.
         before, now: the levels: errors [SI], seconds; null for an outcome.
@@ -101,6 +102,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     mode: str
     quantity: str
     output: str | None
+    unit: str = ""
     first: int
     started: str
     last: int
@@ -166,5 +168,5 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def regressed(self) -> bool:
-        """Whether something is worse than it was; without a run to compare with, whether anything is bad."""
-        return bool(self.regressions) if self.against else bool(self.failing)
+        """Whether something is worse than it was, or was not made; without a run to compare with, whether anything is bad."""
+        return bool(self.regressions) or (self.against is None and bool(self.failing))

@@ -6,7 +6,7 @@ import msgspec
 
 from ..history.series import NIGHTS, NOTHING, History, read
 from ..history.store import Store
-from .compare import changes, compare, same_machine
+from .compare import changes, compare, same_machine, unmade
 from .findings import Finding, Regressions, Step
 from .limits import slowest
 from .loose import loose
@@ -29,10 +29,10 @@ def regressions(subject: Subject, against: Subject | None, reason: str, store: S
     around = _around(subject, store)
     limit = slowest(_alike(subject, around, before=subject.number))
     standing = steps(around, standing=True)
-    found: list[Finding] = []
+    found = unmade(subject)
     if against is not None:
         then = NOTHING if against.number is None else _alike(subject, around, before=against.number + 1)
-        found = compare(subject, against, then, limit)
+        found += compare(subject, against, then, limit)
     records = subject.results.records
     return Regressions(
         run=subject.label,

@@ -13,6 +13,7 @@ import numpy as np
 from ..case import Array
 from ..history.series import Entry, History, Pair, calibration
 from ..history.store import RunRow
+from ..history.trends import unit_of
 from ..reporting.wording import MOTIONS
 from .compare import changes
 from .findings import Change, Step
@@ -178,6 +179,7 @@ def _step(
         mode=mode,
         quantity=quantity,
         output=output,
+        unit="" if output is None else unit_of(run, case, output),
         first=b.run,
         started=run.started,
         last=a.run,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import KincheckError
-from ..history.series import green
+from ..history.series import NIGHTS, Pair, green, present
 from ..history.store import RunRow, Store
 from ..reading.results import read_results
 from ..record import Results
@@ -44,7 +44,9 @@ class Subject:
 
 
 def find(name: str | None, store: Store | None) -> Subject:
-    """The run of that number, or in that results.json; None: the latest of the history that has an end.
+    """The run of that number, or in that results.json; None: the latest of the history that nobody is writing now.
+
+    That may be one without an end, which was killed: to judge the one before it would be to say that all is well.
 
     Raises:
         KincheckError: there is none, or it cannot be read.
@@ -57,9 +59,9 @@ def find(name: str | None, store: Store | None) -> Subject:
         )
     if name is not None:
         return _kept(store, store.run(int(name)))
-    row = next((row for row in store.runs() if row.status != "running"), None)
+    row = next((row for row in store.runs() if not store.at_work(row.id)), None)
     if row is None:
-        raise KincheckError(f"history {store.path}: no run has an end; `kincheck run --history {store.path}` makes one")
+        raise KincheckError(f"history {store.path}: no run to report; `kincheck run --history {store.path}` makes one")
     return _kept(store, row)
 
 
@@ -73,12 +75,20 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
         if store is None:
             return None, f"{name} is found in a history, and there is none"
         branch = name.removesuffix(BASELINE)
-        rows = green(store, before=subject.number) if name == LAST_GREEN else _of_branch(store, branch, subject)
-        row = _most_alike(rows, subject)
+        if name == LAST_GREEN:
+            # with engines that were there: one that is gone since would be told of once, and never again
+            row = _most_alike(green(store, before=subject.number)[:NIGHTS], subject, lambda row: present(store, row.id))
+        else:
+            row = _most_alike(_of_branch(store, branch, subject), subject, lambda row: {*row.plan})
         if row is not None:
             return _kept(store, row, name.replace("-", " ")), ""
-        wanted = "in which nothing went wrong" if name == LAST_GREEN else f"of branch {branch!r}, without changes to its files,"
-        return None, f"no earlier run {wanted} with any of its pairs"
+        if name == LAST_GREEN:
+            return None, "no earlier run in which nothing went wrong with any of its pairs"
+        known = sorted({str(git["branch"]) for row in store.runs() if (git := row.circumstances.get("git")) and git.get("branch")})
+        return None, (
+            f"no earlier run of branch {branch!r}, without changes to its files, with any of its pairs; "
+            f"the history has {'branches ' + ', '.join(known) if known else 'no branch'}"
+        )
     against = find(name, store)
     if against.number is not None and against.number == subject.number:
         raise KincheckError(f"report: {subject.name} cannot be compared with itself; give another --against")
@@ -108,9 +118,9 @@ def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
     return [row for row in store.runs() if fits(row)]
 
 
-def _most_alike(rows: list[RunRow], subject: Subject) -> RunRow | None:
+def _most_alike(rows: list[RunRow], subject: Subject, there: Callable[[RunRow], set[Pair]]) -> RunRow | None:
     """The run that has most of the subject's pairs, the latest of several; None where none has any."""
-    pairs = {(record.case, record.engine, record.mode) for record in subject.results.records}
-    shared: Callable[[RunRow], int] = lambda row: len(pairs & {*row.plan})  # noqa: E731
+    pairs = {(record.case, record.engine, record.mode) for record in subject.results.records} | {*subject.results.missing}
+    shared: Callable[[RunRow], int] = lambda row: len(pairs & there(row))  # noqa: E731
     best = max(rows, key=lambda row: (shared(row), row.id), default=None)
     return best if best is not None and shared(best) else None

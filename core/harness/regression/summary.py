@@ -9,8 +9,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..markdown import escaped, row
+from ..reporting.wording import product
 from .findings import WHY, Kind, Regressions, Step
-from .wording import LONGEST, headline, loose_says, product, rows, step_says
+from .wording import LONGEST, headline, loose_says, rows, step_says
 
 
 def to_markdown(found: Regressions) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..reporting.wording import motion_unit, number
+from ..reporting.wording import motion_unit, number, product
 from .findings import Finding, Kind, Loose, Regressions, Step
 
 LONGEST = 12
@@ -46,6 +46,7 @@ def headline(found: Regressions) -> str:
     """The report in one sentence."""
     if found.against is None:
         failing = f"{len(found.failing)} of {found.pairs} not right" if found.failing else f"all {found.pairs} right"
+        failing += f", {len(found.regressions)} never made" if found.regressions else ""
         return f"{found.run.name}: {failing}; compared with nothing: {found.reason}"
     counts = [f"{len(_pairs(found, kind))} {_plural(kind, found)}" for kind in Kind if kind.regression and _pairs(found, kind)]
     said = ", ".join(counts) or "nothing regressed"
@@ -84,11 +85,6 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
     return [Row(engine, cases, message, since, more) for (engine, message, since, more), cases in alike.items()]
 
 
-def product(engine: str, mode: str) -> str:
-    """The engine, with its mode unless it is projection."""
-    return engine if mode == "projection" else f"{engine} · {mode}"
-
-
 def step_says(step: Step) -> str:
     """A step, its first run and what changed there."""
     name = f"{step.output} {step.quantity} error" if step.output else step.quantity
@@ -97,7 +93,7 @@ def step_says(step: Step) -> str:
     elif step.quantity == "time":
         what = f"{number(1e3 * step.before)} → {number(1e3 * step.now)} ms a sweep"
     else:
-        what = f"{number(step.before)} → {number(step.now)} {motion_unit('', step.quantity)}".rstrip()
+        what = f"{number(step.before)} → {number(step.now)} {motion_unit(step.unit, step.quantity)}".rstrip()
     changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
     return f"{name}: {what} since run {step.first} ({step.started[:16].replace('T', ' ')}); after run {step.last}: {changed}"
 

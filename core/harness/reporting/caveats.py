@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ..case import Truth
 from ..record import Outcome, Record, Results
 from .axis import SAMPLES
-from .wording import engine_name
+from .wording import engine_name, product
 
 COMPARED = (Outcome.PASS, Outcome.FAIL)
 
@@ -36,6 +36,9 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
         if pairs and outcome not in COMPARED:
             say(f"{outcome.value.capitalize()}: {len(pairs)}", f"Nothing is said about {'; '.join(pairs)}.")
+    if results.missing:
+        pairs = [f"{product(engine, mode)} on {case}" for case, engine, mode in results.missing]
+        say(f"Never made: {len(pairs)}", f"The run ended before them, and nothing is said about {'; '.join(pairs)}.")
     for record in records:
         if record.solved is not None and record.samples is not None and record.solved < record.samples:
             say(_pair(record), f"{record.solved} of {record.samples} samples were solved; nothing is said about the others.")

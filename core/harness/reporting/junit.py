@@ -7,20 +7,27 @@ from xml.etree import ElementTree
 
 from ..compare import describe
 from ..record import Deviations, Outcome, Record, Results
+from .wording import UNMADE
 
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
 
 
 def to_junit(results: Results) -> bytes:
-    """The results as JUnit XML; a missing engine or feature is a skip with its reason."""
+    """The results as JUnit XML; a missing engine or feature is a skip with its reason, a pair that was never made an error."""
     root = ElementTree.Element("testsuites", name="kincheck")
-    for case in dict.fromkeys(record.case for record in results.records):
+    for case in dict.fromkeys([*(record.case for record in results.records), *(case for case, _, _ in results.missing)]):
         suite = ElementTree.SubElement(root, "testsuite", name=case)
         for record in results.records:
             if record.case == case:
                 for output, deviations in record.errors.items():
                     _test(suite, record, output, deviations)
+        for name, engine, mode in results.missing:
+            if name == case:
+                test = ElementTree.SubElement(
+                    suite, "testcase", classname=f"{case}.{engine}.{mode}", name="never made", time="0.000000"
+                )
+                ElementTree.SubElement(test, "error", message=UNMADE)
         for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
             suite.set(count, str(sum(1 for _ in suite.iter(tag))))
     ElementTree.indent(root)

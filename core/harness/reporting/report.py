@@ -71,14 +71,14 @@ def render(given: Material, changes: Markup | None = None) -> str:
         _environment()
         .get_template("report.html")
         .render(
-            headline=headline(records),
+            headline=headline(given.results),
             changes=changes,
             worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
             counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
             unjudged=sum(record.outcome in COMPARED and not judged([record]) for record in records),
             problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
             not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
-            circumstances={key: value for key, value in given.results.run.items() if key != "cases"},
+            circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing")},
             settings=_settings(records),
             styles=styles,
             cases=cases,
@@ -117,8 +117,9 @@ def packed(text: str) -> str:
     return base64.b64encode(zlib.compress(text.encode())).decode("ascii")
 
 
-def headline(records: Sequence[Record]) -> str:
+def headline(results: Results) -> str:
     """The run in one sentence."""
+    records, missing = results.records, len(results.missing)
     compared, broken = [record for record in records if judged([record])], _count(records, *BROKEN)
     failed = _count(compared, Outcome.FAIL)
     if not compared:
@@ -131,7 +132,8 @@ def headline(records: Sequence[Record]) -> str:
             if len(compared) > 1
             else "The one comparison is within tolerance"
         )
-    return said + (f", {broken} could not be completed" if broken else "")
+    said += f", {broken} could not be completed" if broken else ""
+    return said + (f"; the run ended before {missing} more" if missing else "")
 
 
 def _worst_of(record: Record, motion: str | None = None) -> Judged | None:

@@ -16,12 +16,20 @@ TRUTHS = {
     Truth.CONSENSUS_ONLY: "consensus only",
 }
 
+UNMADE = "asked for and never made: the run ended before it"
+"""Of a pair that has no record."""
+
 _LABELS = {"half_track_change": "half-track change", "wheelbase_change": "wheel-base change"}
 
 
 def engine_name(record: Record) -> str:
+    """The record's engine, as `product` names it."""
+    return product(record.engine, record.mode)
+
+
+def product(engine: str, mode: str) -> str:
     """The engine, with its mode unless it is projection: the same engine in another mode is another product."""
-    return record.engine if record.mode == "projection" else f"{record.engine} · {record.mode}"
+    return engine if mode == "projection" else f"{engine} · {mode}"
 
 
 def output_label(name: str) -> str:
