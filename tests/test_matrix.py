@@ -76,6 +76,12 @@ def test_joints_are_run_instead_of_the_built_in_cases_and_printed_as_a_matrix(ru
     assert [line[0] for line in lines[1 : len(found) + 1]] == found
 
 
+def test_without_anything_to_compare_with_there_are_no_errors(run):
+    _, _, markdown = run(engines=[Fake("native")], cases=[crank(reference=False)])
+    assert "No errors: nothing was compared with anything" in markdown
+    assert "Largest errors" not in markdown
+
+
 def test_joints_and_cases_can_be_run_together(run):
     _, _, markdown = run("--joints", "crank", engines=[Fake("native")], cases=[crank()])
     assert "| `crank` |" in markdown

@@ -189,6 +189,20 @@ DRIVES = {
 }
 
 
+@pytest.mark.parametrize(
+    ("supplied", "found"),
+    [
+        (
+            DRIVEN,
+            "--drive: found 'right_driver_joint', which an equality of the file locks, expected a joint that moves; name another",
+        ),
+        (Supplied(drive=("left_driver_joint:0:0.8",), hold=("right_driver_joint",)), "joint that moves; leave it out"),
+    ],
+)
+def test_a_joint_that_the_file_locks_is_not_driven(tmp_path, supplied, found):
+    complains(edited(tmp_path, (COUPLING, '<joint joint1="right_driver_joint"')), supplied, found)
+
+
 @pytest.mark.parametrize("kind", DRIVES)
 def test_driving(kind):
     supplied, fragments = DRIVES[kind]

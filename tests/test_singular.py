@@ -175,6 +175,15 @@ def test_near_a_dead_centre_uncertain_rates_are_refused():
     assert [pose["outcome"] for pose in found.details["singular_poses"]] == ["refused", "refused"]
 
 
+def test_a_tolerance_below_rounding_is_no_singular_pose():
+    found = solve(mcpherson(), "stroke", [0.0], tol=1e-30)
+    assert not found.solved.any()
+    assert "rounding alone leaves the pose uncertain by" in found.message
+    assert "by the tolerance 1e-30; smallest singular value 0.12" in found.message
+    assert "the pose is regular; allow more" in found.message
+    assert "singular_poses" not in found.details
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
     found = solve(mcpherson(), "stroke", direction * np.linspace(0.0, 0.4, 21))

@@ -208,17 +208,22 @@ class _Scrutiny:
 
     def _refuse(self, system: System, indices: NDArray[np.intp], state: Array, sample: Array, error: Array) -> None:
         self.found.kept[:, indices], self.found.solved[indices] = np.nan, False
-        for at, k in enumerate(indices.tolist()):
-            self._say("refused", float(self.times[k]), examine(system, state[:, [at]], sample[:, [at]]), k)
+        found = [examine(system, state[:, [at]], sample[:, [at]]) for at in range(len(indices))]
+        for k, each in zip(indices.tolist(), found, strict=True):
+            if each.sigma < REGULAR:
+                self._say("refused", float(self.times[k]), each, k)
         worst = int(error.max(axis=0).argmax())
-        singularity = examine(system, state[:, [worst]], sample[:, [worst]])
+        singularity = found[worst]
         uncertain = f"the pose uncertain by {error[0, worst]:.2g} of the mechanism's size"
         uncertain += f", rates by {error[1:, worst].max():.2g} of their own" if len(error) > 1 else ""
         places = listed([self._where(float(self.times[k])) for k in indices.tolist()])
-        self.findings.messages.append(
-            f"refused at {places}: so near a singular pose that residuals leave {uncertain} (at "
-            f"{self._where(float(self.times[indices[worst]]))}), allowed {self.limit:.2g}; {singularity.words}; keep away from it"
-        )
+        uncertain += f" (at {self._where(float(self.times[indices[worst]]))}), allowed {self.limit:.2g}"
+        if singularity.sigma < REGULAR:
+            why = f"so near a singular pose that residuals leave {uncertain}; {singularity.words}; keep away from it"
+        else:
+            sigma = f"smallest singular value {singularity.sigma:.3g}"
+            why = f"rounding alone leaves {uncertain} by the tolerance {self.tol:.3g}; {sigma}, the pose is regular; allow more"
+        self.findings.messages.append(f"refused at {places}: {why}")
 
     # Passages
 

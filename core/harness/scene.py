@@ -36,23 +36,27 @@ def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
     manage, in a process of its own perhaps, will neither hang nor end this one.
     """
     answered = {record.case for record in results.records if _answers(record)}
+    asked = any(record.engine == NATIVE for record in results.records)
     shown = [case for case in cases if len(case.mechanism.moving) <= LARGEST]
-    return msgspec.structs.replace(results, scenes={case.name: scene(case, poses=case.name in answered) for case in shown})
+    return msgspec.structs.replace(
+        results, scenes={case.name: scene(case, poses=case.name in answered, asked=asked) for case in shown}
+    )
 
 
 def _answers(record: Record) -> bool:
     return record.engine == NATIVE and bool(record.solved)
 
 
-def scene(case: Case, *, poses: bool = True) -> Scene:
+def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
     """The mechanism of a case.
 
     Args:
         poses: solve for the bodies' poses over the sweep; else the scene is the design position.
+        asked: the native engine was, and had no answer, where there are no poses.
     """
     mechanism = case.mechanism
     frames, motions = list[int](), dict[str, BodyMotion]()
-    message = "the native engine has no answer in this run: this is the design position"
+    message = f"the native engine {'has no answer' if asked else 'was not asked'} in this run: this is the design position"
     if poses:
         try:
             frames, motions, message = _poses(case)

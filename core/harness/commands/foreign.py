@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..console import complain
 from ..reading.supplied import LEFT_OUT, Supplied
 
 if TYPE_CHECKING:
@@ -54,6 +54,4 @@ def supplied(options: argparse.Namespace) -> Supplied:
 
 def tell_left_out(cases: Iterable[Case]) -> None:
     """Say on standard error what was read of files of other tools, and what was left out."""
-    for case in cases:
-        if LEFT_OUT in case.source:
-            print(f"kincheck: {case.name}: {case.source}", file=sys.stderr)
+    complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)

@@ -88,7 +88,7 @@ class _Draughtsman:
         self.drawn.steps = [f"sample {k} · {axis.at(k)}".removesuffix(" · ") for k in scene.frames]
         self.drawn.start = min(range(len(scene.frames)), key=self._from_design, default=0)
         solved = f"Poses at {len(scene.frames)} of {len(axis.values)} samples, by the native solver. " if scene.frames else ""
-        self.drawn.caption = solved + scene.message
+        self.drawn.caption = solved + (f"{scene.message[0].upper()}{scene.message[1:]}." if scene.message else "")
 
     def _from_design(self, frame: int) -> float:
         """How far the bodies are from the design position [m + -], to compare frames by."""

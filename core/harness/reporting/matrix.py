@@ -74,8 +74,10 @@ def _reading(results: Results) -> str:
     standards = sorted(
         {each.against for record in results.records for errors in record.errors.values() for _, each in errors.items()}
     )
+    if not standards:
+        return "No errors: nothing was compared with anything"
     units = " · ".join(f"{quantity} [{unit}]" for quantity, unit in QUANTITIES.items())
-    return f"Largest errors against {', '.join(standards).replace('_', ' ') or 'nothing'}: {units}"
+    return f"Largest errors against {', '.join(standards).replace('_', ' ')}: {units}"
 
 
 def _cell(record: Record) -> Text:

@@ -22,6 +22,7 @@ from ..visible import cell
 from .page import effect, headline
 from .results import SweepResults
 from .study import Chunk, Study
+from .variation import Coordinate
 
 
 def print_sweep(results: SweepResults, file: TextIO) -> None:
@@ -111,6 +112,7 @@ class ParquetStore:
     """Writes the values of all variants as they come: a row for each variant, a row group for each chunk.
 
     Columns: variant, the offset of each coordinate [SI], and each output as a list over the samples, NaN where there is no value.
+    A coordinate that is named like an output, W.x say, has the column W.x.offset.
     The file's metadata under the key "kincheck" says case, seed, mode, units and the driver's values, as JSON.
 
     Raises:
@@ -126,13 +128,14 @@ class ParquetStore:
         arrow, self._study, self._first = self._arrow, study, 0
         n = len(study.case.sweep.values)
         fields = [arrow.field("variant", arrow.int64())]
-        fields += [arrow.field(each.name, arrow.float64()) for each in study.variation.coordinates]
+        offsets = _offset_columns(study)
+        fields += [arrow.field(name, arrow.float64()) for name in offsets]
         fields += [arrow.field(row.name, arrow.list_(arrow.float64(), n)) for row in study.rows]
         about = {
             "case": study.case.name,
             "seed": study.seed,
             "mode": str(study.variation.mode),
-            "units": {row.name: row.unit for row in study.rows} | {each.name: each.unit for each in study.variation.coordinates},
+            "units": {row.name: row.unit for row in study.rows} | {name: each.unit for name, each in offsets.items()},
             "driver": {name: values.tolist() for name, values in study.case.sweep.moved.items()},
         }
         self._schema = arrow.schema(fields, metadata={"kincheck": json.dumps(about)})
@@ -162,3 +165,9 @@ class ParquetStore:
         except OSError as error:
             raise KincheckError(f"--store: cannot be written ({error}); free some room, or give a file elsewhere") from error
         self._first += chunk.count
+
+
+def _offset_columns(study: Study) -> dict[str, Coordinate]:
+    """The coordinates by the names of their columns."""
+    taken = {"variant", *(row.name for row in study.rows)}
+    return {f"{each.name}.offset" if each.name in taken else each.name: each for each in study.variation.coordinates}

@@ -7,11 +7,11 @@ from pathlib import Path
 from ....algebra import Quat
 from ....analysis.driven import degrees_of_freedom
 from ....drivers import JointAngle, JointDisplacement, JointDriver
-from ....joints import Revolute
+from ....joints import Fixed, Revolute
 from ....mechanism import Body, Mechanism, Point
 from ...case import Case, Sweep, Truth
 from ..coordinates import all_coordinates
-from ..document import explained, remedy
+from ..document import explained, fault, remedy
 from ..supplied import LEFT_OUT, Supplied
 from .attributes import MAKE_BODIES, ROOT, WRITE_OUT
 from .classes import read_classes
@@ -42,6 +42,10 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
             tree.count(f"{section.tag}: {element.tag}")
     driving = read_driving(file, tree, supplied)
     parts = parts_of(tree, [*read_equalities(root, tree)], driving)
+    for name in driving.joints:
+        if isinstance(parts.joints[name], Fixed):
+            option, advice = ("--drive", "name another") if name == driving.joint else ("--hold", "leave it out")
+            raise fault(file, option, f"found {name!r}, which an equality of the file locks, expected a joint that moves; {advice}")
     points = _points(tree, parts)
     bodies = [Body(name, coordinates(at.at), _euler_parameters(at.turn), name in parts.fixed) for name, at in parts.bodies.items()]
     with explained(file):
