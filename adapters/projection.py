@@ -19,7 +19,7 @@ from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
 from ..core.joints import Joint
-from ..core.motions import Path
+from ..core.motions import Path, outwards
 from ..core.trajectory import Array, PointMotion, Trajectory
 
 MAX_ITERATIONS = 20
@@ -241,9 +241,7 @@ class Walk:
             messages.append(message)
         else:
             step = float(np.abs(np.diff(times)).max()) if n > 1 else abs(float(times[0])) or 1.0
-            outward = np.argsort(np.abs(times - origin.t), kind="stable")
-            ahead = times[outward] >= origin.t
-            for side in (outward[ahead], outward[~ahead]):
+            for side in outwards(times, origin.t):
                 at = origin
                 for k in side:
                     at, reached = self.advance(path, at, float(times[k]), step)

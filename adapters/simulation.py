@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import KincheckError, SolveError
 from ..core.harness.case import Case
+from ..core.motions import outwards
 from ..core.trajectory import Array, PointMotion, Trajectory
 from .projection import ProjectionModel, Walk
 
@@ -143,8 +144,5 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
 def legs(case: Case, start: int) -> list[Leg]:
     """The ways from a sample to both ends of the sweep; samples at the same time as the start come in the first."""
     times = case.sweep.path.times
-    order = np.argsort(np.abs(times - times[start]), kind="stable")
-    others = order[order != start]
-    ahead = times[others] >= times[start]
-    sides = [np.concatenate([[start], others[side]]) for side in (ahead, ~ahead)]
+    sides = [np.concatenate([[start], side[side != start]]) for side in outwards(times, float(times[start]))]
     return [Leg(case, side, sign) for side, sign in zip(sides, (1.0, -1.0), strict=True) if len(side) > 1 or sign > 0.0]

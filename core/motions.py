@@ -11,12 +11,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import MechanismError
 from .trajectory import Array
+
+Samples: TypeAlias = NDArray[np.intp]
+"""Indices of samples."""
 
 
 class Measure(Enum):
@@ -188,6 +192,11 @@ class Path:
         """Whether the mechanism is at its design position at time zero, and so can be followed from there both ways."""
         return all(float(motion.at(np.zeros(1))[0][0]) == 0.0 for motion in self.motions.values())
 
+    @property
+    def start(self) -> float:
+        """The time it is followed from: that of the design position, or where that is not on it, of the first sample."""
+        return 0.0 if self.from_design else float(self.times[0])
+
     def drive(self, names: Sequence[str], t: Array) -> Array:
         """Value, velocity and acceleration of the named drivers at times t, shape (3, names, *t.shape)."""
         still = (np.zeros_like(t),) * 3
@@ -198,6 +207,13 @@ class Path:
         first = self.times[:1]
         ramps = {name: Ramp(float(motion.at(first)[0][0])) for name, motion in self.motions.items()}
         return Path(ramps, np.ones(1))
+
+
+def outwards(times: Array, start: float) -> tuple[Samples, Samples]:
+    """The samples after the start, those at it among them, and those before it: indices, the nearest first, equal ones in order."""
+    nearest = np.argsort(np.abs(times - start), kind="stable")
+    after = times[nearest] >= start
+    return nearest[after], nearest[~after]
 
 
 def _finite(who: str, **numbers: float) -> None:

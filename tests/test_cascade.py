@@ -179,7 +179,7 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
         going, carrying = (CascadeSweep(cascade, path) for _ in range(2))
         for sweep in (going, carrying):
             lanes = sweep._lanes
-            lanes.anchor = sweep._departure[1]
+            lanes.anchor = sweep._departure[0]
             lanes.accept_by(accept_by(1e-12))
             for first in (0.0, 0.1, 0.2):  # there and back again
                 assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), path) > 0.0).all()
@@ -201,7 +201,7 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
     cascade = Cascade(chain(3), request)
     sweep = CascadeSweep(cascade, path)
     lanes, times = sweep._lanes, np.linspace(0.005, 0.1, LANES)
-    lanes.anchor = sweep._departure[1]
+    lanes.anchor = sweep._departure[0]
     lanes.accept_by(accept_by(1e-12))
     assert len(cascade.parts) == 4
     assert (lanes.attempt(times, path) > 0.0).all()

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motions import Path
+from ..motions import Path, outwards
 from ..program import ITERATIONS
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .cascade import WORST, Cascade, Lanes
@@ -69,7 +69,7 @@ class CascadeSweep:
         n = len(path.times)
         rows = [row for each in self._outputs.values() for row in each]
         table, worst = np.full((len(rows), n), np.nan), np.full((len(WORST), n), np.nan)
-        start, departure, message, notes = self._departure
+        departure, message, notes = self._departure
         self._notes = [*notes]
         messages = [message] if message else []
         for order, given in self._sides if not messages else ():
@@ -81,7 +81,7 @@ class CascadeSweep:
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
-            message = self._follow(path.times[order], given, start, path, keep, tol)
+            message = self._follow(path.times[order], given, path.start, path, keep, tol)
             messages += [message] if message else []
         found, at = dict[str, Array](), 0
         for name, each in self._outputs.items():
@@ -92,27 +92,24 @@ class CascadeSweep:
     @cached_property
     def _sides(self) -> list[tuple[Indices, list[Array]]]:
         """Of each side of the start the samples outwards, and what is given there."""
-        start, times = self._departure[0], self.path.times
-        sides = [np.flatnonzero(side) for side in (times >= start, times < start)]
-        orders = [side[np.argsort(np.abs(times[side] - start), kind="stable")] for side in sides]
-        return [(order, self._lanes.sampled(times[order], self.path)) for order in orders]
+        times = self.path.times
+        return [(side, self._lanes.sampled(times[side], self.path)) for side in outwards(times, self.path.start)]
 
     @cached_property
-    def _departure(self) -> tuple[float, list[Array], str, Sequence[str]]:
-        """Where the sweep starts: the time, what is predicted from, why it cannot be reached if it cannot, and notes of the way."""
-        lanes, path, start, message = self._lanes, self.path, 0.0, ""
+    def _departure(self) -> tuple[list[Array], str, Sequence[str]]:
+        """Where the sweep starts: what is predicted from, why it cannot be reached if it cannot, and notes of the way."""
+        lanes, path, message = self._lanes, self.path, ""
         lanes.accept_by(accept_by(CLOSED))
         self._notes = list[str]()
         if not path.from_design:
             way = path.lead_in()
-            start = float(path.times[0])
             times = np.array([0.0, 1.0])
             message = self._follow(times, lanes.sampled(times, way), 0.0, way, _nothing, CLOSED)
             message = f"on the way to the first sample: {message}" if message else ""
-            lanes.stand_at(start)
-        lanes.attempt(np.array([start]), path)  # the rates of the path where the mechanism stands
+            lanes.stand_at(path.start)
+        lanes.attempt(np.array([path.start]), path)  # the rates of the path where the mechanism stands
         lanes.carry(0)
-        return start, lanes.anchor, message, tuple(self._notes)
+        return lanes.anchor, message, tuple(self._notes)
 
     def _follow(self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float) -> str:
         """Follow the samples outwards, with what is given there; empty, or why they end."""

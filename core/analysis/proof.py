@@ -12,7 +12,7 @@ import numpy as np
 
 from ..algebra import ZERO, Quat, vec
 from ..mechanism import Mechanism
-from ..motions import Path
+from ..motions import Path, outwards
 from ..primitives.base import GROUND_POSE, Drive, Pose
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array, BodyMotion, Trajectory
@@ -136,8 +136,7 @@ def _coordinate(c: Constraint, poses: Mapping[str, Pose], times: Array, native: 
         return residual(c=0.0)
     turn = 2.0 * np.arctan2(residual(half_cos=1.0, half_sin=0.0), -residual(half_cos=0.0, half_sin=1.0))
     # turns are counted from the design outwards; a sweep so coarse that they are miscounted fails to be proved
-    for side in (times >= 0.0, times < 0.0):
-        outward = np.flatnonzero(side & native.solved)
-        outward = outward[np.argsort(np.abs(times[outward]), kind="stable")]
+    for side in outwards(times, 0.0):
+        outward = side[native.solved[side]]
         turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
     return turn

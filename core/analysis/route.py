@@ -48,7 +48,7 @@ class Route:
     @cached_property
     def start(self) -> float:
         """The time it starts at: where its lane stands, or else the first sample."""
-        return self.since or 0.0 if self.from_design else float(self.path.times[0])
+        return self.path.start if self.since is None else self.since
 
     @cached_property
     def order(self) -> NDArray[np.intp]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..algebra import Quat, Vec3, cross, rotation_less_identity, vec
 from ..mechanism import Mechanism
-from ..motions import Path
+from ..motions import Path, outwards
 from ..primitives.base import Motion, Pose
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .march import HALVINGS, Headway
@@ -118,11 +118,8 @@ class _Sweep:
         stands = {name: np.full(n, np.nan) for name in ("closure", "leftover", "iterations")}
         wanted = (self.points, self.bodies)
         found = [np.full((n, size, len(each.names)), np.nan) for each, size in zip(wanted, (9, 19), strict=True)]
-        start = 0.0 if path.from_design else float(path.times[0])
-        departure = self._departure(start)
-        for after in (True, False):
-            side = np.flatnonzero((path.times >= start) == after)
-            side = side[np.argsort(np.abs(path.times[side] - start), kind="stable")]
+        departure = self._departure()
+        for side in outwards(path.times, path.start):
             if departure is None or not len(side):
                 continue
             followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
@@ -135,9 +132,9 @@ class _Sweep:
                         into[reached] = each.motions([at for at, _ in some])
         return self._trajectory(found, stands, order)
 
-    def _departure(self, start: float) -> Stand | None:
+    def _departure(self) -> Stand | None:
         """Where the samples are followed from: the design, or the first sample where it is elsewhere; None if that cannot be."""
-        model, path, here = self.model, self.path, self.model.design
+        model, path, here, start = self.model, self.path, self.model.design, self.path.start
         try:
             if not path.from_design:
                 way = path.lead_in()

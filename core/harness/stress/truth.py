@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import KincheckError
+from ...motions import outwards
 from ...trajectory import Array
 from ..case import Case
 from .evaluation import Poses, cross
@@ -86,7 +87,7 @@ def followed(case: Case) -> Truth:
     """The truth by following the motion from the design, both ways."""
     system = System(case)
     found, times = _Gathered(system, Reach.UNKNOWN), system.path.times
-    for side in (np.flatnonzero(times >= 0.0), np.flatnonzero(times < 0.0)):
+    for side in outwards(times, 0.0):
         if len(side):
             _follow(system, found, side)
     return found.truth("followed in extended precision")
@@ -147,8 +148,7 @@ def closed(case: Case, motion: Motion) -> Truth:
         # in a singular pose Newton's iteration cannot polish, and need not
         found.add(chunk, _replaced(solved, poses, solved.condition >= UNPOLISHED), keep=False)
     found.singular |= bool(system.design().condition[0] >= SINGULAR)
-    outward = np.argsort(np.abs(system.path.times), kind="stable")
-    for side in (outward[system.path.times[outward] >= 0.0], outward[system.path.times[outward] < 0.0]):
+    for side in outwards(system.path.times, 0.0):
         # a formula may have values again behind a gap, but no motion leads there
         gone = np.logical_or.accumulate(found.reach[side] == Reach.BEYOND)
         found.reach[side] = np.where(gone, Reach.BEYOND, found.reach[side])
