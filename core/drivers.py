@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from .errors import MechanismError
-from .joints.base import Joint, Kind, triple
+from .joints.base import Joint, Kind
+from .joints.given import require_direction, require_finite, triple
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class PointCoordinate(Driver):
     def __post_init__(self) -> None:
         who = f"driver {self.name!r}: direction"
         object.__setattr__(self, "direction", triple(who, self.direction, Kind.DIRECTION.value))
-        if not any(self.direction):
-            raise MechanismError(f"driver {self.name!r}: direction is zero; give a direction of any other length")
+        require_finite(who, self.direction, Kind.DIRECTION.value)
+        require_direction(who, self.direction)
 
 
 @dataclass(frozen=True)

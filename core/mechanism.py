@@ -15,7 +15,8 @@ from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
-from .joints.base import Coupler, Joint, Kind, triple
+from .joints.base import Coupler, Joint, Kind
+from .joints.given import require_finite, triple
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -39,7 +40,9 @@ class Body:
     fixed: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "origin", triple(f"body {self.name!r}: origin", self.origin, Kind.POSITION.value))
+        who = f"body {self.name!r}: origin"
+        object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
+        require_finite(who, self.origin, Kind.POSITION.value)
         p = [float(e) for e in self.euler_parameters]
         length = math.sqrt(sum(e * e for e in p))
         # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
@@ -60,7 +63,9 @@ class Point:
     position: Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", triple(f"point {self.name!r}: position", self.position, Kind.POSITION.value))
+        who = f"point {self.name!r}: position"
+        object.__setattr__(self, "position", triple(who, self.position, Kind.POSITION.value))
+        require_finite(who, self.position, Kind.POSITION.value)
 
 
 @dataclass(frozen=True)

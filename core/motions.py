@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
+from numbers import Real
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -216,7 +217,7 @@ def outwards(times: Array, start: float) -> tuple[Samples, Samples]:
     return nearest[after], nearest[~after]
 
 
-def _finite(who: str, **numbers: float) -> None:
+def _finite(who: str, **numbers: Any) -> None:
     for name, value in numbers.items():
-        if not math.isfinite(value):
-            raise MechanismError(f"{who} motion: {name} is {value}; give a finite number")
+        if not (isinstance(value, Real) and math.isfinite(value)):
+            raise MechanismError(f"{who} motion: {name} is {value!r}; give a finite number")

@@ -86,6 +86,11 @@ def long_axis(self, i, j):
     return p.Spherical(i.arm(P), j.arm(P)), p.Dot11(f, g, vec(self.axis))
 
 
+def long_row(self, i, j):
+    P = vec(self.point)
+    return (p.Dot20(vec(self.axis), i.arm(P), j.arm(P), ZERO),)
+
+
 def missing_row(self, i, j):
     f, _, h = triad(self.axis)
     P = vec(self.point)
@@ -140,6 +145,7 @@ MISTAKES = {
     "rows too long": ("newton", lambda: mistaken(Spherical, p.Spherical, rows=doubled_rows)),
     "axes swapped": ("newton", lambda: mistaken(Revolute, primitives=left_handed)),
     "axis not unit": ("axis lengths", lambda: mistaken(Revolute, primitives=long_axis)),
+    "a row as long as the axis": ("axis lengths", lambda: mistaken(InPlane, primitives=long_row)),
     "a row missing": ("freedoms", lambda: mistaken(Revolute, primitives=missing_row)),
     "a row twice": ("rank", lambda: mistaken(Revolute, primitives=repeated_row)),
     "a freedom too many": ("freedoms", lambda: mistaken(Universal, freedoms=("rotation i", "rotation j", "slide"))),

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import PointCoordinate
+from kincheck.core import Body, Mechanism, Point, PointCoordinate, Revolute
 from kincheck.core.analysis.solve import solve
-from kincheck.core.joints import AxialJoint, Joint
+from kincheck.core.joints import AxialJoint, Joint, ParallelAxes
 
 from .mechanisms import mcpherson, placed, slider_crank, swapped, without_fixed_bodies
 
@@ -134,3 +134,25 @@ def test_units_of_axes_do_not_matter():
     assert_same(wheel(long), wheel())
     drawn = replace(m, drivers=[PointCoordinate("stroke", "wheel", (0.0, 0.0, 4.0))])
     assert_same(wheel(drawn), wheel(), 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("joint", [Revolute("r", "ground", "a", (0, 0, 0), (0, 0, 1)), ParallelAxes("r", "ground", "a", (0, 0, 1))])
+def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, joint):
+    """A single pivot, or axes that are nowhere: measured in metres, a point a micrometre away would be no way away."""
+    across, along = (size, 0.0, 0.0), (0.0, 1.0, 0.0)
+    free = [] if isinstance(joint, Revolute) else [(f"at {k}", tuple(map(float, np.eye(3)[k]))) for k in range(3)]
+    mechanism = Mechanism(
+        "pivot",
+        [Body("a")],
+        [joint],
+        [Point("P", "a", across), Point("O", "a", (0.0, 0.0, 0.0))],
+        [PointCoordinate("y", "P", along), *(PointCoordinate(name, "O", direction) for name, direction in free)],
+    )
+    sine = np.linspace(-0.9, 0.9, 7)
+    found = solve(mechanism, "y", sine * size, rate=size)
+    assert found.solved.all(), found.message
+    cosine, motion = np.sqrt(1.0 - sine**2), found.points["P"]
+    np.testing.assert_allclose(motion.position[:, 0], size * cosine, rtol=2e-15)
+    np.testing.assert_allclose(motion.velocity[:, 0], -size * sine / cosine, rtol=0, atol=2e-14 * size)
+    np.testing.assert_allclose(motion.acceleration[:, 0], -size / cosine**3, rtol=1e-13)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointAngle, Mechanism, MechanismError, Point, PointCoordinate, Revolute, solve
 from kincheck.core.joints import Gear
-from kincheck.core.motions import Table
+from kincheck.core.motions import Ramp, Table
 
 from .running import forget_recent
 
@@ -59,6 +59,15 @@ WRONG = {
     "no place": (lambda: Point("end", "b", None), "point 'end': position is None, expected a point"),
     "an origin of four": (lambda: Body("b", (0, 0, 0, 1)), "body 'b': origin is (0, 0, 0, 1), expected a point"),
     "a flat direction": (lambda: PointCoordinate("d", "end", (0, 1)), "driver 'd': direction is (0, 1), expected a direction"),
+    "an origin that is nowhere": (lambda: Body("b", (0, np.nan, 0)), "body 'b': origin = (0, nan, 0) is not finite; give a point"),
+    "a point at infinity": (lambda: Point("P", "b", (np.inf, 0, 0)), "point 'P': position = (inf, 0, 0) is not finite"),
+    "a point of words": (lambda: Point("P", "b", ("1", "2", "3")), "position = ('1', '2', '3') is not finite; give a point"),
+    "a driver of nowhere": (lambda: PointCoordinate("d", "P", (0, np.nan, 1)), "direction = (0, nan, 1) is not finite"),
+    "an axis of nearly zero": (lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e-200)), "axis has length 1e-200, whose square"),
+    "an axis without end": (lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e200)), "axis has length 1e+200, whose square"),
+    "a driver of nearly zero": (lambda: PointCoordinate("d", "P", (0, 1e-170, 0)), "driver 'd': direction has length 1e-170"),
+    "a driver of zero": (lambda: PointCoordinate("d", "P", (0, 0, 0)), "driver 'd': direction is zero"),
+    "a motion of words": (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
     "one joint for two": (lambda: Gear("g", "ab", ratio=1.0), "joints is 'ab', expected two names"),
 }
 

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kincheck import cases
 from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, SolveError, Translational, Universal
 from kincheck.core.analysis.equations import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import RATE, RATE_T, Request
 from kincheck.core.analysis.solve import solve
 from kincheck.core.joints import Cylindrical, Screw
+from kincheck.core.motions import Ramp
 from kincheck.core.trajectory import Motions, PointMotion
 
 from . import naive
@@ -249,6 +251,15 @@ def test_motions_are_views_by_name_made_when_looked_at():
         motions["Q"]
 
 
+@pytest.mark.parametrize("name", ["rssr", "four_bar", "iftomm_n_four_bar"])
+def test_of_no_values_there_are_no_samples(name):
+    """Also where rows are left out, which may be chosen anew."""
+    case = cases.load(name)
+    found = solve(case.mechanism, case.sweep.driver, [])
+    assert found.solved.shape == (0,)
+    assert {motion.position.shape for motion in found.points.values()} == {(0, 3)}
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -262,6 +273,12 @@ def test_motions_are_views_by_name_made_when_looked_at():
         ({"values": 0.1}, r"values have shape \(\), expected \(n,\)"),
         ({"values": [[0.0, 0.1]]}, r"values have shape \(1, 2\)"),
         ({"values": [0.0, np.nan]}, "values are not all finite"),
+        ({"values": ["a"]}, r"values are \['a'\], expected numbers"),
+        ({"values": [1j]}, r"values are \[1j\], expected numbers"),
+        ({"rate": 1e-320}, "rate is 1e-320: no number is the time of the values then"),
+        ({"motions": {"stroke": Ramp(1.0)}}, "motions has 'stroke', which is swept; leave it out"),
+        ({"motions": {"steer": Ramp(1.0)}}, "there is no driver 'steer'"),
+        ({"motions": {"steer": 3.0}}, r"motions\['steer'\] is 3.0, expected a motion"),
         ({"style": "dads"}, "there is no style 'dads'; known: native, paper, conventional, mixed, relative"),
     ],
 )

@@ -65,9 +65,7 @@ class Frames:
 def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
     """The length unit, unless it is given, and the internal origins: at the joint by which the spanning tree reaches a body."""
     if length_unit is None:
-        points = [point for joint in mechanism.joints for point in joint_points(joint)]
-        extent = max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=1.0)
-        length_unit = 2.0 ** round(math.log2(extent)) if extent > 0.0 else 1.0
+        length_unit = 2.0 ** round(math.log2(_size(mechanism)))
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
     touching: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
@@ -93,6 +91,21 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
     sizes = [extent for extent in extents if extent > 0.0]
     unit = 2.0 ** round(math.log2(median(sizes))) if sizes else whole.unit
     return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
+
+
+def _size(mechanism: Mechanism) -> float:
+    """The extent of the joints' points [m]; where they have none, as around a single pivot, with all points, or with the origins.
+
+    A metre in its place would be the unit of a mechanism of micrometres: its residuals are too small to be seen, and its
+    singular values too.
+    """
+    places = [point for joint in mechanism.joints for point in joint_points(joint)]
+    for further in ([], [point.position for point in mechanism.points], [body.origin for body in mechanism.bodies]):
+        places = [*places, *further]
+        extent = max((max(axis) - min(axis) for axis in zip(*places, strict=True)), default=0.0)
+        if extent > 0.0:
+            return extent
+    return 1.0
 
 
 def joint_points(joint: Joint, body: str | None = None) -> list[tuple[float, float, float]]:

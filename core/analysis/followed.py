@@ -95,7 +95,7 @@ class Followed:
     def in_question(self) -> NDArray[np.bool_]:
         """Those, and samples that may be better by other rows, shape (n,)."""
         model = self.route.model
-        largest = np.fmax.reduce(self.found.kept[model.rows[LARGEST_SIGMA].start]) if model.selection.dropped else None
+        largest = np.fmax.reduce(self.found.kept[model.rows[LARGEST_SIGMA].start], initial=0.0) if model.selection.dropped else None
         return self.found.solved & in_question(*self._tests, self.tol, largest)
 
     @property

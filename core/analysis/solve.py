@@ -80,8 +80,13 @@ def asked(
     _require(order in (0, 1, 2), f"order is {order}, expected 0, 1 or 2")
     _require(math.isfinite(rate) and rate != 0.0, f"rate is {rate}, expected driver units per second other than 0; 1 serves")
     _require(math.isfinite(tol) and tol > 0.0, f"tol is {tol}, expected a positive number; 1e-12 serves")
+    values = _numbers(values)
     _require(np.ndim(values) == 1, f"values have shape {np.shape(values)}, expected (n,): one driver value for each sample")
     _require(bool(np.isfinite(values).all()), "values are not all finite; give finite driver values")
+    _require(driver not in (motions or {}), f"motions has {driver!r}, which is swept; leave it out, or sweep another driver")
+    for name, motion in (motions or {}).items():
+        right = isinstance(motion, Motion)  # pyright: ignore[reportUnnecessaryIsInstance]
+        _require(right, f"motions[{name!r}] is {motion!r}, expected a motion such as Sine or Table")
     for what, names, known in (
         ("driver", [driver, *(motions or {})], mechanism.drivers),
         ("point", wanted, mechanism.points),
@@ -92,8 +97,18 @@ def asked(
             if name not in there:
                 require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
                 raise SolveError(f"solve: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
-    path = Path({**(motions or {}), driver: Ramp(rate)}, np.asarray(values, dtype=np.float64) / rate)
+    with np.errstate(over="ignore"):
+        times = values / rate
+    _require(bool(np.isfinite(times).all()), f"rate is {rate}: no number is the time of the values then; give a larger one")
+    path = Path({**(motions or {}), driver: Ramp(rate)}, times)
     return path, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style))
+
+
+def _numbers(values: Sequence[float] | Array) -> Array:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SolveError(f"solve: values are {values!r}, expected numbers: one driver value for each sample") from None
 
 
 def _require(holds: bool, otherwise: str) -> None:

@@ -18,6 +18,7 @@ from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_large
 from ..errors import MechanismError
 from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
+from .given import held, require_direction, require_finite, triple
 
 
 class Kind(Enum):
@@ -108,16 +109,15 @@ class Joint(ABC):
             if kind is Kind.LENGTH:
                 parts = [(value,)]
             elif kind in (Kind.POSITIONS, Kind.DIRECTIONS):
-                value = parts = tuple(triple(who, numbers, expected) for numbers in _held(who, value, 2, expected))
+                value = parts = tuple(triple(who, numbers, expected) for numbers in held(who, value, 2, expected))
             else:
                 value = triple(who, value, expected)
                 parts = [value]
             object.__setattr__(self, each.name, value)
             for numbers in parts:
-                if not all(math.isfinite(number) for number in numbers):
-                    raise MechanismError(f"{who} = {value} is not finite; give {expected}")
-                if kind in (Kind.DIRECTION, Kind.DIRECTIONS) and not any(numbers):
-                    raise MechanismError(f"{who} is zero; give a direction of any other length")
+                require_finite(who, numbers, expected)
+                if kind in (Kind.DIRECTION, Kind.DIRECTIONS):
+                    require_direction(who, numbers)
 
     def __str__(self) -> str:
         return f"joint {self.name!r} ({self.type})"
@@ -222,7 +222,7 @@ class Coupler(ABC):
             Coupler.registry[cls.type] = cls
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", _held(f"{self}: joints", self.joints, 2, "two names"))
+        object.__setattr__(self, "joints", held(f"{self}: joints", self.joints, 2, "two names"))
         if self.joints[0] == self.joints[1]:
             raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
         if not all(weight and math.isfinite(weight) for weight in self.coefficients):
@@ -239,27 +239,6 @@ class Coupler(ABC):
     @abstractmethod
     def coefficients(self) -> tuple[float, float]:
         """Weights of the two coordinates [m, rad]; their weighted sum stays zero."""
-
-
-def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
-    """Three numbers as a tuple, whatever sequence or array they are given as: that may change, a mechanism does not.
-
-    Of an array they are Python's own numbers: numpy's divide by zero without a word, and print their type.
-
-    Raises:
-        MechanismError: there are not three.
-    """
-    return _held(who, value, 3, expected)
-
-
-def _held(who: str, value: Any, count: int, expected: str) -> Any:
-    try:
-        found = tuple(value.tolist() if hasattr(value, "tolist") else value)
-    except TypeError:  # a number, or nothing
-        found = ()
-    if len(found) != count or isinstance(value, str):
-        raise MechanismError(f"{who} is {value!r}, expected {expected}")
-    return found
 
 
 def _times(factor: float, value: float | Sequence[Any]) -> Any:

@@ -74,10 +74,17 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
 
 
 def axis_lengths(s: Specimen) -> Iterator[Finding]:
-    """The same motion with longer directions."""
+    """The same motion, and the same residuals where it is not met, with longer directions.
+
+    A row that is a multiple of what it was has the same solutions, until it is so small or large that nothing meets its tolerance.
+    """
     long = TracedJoint(stretched(s.joint, 137.0), s.place)
     remedy = "a direction may have any length: use unit() or triad()"
-    yield _same("axis lengths", s, long, (s.state, s.rate, s.acceleration), remedy)
+    met = _same("axis lengths", s, long, (s.state, s.rate, s.acceleration), remedy)
+    off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
+    apart = np.abs(s.traced.phi(off) - long.phi(off))
+    unmet = judged("axis lengths", apart, ROUND_OFF, ROUND_OFF_WHY, s.traced.names, "where it is not met", remedy)
+    yield max(met, unmet, key=lambda each: each.badness)
 
 
 def size_and_place(s: Specimen) -> Iterator[Finding]:

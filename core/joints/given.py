@@ -1,0 +1,51 @@
+"""The numbers of a description: as Python's own, finite, and directions with a direction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any
+
+from ..errors import MechanismError
+
+SHORTEST = 1e-150
+"""Of a direction: the square of a shorter one has fewer digits than others, or none."""
+
+
+def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
+    """Three numbers as a tuple, whatever sequence or array they are given as: that may change, a mechanism does not.
+
+    Of an array they are Python's own numbers: numpy's divide by zero without a word, and print their type.
+
+    Raises:
+        MechanismError: there are not three.
+    """
+    x, y, z = held(who, value, 3, expected)
+    return x, y, z
+
+
+def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
+    """Raise MechanismError unless all are finite numbers, or known only later (traced)."""
+    if any(isinstance(number, str) or (isinstance(number, Real) and not math.isfinite(number)) for number in numbers):
+        raise MechanismError(f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}")
+
+
+def require_direction(who: str, numbers: Sequence[float]) -> None:
+    """Raise MechanismError unless a vector has a direction: its length is not zero, nor so small or large that its square is."""
+    length = math.hypot(*numbers)
+    if length == 0.0:
+        raise MechanismError(f"{who} is zero; give a direction of any other length")
+    if not SHORTEST <= length <= 1.0 / SHORTEST:
+        raise MechanismError(f"{who} has length {length:.3g}, whose square is no number; give a direction of another length")
+
+
+def held(who: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
+    """So many things as a tuple, likewise."""
+    try:
+        found = tuple(value.tolist() if hasattr(value, "tolist") else value)
+    except TypeError:  # a number, or nothing
+        found = ()
+    if len(found) != count or isinstance(value, str):
+        raise MechanismError(f"{who} is {value!r}, expected {expected}")
+    return found
