@@ -24,9 +24,10 @@ from .route import AS_THEY_ARE, Route
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
 # passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
 HALVINGS = 40
-# A step that is divided so often, and comes by less than this part of what is left of it nearer to its sample, makes no headway.
-# A part is about 0.3 rad: a fiftieth lets a step of 3,000 rad be gone to its end, which takes seconds.
-MAX_ROUNDS, HEADWAY = 200, 0.02
+# A step that is divided so often, and comes by less than this part of it nearer to its sample, makes no headway.
+# A part is about 0.3 rad: a tenth lets a step of 600 rad be gone to its end. A fiftieth let one of 3,000 rad, and broken equations
+# go on for minutes, by parts of millionths.
+MAX_ROUNDS, HEADWAY = 200, 0.1
 
 
 class March(NamedTuple):
@@ -123,20 +124,24 @@ class Headway:
     """How a step that is divided gets on.
 
     Attributes:
-        since: the time where it stood when that was looked at last.
+        start: the time where it began.
         rounds: parts that were gone.
     """
 
-    since: float
+    start: float
     rounds: int = 0
+
+    def __post_init__(self) -> None:
+        self._since = self.start  # where it stood when that was looked at last
 
     def stopped(self, here: float, wanted: float) -> str:
         """Count a part, that ended here; empty, or why not to go on."""
         self.rounds += 1
         if self.rounds % MAX_ROUNDS:
             return ""
-        gone, self.since = abs(here - self.since), here
-        if gone >= HEADWAY * abs(wanted - here):
+        gone, self._since = abs(here - self._since), here
+        # of the whole step, not of what is left: parts that become ever smaller would be gone by the hundred thousand
+        if gone >= HEADWAY * abs(wanted - self.start):
             return ""
         return f"{self.rounds} parts of the step were gone, and the next sample is as good as no nearer; give samples in between"
 
