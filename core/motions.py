@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from numbers import Real
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -219,5 +218,9 @@ def outwards(times: Array, start: float) -> tuple[Samples, Samples]:
 
 def _finite(who: str, **numbers: Any) -> None:
     for name, value in numbers.items():
-        if not (isinstance(value, Real) and math.isfinite(value)):
+        try:
+            right = math.isfinite(value)  # also of an array that is one number
+        except TypeError:
+            right = False
+        if not right:
             raise MechanismError(f"{who} motion: {name} is {value!r}; give a finite number")
