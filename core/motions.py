@@ -11,16 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import MechanismError
 from .trajectory import Array
-
-Samples: TypeAlias = NDArray[np.intp]
-"""Indices of samples."""
 
 
 class Measure(Enum):
@@ -209,7 +206,7 @@ class Path:
         return Path(ramps, np.ones(1))
 
 
-def outwards(times: Array, start: float) -> tuple[Samples, Samples]:
+def outwards(times: Array, start: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The samples after the start, those at it among them, and those before it: indices, the nearest first, equal ones in order."""
     nearest = np.argsort(np.abs(times - start), kind="stable")
     after = times[nearest] >= start

@@ -94,14 +94,13 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """The extent of the joints' points [m]; where they have none, as around a single pivot, with all points, or with the origins.
+    """The extent of the joints' points [m]; where they have none, as around a single pivot, of these and all others.
 
     A metre in its place would be the unit of a mechanism of micrometres: its residuals are too small to be seen, and its
     singular values too.
     """
-    places = [point for joint in mechanism.joints for point in joint_points(joint)]
-    for further in ([], [point.position for point in mechanism.points], [body.origin for body in mechanism.bodies]):
-        places = [*places, *further]
+    joints = [point for joint in mechanism.joints for point in joint_points(joint)]
+    for places in (joints, joints + [point.position for point in mechanism.points]):
         extent = max((max(axis) - min(axis) for axis in zip(*places, strict=True)), default=0.0)
         if extent > 0.0:
             return extent

@@ -25,8 +25,8 @@ from .route import AS_THEY_ARE, Route
 # passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
 HALVINGS = 40
 # A step that is divided so often, and comes by less than this part of it nearer to its sample, makes no headway.
-# A part is about 0.3 rad: a tenth lets a step of 600 rad be gone to its end. A fiftieth let one of 3,000 rad, and broken equations
-# go on for minutes, by parts of millionths.
+# Of a slider-crank a part is 0.7 rad: a step of 1,000 rad is gone to its end, one of 1,500 is not. A fiftieth of what was left
+# allowed 3,000 rad, and had broken equations go on for minutes, by parts of millionths.
 MAX_ROUNDS, HEADWAY = 200, 0.1
 
 

@@ -46,6 +46,7 @@ def headline(found: Regressions) -> str:
     """The report in one sentence."""
     if found.against is None:
         failing = f"{len(found.failing)} of {found.pairs} not right" if found.failing else f"all {found.pairs} right"
+        # with nothing to compare with there are no other regressions
         failing += f", {len(found.regressions)} never made" if found.regressions else ""
         return f"{found.run.name}: {failing}; compared with nothing: {found.reason}"
     counts = [f"{len(_pairs(found, kind))} {_plural(kind, found)}" for kind in Kind if kind.regression and _pairs(found, kind)]
