@@ -20,7 +20,7 @@ from ..core.errors import SolveError
 from ..core.harness.case import Case
 from ..core.joints import Joint
 from ..core.motions import Path, outwards
-from ..core.trajectory import Array, PointMotion, Trajectory
+from ..core.trajectory import Array, PointMotion, Trajectory, largest_found
 
 MAX_ITERATIONS = 20
 # Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method. None is as many as it takes.
@@ -252,7 +252,7 @@ class Walk:
                     iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
         moves = {name: PointMotion(motion[0, :, k], motion[1, :, k], motion[2, :, k]) for k, name in enumerate(points)}
         facts = {"rank": self.rank, "unknowns": self.unknowns, **details}
-        return Trajectory(moves, solved, iterations, float(residual.max(initial=0.0)), "; ".join(messages), facts)
+        return Trajectory(moves, solved, iterations, largest_found(residual[solved]), "; ".join(messages), facts)
 
 
 def _met(jacobian: Array, v: Array, wanted: Array) -> bool:

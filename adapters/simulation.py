@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..core.errors import KincheckError, SolveError
 from ..core.harness.case import Case
 from ..core.motions import outwards
-from ..core.trajectory import Array, PointMotion, Trajectory
+from ..core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .projection import ProjectionModel, Walk
 
 # A loop that is open by more than this part of the mechanism's size is torn: the pose is no longer one of the mechanism. The
@@ -116,7 +116,7 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
     n = len(case.sweep.path.times)
     motion = np.full((3, n, len(case.points), 3), np.nan)
     solved, steps = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
-    residual, messages = 0.0, list[str]()
+    residuals, messages = list[float](), list[str]()
     for leg in legs(case, start.sample):
         reached = 0
         try:
@@ -128,7 +128,7 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
                 motion[:, k], solved[k], reached = pose.points, True, reached + 1
                 motion[1, k] *= leg.sign
                 steps[k] = pose.steps
-                residual = max(residual, pose.residual)
+                residuals.append(pose.residual)
         except SimulationEndedError as why:
             where = case.sweep.path.where
             last = f"last sample reached at {where(leg.times[reached - 1])}" if reached else "no sample reached on this side"
@@ -138,7 +138,7 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
         name: PointMotion(motion[0, :, k], motion[1, :, k] if known[1] else None, motion[2, :, k] if known[2] else None)
         for k, name in enumerate(case.points)
     }
-    return Trajectory(points, solved, steps, residual, "; ".join(messages), details)
+    return Trajectory(points, solved, steps, largest_found(np.array(residuals)), "; ".join(messages), details)
 
 
 def legs(case: Case, start: int) -> list[Leg]:

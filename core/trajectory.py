@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -78,7 +79,7 @@ class Trajectory:
         points: motion by point name.
         solved: whether each sample was reached, shape (n,).
         iterations: Newton iterations of each sample, shape (n,).
-        residual: the engine's own largest constraint residual over the solved samples [m or -].
+        residual: the engine's own largest constraint residual over the solved samples [m or -]; NaN where there are none.
         message: empty, or why samples are missing: what was found, where, and what to do.
         details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
         bodies: motion by body name, for engines and requests that give it.
@@ -106,3 +107,8 @@ class Trajectory:
         known["points"], known["solved"], known["iterations"] = points, solved, iterations
         known["residual"], known["message"], known["details"] = residual, message, details
         known["bodies"] = {} if bodies is None else bodies
+
+
+def largest_found(values: Array) -> float:
+    """The largest of what was found at solved samples, or NaN where there are none: zero would be praise."""
+    return float(values.max()) if values.size else math.nan

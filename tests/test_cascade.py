@@ -169,6 +169,9 @@ def test_a_narrow_gap_is_not_stepped_over(name):
     else:
         assert not found.solved.any()
         assert "cannot be followed beyond" in found.message
+        # nothing was found, which is not zero
+        assert np.isnan([found.residual, expected.residual]).all()
+        assert np.isnan([each.details["smallest_singular_value"] for each in (found, expected)]).all()
 
 
 @pytest.mark.parametrize("compiled", [False, True])

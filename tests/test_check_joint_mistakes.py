@@ -133,6 +133,10 @@ def unscaled(self, i, j):
     return tuple(p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in (f, g))
 
 
+def no_rows(self, i, j):
+    return ()
+
+
 def one_short(self, i, j, vi, vj):
     return super(type(self), self).gamma(i, j, vi, vj)[1:]
 
@@ -141,6 +145,7 @@ MISTAKES = {
     "sign of gamma": ("gamma", lambda: mistaken(Revolute, p.Dot11, gamma=negative_gamma)),
     "gamma of a line": ("gamma", lambda: mistaken(Translational, p.Dot21, gamma=negative_gamma)),
     "gamma one short": ("equations", lambda: mistaken(Spherical, p.Spherical, gamma=one_short)),
+    "no rows": ("equations", lambda: mistaken(InPlane, primitives=no_rows)),
     "rows without an arm": ("rows", lambda: mistaken(InPlane, p.Dot20, rows=rows_without_arm)),
     "rows too long": ("newton", lambda: mistaken(Spherical, p.Spherical, rows=doubled_rows)),
     "axes swapped": ("newton", lambda: mistaken(Revolute, primitives=left_handed)),
@@ -174,6 +179,10 @@ def test_mistakes_are_caught(mistake):
     found = report[check]
     assert found.limit is None or found.figure > found.limit
     assert found.message
+
+
+def test_a_joint_without_rows_is_told_what_is_missing():
+    assert "has 0 rows, expected one or more; return its primitives" in check_joint(MISTAKES["no rows"][1]())["equations"].message
 
 
 def test_the_base_of_a_mistake_is_sound():

@@ -95,6 +95,7 @@ def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
     jumps = solve_by_projection(Crank(lambda c: float(c > 0.25)), case, 1e-12)
     assert not jumps.solved.any()
     assert "no sample reached on this side" in jumps.message
+    assert np.isnan(jumps.residual)
 
 
 def test_a_first_sample_whose_rates_cannot_be_met_is_told():

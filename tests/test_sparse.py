@@ -201,6 +201,7 @@ def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
     far = solve_sparse(model, Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
     assert "no sample reached on this side" in far.message
     assert not far.solved.any()
+    assert np.isnan([far.residual, far.details["redundant_residual"]]).all()
 
 
 def without_driver(mechanism):

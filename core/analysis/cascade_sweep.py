@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..motions import Path, outwards
 from ..program import ITERATIONS
-from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
+from ..trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
 from .cascade import WORST, Cascade, Lanes
 from .cascade_bridge import cross
 from .march import HALVINGS, Headway, longest
@@ -194,7 +194,7 @@ class CascadeSweep:
             points={name: motion(name) for name in request.points},
             solved=solved,
             iterations=np.where(solved, tests[ITERATIONS], 0.0).astype(np.int64),
-            residual=float(tests["closure"][solved].max(initial=0.0)) * unit,
+            residual=largest_found(tests["closure"][solved]) * unit,
             message="; ".join(messages),
             details={
                 "rank": sum(members * account.rank for members, account in accounts),
@@ -202,8 +202,8 @@ class CascadeSweep:
                 "components": len(self.cascade.parts),
                 "largest_component": self.cascade.largest,
                 "programs": sizes,
-                "redundant_residual": float(tests["leftover"][solved].max(initial=0.0)) * unit,
-                "smallest_singular_value": float(tests[SIGMA][solved].min(initial=1.0)),
+                "redundant_residual": largest_found(tests["leftover"][solved]) * unit,
+                "smallest_singular_value": min(-largest_found(-tests[SIGMA][solved]), 1.0),
             }
             | ({"notes": self._notes} if self._notes else {}),
             bodies={name: body(name) for name in request.bodies},

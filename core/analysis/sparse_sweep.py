@@ -14,7 +14,7 @@ from ..algebra import Quat, Vec3, cross, rotation_less_identity, vec
 from ..mechanism import Mechanism
 from ..motions import Path, outwards
 from ..primitives.base import Motion, Pose
-from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
+from ..trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
 from .march import HALVINGS, Headway
 from .sparse import FailedError, SparseModel, Stand
 from .together import REMEMBERED
@@ -226,7 +226,7 @@ class _Sweep:
     def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array], order: int) -> Trajectory:
         (points, bodies), unit = found, self.model.frame.unit
         solved: NDArray[np.bool_] = ~np.isnan(tests["closure"])
-        closure, leftover = (float(tests[name][solved].max(initial=0.0)) * unit for name in ("closure", "leftover"))
+        closure, leftover = (largest_found(tests[name][solved]) * unit for name in ("closure", "leftover"))
         # rates of place and of rotation stand side by side
         rates = [np.concatenate([bodies[:, k : k + 3], bodies[:, k + 10 : k + 13]], axis=1) for k in (3, 6)]
         series = [points[:, 3 * k : 3 * k + 3] for k in range(order + 1)]

@@ -37,6 +37,8 @@ def follow(route: Route, tol: float) -> Trajectory:
         scrutiny = scrutinise(route, found, tol)
         closure, leftover, sigma = _worst(found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved])
         message, findings = "; ".join(scrutiny.messages), scrutiny.details
+    if not (found.solved.any() if message else found.solved.size):
+        closure = leftover = sigma = math.nan
     iterations, table, unit = found.kept[rows[ITERATIONS].start], found.kept.T, model.frame.unit
     return Trajectory(
         points=Motions(PointMotion, table, model.of_points),
@@ -47,7 +49,7 @@ def follow(route: Route, tol: float) -> Trajectory:
         details={
             **model.details,
             "redundant_residual": leftover * unit,
-            "smallest_singular_value": min(1.0, sigma),
+            "smallest_singular_value": min(sigma, 1.0),
             **findings,
         },
         bodies=Motions(BodyMotion, table, model.of_bodies),

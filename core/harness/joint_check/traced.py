@@ -58,7 +58,7 @@ class TracedJoint:
         programs: phi, rows, nu, gamma and branch, over the slots of a state and a rate.
 
     Raises:
-        MechanismError: the equations disagree in number, or are in body axes.
+        MechanismError: there are no equations, they disagree in number, or are in body axes.
     """
 
     def __init__(self, joint: Joint, place: Place, style: Style = Style.NATIVE) -> None:
@@ -73,6 +73,8 @@ class TracedJoint:
         self._trace(equations)
         kinds = [(Relation, 1) if isinstance(each, Relation) else (type(each.primitive), each.primitive.n) for each in found]
         self.names = [f"{kind.__name__} row {k + 1}" for kind, count in kinds for k in range(count)]
+        if not self.names:
+            raise MechanismError(f"{joint}: has 0 rows, expected one or more; return its primitives")
         ends: list[int] = np.cumsum([count for _, count in kinds]).tolist()
         self.parts = [(end - count, end) for end, (_, count) in zip(ends, kinds, strict=True)]
         lengths = {name: len(self.programs[name].outputs) for name in ("phi", "nu", "gamma")}
