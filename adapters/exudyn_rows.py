@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from ..core import joints
-from ..core.analysis.equations import joint_points
+from ..core.analysis.equations.constraints import joint_points
 from ..core.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ..core.joints.base import triad, unit
 from ..core.mechanism import GROUND, Mechanism

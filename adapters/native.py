@@ -10,7 +10,7 @@ from typing import Any
 from ..core.analysis.prepare import Solver, prepare
 from ..core.analysis.request import LAST_ITERATION, Request
 from ..core.harness.case import Case
-from ..core.program.compiler import available
+from ..core.program.llvm.compiler import available
 from ..core.trajectory import Trajectory
 from ..core.version import VERSION
 

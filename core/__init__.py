@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 from .version import VERSION
 
 if TYPE_CHECKING:
-    from .analysis.assemble import assemble
-    from .analysis.assemblies import find_assemblies
-    from .analysis.continuation import trace
+    from .analysis.assembly.assemble import assemble
+    from .analysis.assembly.assemblies import find_assemblies
     from .analysis.designs import solve_designs
+    from .analysis.singular.continuation import trace
     from .analysis.solve import solve
     from .drivers import JointAngle, JointDisplacement, PointCoordinate
     from .errors import CaseError, KincheckError, MechanismError, SolveError
@@ -83,7 +83,7 @@ __all__ = [
 
 _ROOMS = (
     *(".errors", ".mechanism", ".drivers", ".motions", ".joints"),
-    *(f".analysis.{name}" for name in ("solve", "assemble", "assemblies", "designs", "continuation")),
+    *(f".analysis.{name}" for name in ("solve", "designs", "assembly.assemble", "assembly.assemblies", "singular.continuation")),
 )
 
 

@@ -37,6 +37,19 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__init__": {"analysis", "version", *DESCRIPTION},
 }
 """Room of core (a module or a folder) -> the rooms it may import besides itself."""
+ROAD = "road"
+AMONG_ANALYSIS: dict[str, set[str]] = {
+    "equations": set(),
+    "structure": {"equations"},
+    ROAD: {"equations", "structure"},
+    "singular": {"equations", "structure", ROAD},
+    "assembly": {"equations", "structure", ROAD},
+    "cascade": {"equations", "structure", ROAD, "singular"},
+    "sparse": {"equations", "structure", ROAD},
+    "diagnosis": {"equations", "structure", ROAD, "singular"},
+    "proofs": {"equations", "structure", ROAD, "singular"},
+}
+"""The same within analysis; the road is what stands beside the rooms. It may turn to others in a function, where few need them."""
 
 
 def files(*folders):
@@ -96,6 +109,22 @@ def imports_against_the_stream(path, syntax):
             yield f"imports {'.'.join(target)}: engines share only {sorted(SHARED_BY_ADAPTERS)}"
 
 
+def turns_within_analysis(path, syntax):
+    """analysis: by its own table; the road takes turns in functions only."""
+    if path.parts[:2] != ("core", "analysis"):
+        return
+    mine = path.parts[2] if len(path.parts) > 3 else ROAD
+    for target in imported(path, ast.Module(syntax.body if mine != ROAD else _at_import(syntax), [])):
+        if target[:2] == ("core", "analysis") and len(target) > 2:
+            other = target[2] if target[2] in AMONG_ANALYSIS else ROAD
+            if other != mine and other not in AMONG_ANALYSIS[mine]:
+                yield f"{mine} imports {other}"
+
+
+def _at_import(syntax):
+    return [node for node in syntax.body if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def simulators_at_import(path, syntax):
     """Simulators named by an import that runs when the module is imported, in a statement or by import_module."""
     waiting = list(ast.iter_child_nodes(syntax))
@@ -131,7 +160,10 @@ def bare_packages(path, syntax):
             yield f"imports {'.'.join(target)}: say kincheck.{target[0]}"
 
 
-@pytest.mark.parametrize("rule", [imports_against_the_stream, simulators_at_import, undocumented], ids=lambda rule: rule.__name__)
+RULES = [imports_against_the_stream, turns_within_analysis, simulators_at_import, undocumented]
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
 def test_sources(rule):
     assert {str(path): found for path in SOURCES if (found := list(rule(path, tree(path))))} == {}
 
@@ -153,6 +185,10 @@ OFFENDERS = [
     (imports_against_the_stream, "adapters/exudyn.py", "from .mujoco_spec import Sketch"),
     (imports_against_the_stream, "adapters/mujoco.py", "from ..cases import load"),
     (imports_against_the_stream, "cases/rssr.py", "from ..adapters import engine"),
+    (turns_within_analysis, "core/analysis/equations/new.py", "from ..structure.freedom import rank"),
+    (turns_within_analysis, "core/analysis/structure/new.py", "def f():\n    from ..model import Model"),
+    (turns_within_analysis, "core/analysis/new.py", "from .sparse.model import SparseModel"),
+    (turns_within_analysis, "core/analysis/sparse/new.py", "from .. import cascade"),
     (simulators_at_import, "adapters/mujoco.py", "import mujoco"),
     (simulators_at_import, "adapters/mujoco.py", "class A:\n    from mujoco.viewer import launch"),
     (simulators_at_import, "adapters/mujoco.py", "try:\n    import exudyn as exu\nexcept ImportError:\n    exu = None"),
@@ -178,6 +214,12 @@ ALLOWED = [
     ),
     (imports_against_the_stream, "core/harness/cli.py", "def f():\n    from ... import adapters, cases"),
     (
+        turns_within_analysis,
+        "core/analysis/new.py",
+        "from .structure.freedom import rank\ndef f():\n    from .sparse.model import A",
+    ),
+    (turns_within_analysis, "core/analysis/cascade/new.py", "from ..march import march\nfrom ..singular.bridge import Bridge"),
+    (
         imports_against_the_stream,
         "adapters/mujoco.py",
         "from ..core.mechanism import Body\nfrom .projection import project\nfrom .mujoco_spec import Sketch",
@@ -195,8 +237,11 @@ def test_what_is_allowed_passes(rule, path, text):
 
 def test_the_table_has_no_circle_and_no_dead_entry():
     TopologicalSorter(MAY_IMPORT).prepare()
+    TopologicalSorter(AMONG_ANALYSIS).prepare()
     rooms = {room(path.parts) for path in SOURCES if path.parts[0] == "core"}
     assert rooms == set(MAY_IMPORT)
+    folders = {path.parts[2] for path in SOURCES if path.parts[:2] == ("core", "analysis") and len(path.parts) > 3}
+    assert folders | {ROAD} == set(AMONG_ANALYSIS)
 
 
 # Files and packages

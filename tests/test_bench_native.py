@@ -16,7 +16,7 @@ TOL = 1e-12
 
 
 def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
-    monkeypatch.setattr("kincheck.core.program.compiler.vector_width", lambda: 8)  # twice four predict to 3e-9
+    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)  # twice four predict to 3e-9
     case = cases.load("rssr")
     found = [each.entry for each in precision.contestants(case, adapters.engine("native").efforts(), TOL)]
     errors, iterations = [each.errors.position for each in found], [each.iterations for each in found]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import Body, Gear, JointAngle, Point, SolveError, solve
-from kincheck.core.analysis.cascade import WORST, Cascade
-from kincheck.core.analysis.cascade_sweep import LANES, CascadeSweep
+from kincheck.core.analysis.cascade.cascade import WORST, Cascade
+from kincheck.core.analysis.cascade.sweep import LANES, CascadeSweep
 from kincheck.core.analysis.march import HALVINGS
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request, accept_by

@@ -7,14 +7,14 @@ import pytest
 from kincheck import cases
 from kincheck.cases import bennett
 from kincheck.cases.jet import Jet
-from kincheck.core.analysis import choice, followed, scrutiny
-from kincheck.core.analysis.choice import Choice, chosen
-from kincheck.core.analysis.conditioning import conditioning
-from kincheck.core.analysis.followed import Followed
+from kincheck.core.analysis.diagnosis.conditioning import conditioning
 from kincheck.core.analysis.march import Marcher, march
 from kincheck.core.analysis.model import recent_model
 from kincheck.core.analysis.request import SIGMA, Request
 from kincheck.core.analysis.route import Route
+from kincheck.core.analysis.singular import choice, followed, scrutiny
+from kincheck.core.analysis.singular.choice import Choice, chosen
+from kincheck.core.analysis.singular.followed import Followed
 from kincheck.core.analysis.solve import solve
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp, Sine

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import SolveError
-from kincheck.core.analysis.continuation import trace
+from kincheck.core.analysis.singular.continuation import trace
 from kincheck.core.harness.cli import main
 
 from .mechanisms import A0, B0, C0, CRANK, D0, four_bar, mcpherson, slider_crank

@@ -20,12 +20,12 @@ from kincheck.core import (
     Spherical,
     Translational,
 )
-from kincheck.core.analysis.geometry import places
+from kincheck.core.analysis.diagnosis.rank import Ranks
+from kincheck.core.analysis.diagnosis.screws import free_motions
+from kincheck.core.analysis.equations.geometry import places
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.rank import Ranks
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
-from kincheck.core.analysis.screws import free_motions
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
 from kincheck.core.harness.cli import main

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from kincheck import cases
 from kincheck.core import Body, Gear, JointAngle, Mechanism, PointCoordinate, Revolute, SolveError, Spherical
-from kincheck.core.analysis import driven
-from kincheck.core.analysis.equations import frames
-from kincheck.core.analysis.freedom import account
+from kincheck.core.analysis.equations.constraints import frames
+from kincheck.core.analysis.structure import driven
+from kincheck.core.analysis.structure.freedom import account
 from kincheck.core.harness import cli
 
 from .case_texts import write

@@ -10,14 +10,14 @@ import kincheck.cases
 import numpy as np
 import pytest
 from kincheck.core import Body, Gear, JointAngle, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute
-from kincheck.core.analysis import enclosure
-from kincheck.core.analysis.cartesian import Cartesian
-from kincheck.core.analysis.enclosure import Enclosure, UnprovedError
-from kincheck.core.analysis.equations import constraints, frames
-from kincheck.core.analysis.exact import Exact, as_decimal, as_double, equations, exact_mechanism
-from kincheck.core.analysis.freedom import select_rows
-from kincheck.core.analysis.proof import _states, prove
+from kincheck.core.analysis.equations.cartesian import Cartesian
+from kincheck.core.analysis.equations.constraints import constraints, frames
+from kincheck.core.analysis.proofs import enclosure
+from kincheck.core.analysis.proofs.enclosure import Enclosure, UnprovedError
+from kincheck.core.analysis.proofs.exact import Exact, as_decimal, as_double, equations, exact_mechanism
+from kincheck.core.analysis.proofs.proof import _states, prove
 from kincheck.core.analysis.solve import solve
+from kincheck.core.analysis.structure.freedom import select_rows
 from kincheck.core.harness.probe import probes
 from kincheck.core.motions import Path as Way
 from kincheck.core.motions import Ramp

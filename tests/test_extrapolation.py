@@ -52,7 +52,7 @@ def positions(values, order=0, *, compiled=False):
 @pytest.fixture
 def eight_lanes(monkeypatch):
     monkeypatch.setattr("kincheck.core.analysis.route.LANES", 8)
-    monkeypatch.setattr("kincheck.core.program.compiler.vector_width", lambda: 8)  # whatever the processor's
+    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)  # whatever the processor's
 
 
 @pytest.mark.usefixtures("eight_lanes")
@@ -73,8 +73,8 @@ def test_lanes_are_extrapolated_to_one_iteration(order):
 def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, walked, monkeypatch):
     """Whatever the processor's: it runs such vectors too. On from where the grid changes it takes as many again."""
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
-    monkeypatch.setattr("kincheck.core.program.compiler.vector_width", lambda: lanes)
-    monkeypatch.setattr("kincheck.core.program.machine_code.OFTEN", 10**9 if walked else 0)
+    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
+    monkeypatch.setattr("kincheck.core.program.llvm.machine_code.OFTEN", 10**9 if walked else 0)
     grid = np.concatenate([np.linspace(-0.08, 0.0, 80), 0.001 * np.arange(1.0, 41.0), 0.06 + 0.001 * np.arange(1.0, 20.0)])
     found, first = positions(grid, order, compiled=True), groups_behind(lanes) * lanes
     expected = positions(grid, order).points["wheel"]
@@ -130,7 +130,7 @@ def test_where_extrapolation_fails_the_rates_take_over(values, order, monkeypatc
 def test_beyond_a_long_step_groups_are_counted_anew(lanes, monkeypatch):
     """A group of eight is accepted in part there, and those after it begin at no multiple of eight."""
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
-    monkeypatch.setattr("kincheck.core.program.compiler.vector_width", lambda: lanes)
+    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
     angles = np.concatenate([0.002 * np.arange(21.0), 0.94 + 0.002 * np.arange(60.0)])
     found = sweep(compile_model(slider_crank(), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, angles), 1e-12)
     assert np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max() <= 1e-15

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kincheck.core import Body, Mechanism, OrientationLock, solve
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, turned_by
-from kincheck.core.analysis.equations import Style, constraints, frames
+from kincheck.core.analysis.equations.constraints import Style, constraints, frames
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.sweep import sweep

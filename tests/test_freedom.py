@@ -19,11 +19,11 @@ from kincheck.core import (
     Translational,
     Universal,
 )
-from kincheck.core.analysis.cartesian import Cartesian
-from kincheck.core.analysis.equations import constraints, frames
-from kincheck.core.analysis.freedom import account
-from kincheck.core.analysis.redundancy import independent_rows
+from kincheck.core.analysis.equations.cartesian import Cartesian
+from kincheck.core.analysis.equations.constraints import constraints, frames
 from kincheck.core.analysis.solve import solve
+from kincheck.core.analysis.structure.freedom import account
+from kincheck.core.analysis.structure.redundancy import independent_rows
 from kincheck.core.primitives import Drive, Motion
 
 from .mechanisms import CRANK, D0, ROD, four_bar, mcpherson, placed, slider_crank

@@ -10,7 +10,7 @@ from ctypes import CFUNCTYPE, c_double, c_int64
 import numpy as np
 import pytest
 from kincheck.core import solve
-from kincheck.core.program import compiled, compiler, image, machine_code
+from kincheck.core.program.llvm import compiled, compiler, image, machine_code
 
 from .mechanisms import mcpherson
 from .running import forget_recent

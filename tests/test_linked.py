@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from kincheck.core.program import NumpyExecutor, Plan, Tape, cos, program, sqrt, where_larger
-from kincheck.core.program.compiler import available, vector_width
 from kincheck.core.program.fixed_order import FixedOrder
 from kincheck.core.program.linked import MOST, Linker, Memory, joined, numbers
+from kincheck.core.program.llvm.compiler import available, vector_width
 from kincheck.core.program.memory import address, aligned
 
 if not available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
-from kincheck.core.program.machine_code import walker
+from kincheck.core.program.llvm.machine_code import walker
 
 WIDTH = vector_width()
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, solve, solve_designs
 from kincheck.core.analysis import tracing
-from kincheck.core.analysis.equations import Style
+from kincheck.core.analysis.equations.constraints import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.sweep import sweep
@@ -24,9 +24,7 @@ from kincheck.core.program import (
     Plan,
     Tape,
     absolute,
-    compiler,
     cos,
-    machine_code,
     maximum,
     minimum,
     place_of,
@@ -35,6 +33,7 @@ from kincheck.core.program import (
     sqrt,
     where_larger,
 )
+from kincheck.core.program.llvm import compiler, machine_code
 
 from .mechanisms import four_bar, mcpherson
 from .running import forget_recent

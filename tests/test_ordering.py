@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
-from kincheck.core.program import Tape, llvm_programs, program
-from kincheck.core.program.llvm_programs import _Straight
+from kincheck.core.program import Tape, program
+from kincheck.core.program.llvm import programs
+from kincheck.core.program.llvm.ordering import AT_ONCE, CYCLES, OTHERS, ordered
+from kincheck.core.program.llvm.programs import _Straight
 from kincheck.core.program.lowering import lowered
-from kincheck.core.program.ordering import AT_ONCE, CYCLES, OTHERS, ordered
 from kincheck.core.program.trace import LEAVES, operands
 
 from .mechanisms import mcpherson
@@ -59,9 +60,9 @@ def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkey
     each = compile_model(mcpherson(), Request(("stroke",), ("wheel",), compiled=False)).programs["newton"]
     traced, waiting = (_Straight(found, width).text for found in (lowered(each), ordered(lowered(each))))
     assert traced != waiting
-    assert (waiting if width == 8 else traced) in llvm_programs.function(each, width)
-    monkeypatch.setattr(llvm_programs, "PUT_AWAY", 0.0)  # nothing may be put away for it
-    assert traced in llvm_programs.function(each, width)
+    assert (waiting if width == 8 else traced) in programs.function(each, width)
+    monkeypatch.setattr(programs, "PUT_AWAY", 0.0)  # nothing may be put away for it
+    assert traced in programs.function(each, width)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

@@ -9,7 +9,7 @@ from kincheck.core.analysis.march import march
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
-from kincheck.core.analysis.singularity import solve_closely
+from kincheck.core.analysis.singular.singularity import solve_closely
 from kincheck.core.analysis.system import System
 from kincheck.core.harness.case import Truth
 from kincheck.core.harness.compare import output_series

@@ -6,8 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
-from kincheck.core.analysis import cascade, cascade_sweep, march, model, route, sparse
+from kincheck.core.analysis import march, model, route
+from kincheck.core.analysis.cascade import cascade
+from kincheck.core.analysis.cascade import sweep as cascade_sweep
 from kincheck.core.analysis.prepare import prepare
+from kincheck.core.analysis.sparse import model as sparse
 from kincheck.core.harness.bench.size import circle
 from kincheck.core.motions import Absolute, Motion, Path, Ramp, Sine, Table
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve, trace
 from kincheck.core.algebra import ZERO, Quat, vec
-from kincheck.core.analysis.cartesian import Cartesian
-from kincheck.core.analysis.equations import constraints, frames
-from kincheck.core.analysis.formulation import Condition
-from kincheck.core.analysis.freedom import select_rows
-from kincheck.core.analysis.poses import jacobian
+from kincheck.core.analysis.equations.cartesian import Cartesian
+from kincheck.core.analysis.equations.constraints import constraints, frames
+from kincheck.core.analysis.equations.formulation import Condition
+from kincheck.core.analysis.equations.poses import jacobian
 from kincheck.core.analysis.programs import Tracer
-from kincheck.core.analysis.redundancy import independent_rows
 from kincheck.core.analysis.request import Request
+from kincheck.core.analysis.structure.freedom import select_rows
+from kincheck.core.analysis.structure.redundancy import independent_rows
 from kincheck.core.harness.stress.families import planar
 from kincheck.core.harness.stress.families.planar import any_plane, crank_rocker
 from kincheck.core.primitives.base import Pose

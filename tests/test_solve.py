@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, SolveError, Translational, Universal
-from kincheck.core.analysis.equations import Style
+from kincheck.core.analysis.equations.constraints import Style
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import RATE, RATE_T, Request
 from kincheck.core.analysis.solve import solve

@@ -21,16 +21,16 @@ from kincheck.core import (
     Translational,
     solve,
 )
-from kincheck.core.analysis.components import components
-from kincheck.core.analysis.equations import frames
-from kincheck.core.analysis.factors import Factors
+from kincheck.core.analysis.equations.constraints import frames
 from kincheck.core.analysis.model import compile_model
-from kincheck.core.analysis.orientation import Blocks
 from kincheck.core.analysis.prepare import IRREDUCIBLE
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
-from kincheck.core.analysis.sparse import FailedError, SparseModel
-from kincheck.core.analysis.sparse_sweep import solve_sparse
+from kincheck.core.analysis.sparse.model import FailedError, SparseModel
+from kincheck.core.analysis.sparse.orientation import Blocks
+from kincheck.core.analysis.sparse.sweep import solve_sparse
+from kincheck.core.analysis.structure.components import components
+from kincheck.core.analysis.structure.factors import Factors
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.bench import scaling
 from kincheck.core.harness.bench.ring import LEAN, pivot, ring

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute, Spherical, Translational
-from kincheck.core.analysis.cascade import Cascade
-from kincheck.core.analysis.cascade_sweep import CascadeSweep
+from kincheck.core.analysis.cascade.cascade import Cascade
+from kincheck.core.analysis.cascade.sweep import CascadeSweep
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.solve import solve
-from kincheck.core.analysis.sparse_sweep import solve_sparse
+from kincheck.core.analysis.sparse.sweep import solve_sparse
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.analysis import factors
-from kincheck.core.analysis import together as module
-from kincheck.core.analysis.sparse import SparseModel
-from kincheck.core.analysis.sparse_sweep import solve_sparse
-from kincheck.core.analysis.sparse_tables import SparseTables
-from kincheck.core.analysis.stand import Stand
-from kincheck.core.analysis.together import Together
+from kincheck.core.analysis.sparse import together as module
+from kincheck.core.analysis.sparse.model import SparseModel
+from kincheck.core.analysis.sparse.stand import Stand
+from kincheck.core.analysis.sparse.sweep import solve_sparse
+from kincheck.core.analysis.sparse.tables import SparseTables
+from kincheck.core.analysis.sparse.together import Together
+from kincheck.core.analysis.structure import factors
 from kincheck.core.harness.bench.ring import ring
 
 from .mechanisms import four_bar

@@ -16,9 +16,9 @@ from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import NODES, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program
-from kincheck.core.program.compiler import available
 from kincheck.core.program.executor import in_order
-from kincheck.core.program.llvm_plan import TOGETHER, PlanInMemory
+from kincheck.core.program.llvm.compiler import available
+from kincheck.core.program.llvm.plan import TOGETHER, PlanInMemory
 
 from .mechanisms import four_bar, mcpherson, slider_crank
 
@@ -215,7 +215,7 @@ def test_a_window_is_memory_and_takes_what_is_arranged(compiled, lanes):
 @pytest.mark.parametrize("compiled", COMPILED)
 def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, monkeypatch):
     """Lanes of a group: to slots that are read, that are put out elsewhere, and that nobody reads; and values used on the way."""
-    monkeypatch.setattr("kincheck.core.program.machine_code.OFTEN", 0)
+    monkeypatch.setattr("kincheck.core.program.llvm.machine_code.OFTEN", 0)
     tape = Tape()
     x, last, first, other = tape.input(0), tape.at(NODES - 1, 0), tape.at(0, 0), tape.at(NODES - 1, 1)
     head = tape.at(0, 3)

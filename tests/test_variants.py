@@ -7,7 +7,7 @@ import pytest
 from kincheck.cases import load
 from kincheck.core import Ramp, Sine, SolveError, solve, solve_designs
 from kincheck.core.analysis import variants
-from kincheck.core.analysis.geometry import placed, places
+from kincheck.core.analysis.equations.geometry import placed, places
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route

@@ -12,18 +12,19 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve, solve_designs
 from kincheck.core.analysis import model as models
-from kincheck.core.analysis.cascade import Cascade
-from kincheck.core.analysis.cascade_sweep import CascadeSweep
-from kincheck.core.analysis.components import components
-from kincheck.core.analysis.equations import frames
+from kincheck.core.analysis.cascade.cascade import Cascade
+from kincheck.core.analysis.cascade.sweep import CascadeSweep
+from kincheck.core.analysis.equations.constraints import frames
 from kincheck.core.analysis.model import Model, compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
+from kincheck.core.analysis.structure.components import components
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path, Ramp
-from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, compiled, compiler, program
-from kincheck.core.program import machine_code as llvm
+from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, program
+from kincheck.core.program.llvm import compiled, compiler
+from kincheck.core.program.llvm import machine_code as llvm
 from kincheck.core.program.lowering import lowered, unrolled
 from kincheck.core.program.walk import walk
 

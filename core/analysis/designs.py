@@ -13,7 +13,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion
 from ..trajectory import Array, PointMotion
-from .geometry import places
+from .equations.geometry import places
 from .route import recent_route
 from .solve import asked
 from .variants import solve_variants

@@ -14,12 +14,12 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..primitives.base import Drive
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
-from ..program.compiler import available
+from ..program.llvm.compiler import available
 from ..trajectory import Array
 from . import following
 from .bound import Bound
-from .components import Section
 from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
+from .structure.components import Section
 from .tracing import Tracing, ours, traced
 
 MAX_ITERATIONS = 12

@@ -18,7 +18,7 @@ from threading import local
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Trajectory
-from .equations import Style, frames
+from .equations.constraints import Style, frames
 from .request import Request
 from .route import recent_route
 from .sweep import follow
@@ -51,9 +51,9 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
 def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] | None:
     """Component by component, or as a sparse system; None where one program is better."""
     # few mechanisms are so large: the others need not wait for the import
-    from .cascade import Cascade
-    from .cascade_sweep import CascadeSweep
-    from .components import components
+    from .cascade.cascade import Cascade
+    from .cascade.sweep import CascadeSweep
+    from .structure.components import components
 
     parts = components(mechanism, frames(mechanism))
     if max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
@@ -66,8 +66,8 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
         return along
     if len(mechanism.moving) <= IRREDUCIBLE:
         return None
-    from .sparse import SparseModel
-    from .sparse_sweep import solve_sparse
+    from .sparse.model import SparseModel
+    from .sparse.sweep import solve_sparse
 
     model = SparseModel(mechanism, compiled=request.compiled)
     return lambda path: partial(solve_sparse, model, path, request.points, request.bodies, request.order)

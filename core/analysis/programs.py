@@ -29,14 +29,14 @@ from ..program import (
     minimum,
     program,
 )
-from .cartesian import Cartesian, Given
-from .components import Section, select_section
-from .equations import Style, constraints, frames
-from .formulation import Acceleration, Formulation, State
-from .freedom import select_rows
-from .geometry import placed, places
-from .relative import Relative
+from .equations.cartesian import Cartesian, Given
+from .equations.constraints import Style, constraints, frames
+from .equations.formulation import Acceleration, Formulation, State
+from .equations.geometry import placed, places
+from .equations.relative import Relative
 from .request import BLOCKS, GIVEN, ORIENTATION, RATE, RATE_T, SIGMA, Layout, Request
+from .structure.components import Section, select_section
+from .structure.freedom import select_rows
 
 
 class Tracer:

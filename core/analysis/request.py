@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from .equations import Style
+from .equations.constraints import Style
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
 LAST_ITERATION = 1e-9

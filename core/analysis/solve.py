@@ -11,10 +11,10 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp
 from ..trajectory import Array, Trajectory
-from .driven import require_driven
-from .equations import Style
+from .equations.constraints import Style
 from .prepare import prepare
 from .request import Request
+from .structure.driven import require_driven
 
 
 def solve(

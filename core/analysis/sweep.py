@@ -32,7 +32,7 @@ def follow(route: Route, tol: float) -> Trajectory:
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
     elif found.ends or (tol not in route.settled and in_question(sigma, closure, tol, largest)):
-        from .scrutiny import scrutinise  # rarely needed
+        from .singular.scrutiny import scrutinise  # rarely needed
 
         scrutiny = scrutinise(route, found, tol)
         closure, leftover, sigma = _worst(found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved])

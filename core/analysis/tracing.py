@@ -14,13 +14,14 @@ from functools import cache
 from pathlib import Path
 
 from ..mechanism import Mechanism
-from ..program import ITERATIONS, NODES, Program, compiler, groups_behind
+from ..program import ITERATIONS, NODES, Program, groups_behind
+from ..program.llvm import compiler
 from ..program.shelf import kept
 from . import following
-from .components import Section
-from .equations import Frames
-from .freedom import Selection
+from .equations.constraints import Frames
 from .request import Request
+from .structure.components import Section
+from .structure.freedom import Selection
 
 CORE = Path(__file__).parents[1]
 PACKAGE = __name__.split(".analysis.")[0]
@@ -81,7 +82,7 @@ def _source() -> bytes:
     """A digest of the source that tracing runs through, and whatever stands beside it."""
     digest = hashlib.sha256()
     for folder in (CORE, *(CORE / name for name in ("primitives", "joints", "program", "analysis"))):
-        for file in sorted(folder.glob("*.py")):
+        for file in sorted(folder.glob("*.py" if folder is CORE else "**/*.py")):
             digest.update(file.read_bytes())
     return digest.digest()
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from ..analysis.assemblies import Assemblies, Assembly, find_assemblies
+from ..analysis.assembly.assemblies import Assemblies, Assembly, find_assemblies
 from ..errors import KincheckError, SolveError
 from ..joints import AxialJoint
 from ..trajectory import BodyMotion
@@ -22,7 +22,7 @@ INTENDED = 1e-9
 
 
 class Found(msgspec.Struct, frozen=True):
-    """One assembly in a results file; see `analysis.assemblies.Assembly`. bodies: r [m] and p by name."""
+    """One assembly in a results file; see `analysis.assembly.assemblies.Assembly`. bodies: r [m] and p by name."""
 
     number: int
     intended: bool

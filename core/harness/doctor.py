@@ -14,7 +14,8 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from ..program import compiler, shelf
+from ..program import shelf
+from ..program.llvm import compiler
 from .case import Case
 from .circumstances import circumstances
 from .console import how_to_install

@@ -1,6 +1,6 @@
 """Proving a case: every output at every sample, to as many digits as are asked for, and how far the native engine is from it.
 
-The native solution of each sample is proved to lie near exactly one solution of the case's equations (`core.analysis.enclosure`).
+The native solution of each sample is proved to lie near exactly one solution of the case's equations (`analysis.proofs.enclosure`).
 That is a statement about the equations that kincheck has made of the description: as a truth it is an in_house_oracle.
 """
 
@@ -14,9 +14,9 @@ from fractions import Fraction
 import numpy as np
 
 from ..algebra import Vec3
-from ..analysis.enclosure import Enclosure, UnprovedError
-from ..analysis.exact import Exact, Reading, as_decimal, as_double
-from ..analysis.proof import Drives, Proofs, prove
+from ..analysis.proofs.enclosure import Enclosure, UnprovedError
+from ..analysis.proofs.exact import Exact, Reading, as_decimal, as_double
+from ..analysis.proofs.proof import Drives, Proofs, prove
 from ..jet import Jet
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array

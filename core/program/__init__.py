@@ -2,8 +2,8 @@
 
 from .elimination import Elimination
 from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
-from .llvm_executor import LlvmExecutor
-from .machine_code import LlvmCode, make_loops_ready
+from .llvm.executor import LlvmExecutor
+from .llvm.machine_code import LlvmCode, make_loops_ready
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
 from .trace import (

@@ -1,4 +1,4 @@
-"""Programs as tables of whole numbers, which `llvm_walk` goes through: nothing has to be compiled before they can be run.
+"""Programs as tables of whole numbers, which `llvm.walker` goes through: nothing has to be compiled before they can be run.
 
 A table is a list of stretches: the kind of an operation, how many bytes its rows take, and the rows: where the result goes and
 where the operands stand, in bytes from the lanes. Stretches are long: of what can be done next, all of one kind comes first.

@@ -1,7 +1,7 @@
 """Case files, TOML and JSON: read, and driven as `kincheck run` asks."""
 
 import kincheck.cases
-from kincheck.core.analysis.driven import require_driven
+from kincheck.core.analysis.structure.driven import require_driven
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.harness.reading.document import fault

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import msgspec
 import numpy as np
 
-from ...analysis.geometry import places
+from ...analysis.equations.geometry import places
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
 from ...analysis.route import Route
 from ...analysis.variants import Variants, solve_variants
-from ...program.compiler import available
+from ...program.llvm.compiler import available
 from ...trajectory import Array, PointMotion, Trajectory
 from ..case import Case
 from ..compare import output_series, size

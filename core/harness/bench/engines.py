@@ -11,7 +11,7 @@ from typing import Any, Literal
 import msgspec
 
 from ...errors import KincheckError
-from ...program import compiler
+from ...program.llvm import compiler
 from ..case import Case
 from ..circumstances import circumstances
 from ..engine import Engine

@@ -13,7 +13,7 @@ from ...analysis.request import Request
 from ...analysis.route import Route
 from ...analysis.sweep import follow
 from ...errors import SolveError
-from ...program.compiler import available
+from ...program.llvm.compiler import available
 from ...trajectory import Array, Trajectory
 from ...version import VERSION
 from ..case import Case

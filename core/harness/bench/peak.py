@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...program import compiled, compiler
+from ...program.llvm import compiled, compiler
 from ...trajectory import Array
 from .rounds import Spread
 

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import msgspec
 import numpy as np
 
-from ...analysis.sparse import SparseModel
-from ...analysis.sparse_sweep import solve_sparse
+from ...analysis.sparse.model import SparseModel
+from ...analysis.sparse.sweep import solve_sparse
 from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...motions import Path, Ramp

@@ -16,13 +16,13 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ...analysis.cascade import Cascade
-from ...analysis.cascade_sweep import CascadeSweep
+from ...analysis.cascade.cascade import Cascade
+from ...analysis.cascade.sweep import CascadeSweep
 from ...analysis.request import Request
 from ...drivers import JointAngle
 from ...joints import Revolute, Spherical, Universal
 from ...mechanism import Body, Mechanism, Point
-from ...program.compiler import available
+from ...program.llvm.compiler import available
 from ...trajectory import Trajectory
 from ...version import VERSION
 from ..case import Case, Output, Series, Sweep, Truth

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ...analysis.equations import Style
+from ...analysis.equations.constraints import Style
 from ...analysis.solve import solve
 from ...errors import SolveError
 from ...joints import Joint, Kind

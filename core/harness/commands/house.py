@@ -58,7 +58,7 @@ class House:
         Raises:
             KincheckError: there is none, its file does not make sense, or its drivers do not match its freedom.
         """
-        from ...analysis.driven import require_driven
+        from ...analysis.structure.driven import require_driven
         from ..reading.files import SUFFIXES, load
 
         known = self.cases()

@@ -13,7 +13,7 @@ from .house import House, Status, unknown
 from .run import positive
 
 if TYPE_CHECKING:
-    from ...analysis.continuation import Curve, Event
+    from ...analysis.singular.continuation import Curve, Event
 
 LENGTH = 5.0
 """Default length either way: a few whole turns of the bodies together."""
@@ -47,7 +47,7 @@ def _trace(options: argparse.Namespace, house: House) -> int:
     A branch point is where the joints let the motion go on in more ways than one (bifurcation); it is followed straight on.
     Exit status: 0 the whole length was traced, or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
     """
-    from ...analysis.continuation import trace
+    from ...analysis.singular.continuation import trace
 
     case = house.find_case(options.case, foreign.supplied(options))
     foreign.tell_left_out([case])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from ...analysis.conditioning import Conditioning, conditioning
-from ...analysis.geometry import places
-from ...analysis.rank import Blocked, Component, Dependency, Ranks, Row, Violation
-from ...analysis.screws import Screw, described
+from ...analysis.diagnosis.conditioning import Conditioning, conditioning
+from ...analysis.diagnosis.rank import Blocked, Component, Dependency, Ranks, Row, Violation
+from ...analysis.diagnosis.screws import Screw, described
+from ...analysis.equations.geometry import places
 from ...errors import SolveError
 from ..case import MARKER, Case
 from ..explain import explain
@@ -36,7 +36,7 @@ class Nearly(msgspec.Struct, frozen=True):
 
 
 class Sample(msgspec.Struct, frozen=True):
-    """How well a pose of the sweep is determined; see `analysis.conditioning.Pose`. condition is null where it is singular."""
+    """How well a pose of the sweep is determined; see `diagnosis.conditioning.Pose`. condition is null where it is singular."""
 
     value: float
     smallest: float

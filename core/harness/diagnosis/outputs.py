@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from ...algebra import Vec3, vec
-from ...analysis.conditioning import Conditioning, Gradient, Pose
+from ...analysis.diagnosis.conditioning import Conditioning, Gradient, Pose
 from ...jet import Jet
 from ...trajectory import Array
 from ..case import Case, Quantity

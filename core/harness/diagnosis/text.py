@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ...analysis.rank import Row
-from ...analysis.screws import described
+from ...analysis.diagnosis.rank import Row
+from ...analysis.diagnosis.screws import described
 from ..printing import columns, listed
 from .diagnose import Diagnosis, Sample
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.equations import Style
+from ...analysis.equations.constraints import Style
 from ...joints import AxialJoint, Joint
 from ...trajectory import Array
 from .findings import Finding, Verdict, judged

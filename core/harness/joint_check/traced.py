@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ...algebra import Quat, vec
-from ...analysis.cartesian import COLUMNS, Cartesian
-from ...analysis.equations import Frames, Relation, Style, constraints
+from ...analysis.equations.cartesian import COLUMNS, Cartesian
+from ...analysis.equations.constraints import Frames, Relation, Style, constraints
 from ...errors import MechanismError
 from ...joints import Joint
 from ...mechanism import Body, Mechanism

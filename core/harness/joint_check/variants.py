@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...algebra import Quat, rotation_less_identity, vec
-from ...analysis.equations import Style
+from ...analysis.equations.constraints import Style
 from ...joints import AxialJoint
 from ...trajectory import Array
 from .checks import AMPLIFIED, AMPLIFIED_WHY, ROUND_OFF, ROUND_OFF_WHY, Specimen, defects, times

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...algebra import Vec3
-from ...analysis.cartesian import Cartesian
-from ...analysis.choice import chosen_at
-from ...analysis.enclosure import enclose
-from ...analysis.equations import constraints, frames
-from ...analysis.exact import as_double, equations, exact_mechanism
-from ...analysis.freedom import select_rows
+from ...analysis.equations.cartesian import Cartesian
+from ...analysis.equations.constraints import constraints, frames
+from ...analysis.proofs.enclosure import enclose
+from ...analysis.proofs.exact import as_double, equations, exact_mechanism
+from ...analysis.singular.choice import chosen_at
+from ...analysis.structure.freedom import select_rows
 from ...drivers import JointAngle
 from ...program.ball_executor import flint, precision
 from ...trajectory import Array

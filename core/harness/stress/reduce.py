@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.driven import require_driven
+from ...analysis.structure.driven import require_driven
 from ...errors import KincheckError
 from ...joints import Joint, Kind
 from ...mechanism import Mechanism

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...analysis.enclosure import UnprovedError
+from ...analysis.proofs.enclosure import UnprovedError
 from ...errors import KincheckError, SolveError
 from ...version import VERSION
 from ..attempt import Failure, Pair

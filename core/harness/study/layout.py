@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import fields
 from enum import Enum
 
-from ...analysis.geometry import places
+from ...analysis.equations.geometry import places
 from ...joints import Kind as Shape
 from ...mechanism import Mechanism
 from ..case import MARKER

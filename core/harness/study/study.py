@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Vec3
-from ...analysis.geometry import placed
+from ...analysis.equations.geometry import placed
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
 from ...analysis.route import Route

@@ -75,7 +75,7 @@ class Variation:
     """The coordinates that vary, and how the places of the geometry follow them: nominal + moves @ offsets.
 
     Attributes:
-        places: names of the varied places (see `analysis.geometry.places`), with how many numbers each has.
+        places: names of the varied places (see `analysis.equations.geometry.places`), with how many numbers each has.
         nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
         moves: shape (numbers, coordinates).
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ....algebra import Quat
-from ....analysis.driven import degrees_of_freedom
+from ....analysis.structure.driven import degrees_of_freedom
 from ....drivers import JointAngle, JointDisplacement, JointDriver
 from ....joints import Fixed, Revolute
 from ....mechanism import Body, Mechanism, Point

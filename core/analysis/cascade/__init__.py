@@ -1,0 +1,1 @@
+"""Large mechanisms whose components can be solved one after the other."""

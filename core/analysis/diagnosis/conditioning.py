@@ -1,0 +1,234 @@
+"""How well the equations determine the motion, sample by sample, and how what is read from it depends on them and on hardpoints.
+
+With J the solved rows and phi their residuals at a pose that closes, q the unknowns and g the numbers of the geometry,
+
+    dq = J^-1 d(residual)          what residuals left over by a solver shift the pose by
+    dq = -J^-1 (d phi / dg) dg     what a hardpoint placed elsewhere shifts it by, drivers held
+
+so both are one factorisation and no neighbouring design is solved; d phi / dg is exact (see `slope`). A redundant row that is left
+out of J need not hold for the changed geometry: its residual then says how much that geometry would contradict itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...algebra import Vec3, vec
+from ...mechanism import Mechanism
+from ...motions import Path
+from ...primitives.base import GROUND_POSE, Motion
+from ...trajectory import Array, Trajectory
+from ..equations.cartesian import Cartesian
+from ..equations.constraints import Frames, constraints
+from ..equations.formulation import Configuration
+from ..equations.geometry import placed, places
+from ..equations.poses import displaced, jacobian, state_of
+from ..model import compile_model, standing_drives
+from ..request import Request
+from ..singular.choice import chosen
+from ..sweep import sweep
+from .screws import Screw, screws
+from .slope import Slope, derivatives
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Derivatives of a point's position [m] at a sample, by components x, y, z.
+
+    Attributes:
+        position: where it is, and where it is at design, global [m], shape (3,).
+        by_residuals: by the residuals of the solved rows [m or rad], shape (3, rows).
+        by_geometry: by the numbers of the places, shape (3, numbers).
+        design_by_geometry: of where it is at design, shape (3, numbers).
+    """
+
+    position: Array
+    design: Array
+    by_residuals: Array
+    by_geometry: Array
+    design_by_geometry: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A sample: how well its pose is determined.
+
+    Attributes:
+        value: of the swept driver or time, as the sweep has it.
+        owners: joint or driver and primitive of each solved row: where those chosen at design are worse than need be, others are.
+        smallest, largest: singular values of the solved rows, lengths in mechanism sizes.
+        orientation: sign of their determinant, against that at design; of all rows if there are more, followed from pose to pose.
+        direction: the motion that the rows determine least.
+        points: gradients by point.
+        contradicted: by how much each redundant row would not hold, by the numbers of the places, shape (redundant rows, numbers).
+    """
+
+    value: float
+    owners: Sequence[tuple[str, str]]
+    smallest: float
+    largest: float
+    orientation: float
+    direction: list[Screw]
+    points: Mapping[str, Gradient]
+    contradicted: Array
+
+    @property
+    def condition(self) -> float:
+        """Largest over smallest singular value."""
+        return self.largest / self.smallest if self.smallest else float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Conditioning:
+    """A sweep, sample by sample.
+
+    Attributes:
+        trajectory: of the whole sweep, with its message where it cannot be followed.
+        poses: at the samples that were looked at; those not reached are left out.
+        numbers: place and component of each number of the geometry, and the length of its vector for a direction, else 1.
+    """
+
+    trajectory: Trajectory
+    poses: Sequence[Pose]
+    numbers: Sequence[tuple[str, int, float]]
+
+
+def conditioning(
+    mechanism: Mechanism, path: Path, values: Array, points: Sequence[str], varied: Sequence[str], samples: int, tol: float
+) -> Conditioning:
+    """Look at up to so many samples of a path, both ends and the one nearest to design among them.
+
+    Args:
+        values: what the sweep is reported by at each sample.
+        points: names of the points that are read.
+        varied: places of the geometry to vary; see `places`.
+
+    Raises:
+        SolveError: the mechanism cannot be solved as described.
+    """
+    drivers, bodies = tuple(path.motions), tuple(body.name for body in mechanism.moving)
+    model = compile_model(mechanism, Request(drivers, (), bodies, order=0))
+    found = sweep(model, path, tol)
+    frame = model.frame
+    drive = path.drive(drivers, path.times)[0]
+    reached = np.flatnonzero(found.solved)
+    at = {int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()}
+    at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
+    geometry = _slopes(mechanism, varied)
+    looked, matrices = list[Pose](), list[Array]()
+    seen = sorted(at & set(reached.tolist()))
+    for k in seen:
+        change = dict(zip(drivers, drive[:, k].tolist(), strict=True))
+        drives = standing_drives(mechanism, frame.unit, change)
+        formulation = Cartesian(constraints(mechanism, frame, drives), frame.moving)
+        pose = displaced(mechanism, frame, {name: (found.bodies[name].r[k], found.bodies[name].p[k]) for name in bodies})
+        configuration = formulation.configuration(_floats(state_of(formulation, mechanism, frame, pose, change)))
+        matrix = jacobian(formulation, configuration)
+        matrices.append(matrix)
+        kept = list(chosen(matrix, [model.selection.kept], len(mechanism.drivers), formulation.conditions))
+        dropped = [row for row in range(len(matrix)) if row not in kept]
+        solved, rest = matrix[kept], matrix[dropped]
+        U, sizes, V = np.linalg.svd(solved)
+        inverse = (V.T / sizes) @ U.T
+        metres = inverse / np.where(_is_length(formulation, solved), frame.unit, 1.0)
+        changed = Cartesian(constraints(placed(mechanism, geometry), frame, drives), frame.moving)
+        phi = changed.phi(configuration)
+        by_geometry = np.array([np.broadcast_to(derivatives(x), (_count(mechanism, varied),)) for x in phi])
+        shift = -inverse @ by_geometry[kept]
+        looked.append(
+            Pose(
+                float(values[k]),
+                [formulation.owners[row] for row in kept],
+                float(sizes[-1]),
+                float(sizes[0]),
+                1.0,
+                screws(formulation, configuration, frame, V[-1]),
+                {name: _gradient(mechanism, frame, formulation, configuration, geometry, name, metres, shift) for name in points},
+                by_geometry[dropped] + rest @ shift,
+            )
+        )
+    numbers = [(place, k, _length(place, value)) for place, value in _varied(mechanism, varied).items() for k in range(len(value))]
+    still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
+    turned = _orientations(matrices, jacobian(still, still.configuration(still.design)), nearest)
+    return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], numbers)
+
+
+def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> list[float]:
+    """Signs of determinants against that at design, from pose to pose, beginning at the one nearest to design.
+
+    Of a tall matrix there is none, but of the product A^T B of two that are near each other: it is the sum over all choices of rows
+    of the products of their determinants, and of square ones the product itself.
+    """
+    found, n = np.ones(len(matrices)), len(matrices)
+    for way in (range(nearest, n), range(nearest, -1, -1)):
+        before, sign = design, 1.0
+        for k in way:
+            sign *= float(np.linalg.slogdet(before.T @ matrices[k])[0])
+            before, found[k] = matrices[k], sign
+    return found.tolist()
+
+
+def _is_length(formulation: Cartesian, rows: Array) -> Array:
+    """Which rows are equations of lengths: those that a shift changes."""
+    first = formulation.columns.values()
+    slides = [k for name, k in formulation.coordinates.items() if name.endswith(".translation")]
+    shifts = [k + axis for k in first for axis in range(3)] + slides
+    return np.abs(rows[:, shifts]).max(axis=1) > 0.0
+
+
+def _varied(mechanism: Mechanism, varied: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    every = places(mechanism)
+    return {place: every[place] for place in varied}
+
+
+def _count(mechanism: Mechanism, varied: Sequence[str]) -> int:
+    return sum(map(len, _varied(mechanism, varied).values()))
+
+
+def _length(place: str, value: Sequence[float]) -> float:
+    """Of a direction, so that a derivative by its components becomes one by its angle; 1 for a point or a length."""
+    return float(np.linalg.norm(value)) if ".axis" in place or ".axes" in place else 1.0
+
+
+def _slopes(mechanism: Mechanism, varied: Sequence[str]) -> dict[str, tuple[Slope, ...]]:
+    count = _count(mechanism, varied)
+    unit_rows = iter(np.eye(count))
+    return {place: tuple(Slope(x, next(unit_rows)) for x in value) for place, value in _varied(mechanism, varied).items()}
+
+
+def _floats(state: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
+    return {name: tuple(map(float, vector)) for name, vector in state.items()}
+
+
+def _gradient(
+    mechanism: Mechanism,
+    frame: Frames,
+    formulation: Cartesian,
+    at: Configuration,
+    geometry: Mapping[str, tuple[Slope, ...]],
+    name: str,
+    inverse: Array,
+    shift: Array,
+) -> Gradient:
+    point = mechanism.point(name)
+    pose, arm = at.poses.get(point.body, GROUND_POSE), frame.arm(point.body, point.position)
+    turned = pose.turn(arm)
+    by_unknowns = np.zeros((3, formulation.unknowns))
+    if point.body in formulation.columns:
+        first = formulation.columns[point.body]
+        for k in range(6):
+            rates = [float(k == column) for column in range(6)]
+            by_unknowns[:, first + k] = [*Motion(vec(rates[:3]), vec(rates[3:])).of(turned)]
+    by_unknowns *= frame.unit
+    own = geometry.get(f"points.{name}.position")
+    moved: Vec3 = vec(own) if own else vec(point.position)
+    # the body carries its point along: A times the change of where it is at design
+    design = np.array([np.broadcast_to(derivatives(x), shift.shape[1:]) for x in moved])
+    along = np.array([np.broadcast_to(derivatives(x), shift.shape[1:]) for x in pose.turn(moved)])
+    position = vec(point.position) + frame.unit * (pose.u + pose.swing(arm))
+    here, there = np.array([*position]), np.array(point.position)
+    return Gradient(here, there, by_unknowns @ inverse, by_unknowns @ shift + along, design)

@@ -1,0 +1,219 @@
+"""The equations of a mechanism: its joints and drivers as primitives between bodies, over any scalar.
+
+Lengths are measured in a power of two of metres near the mechanism's size, which is exact and makes rows of lengths and of angles
+alike in size. Every moving body gets an internal origin at one of its joints, so that the arm of that joint is a literal zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from statistics import median
+from typing import Any, Never
+
+from ... import primitives as p
+from ...algebra import ZERO, Vec3, vec
+from ...drivers import Driver, JointDriver, PointCoordinate
+from ...errors import SolveError
+from ...joints import Attachment, AxialJoint, Joint
+from ...joints.base import unit
+from ...mechanism import GROUND, Mechanism
+from ...primitives.base import Drive
+from ...topology import spanning_tree
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A primitive between two bodies, and the joint or driver it belongs to.
+
+    Attributes:
+        coordinate: the unknown that drives the primitive, as JOINT.rotation or JOINT.translation; empty where none does.
+    """
+
+    owner: str
+    primitive: p.Primitive
+    i: str
+    j: str
+    coordinate: str = ""
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A linear row between coordinates: the weighted sum is the drive's value (zero unless driven)."""
+
+    owner: str
+    weights: Mapping[str, float]
+    drive: Drive = field(default_factory=Drive)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """How the mechanism is measured: the length unit [m], the internal origin of every body [units], and which bodies move."""
+
+    unit: float
+    origins: Mapping[str, Vec3]
+    moving: tuple[str, ...]
+
+    def arm(self, body: str, position: Sequence[float]) -> Vec3:
+        """From the internal origin of the body to a point, at design [units]."""
+        return (1.0 / self.unit) * vec(position) - self.origins[body]
+
+
+def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
+    """The length unit, unless it is given, and the internal origins: at the joint by which the spanning tree reaches a body."""
+    if length_unit is None:
+        length_unit = 2.0 ** round(math.log2(_size(mechanism)))
+    origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
+    touching: dict[str, list[Joint]] = {}
+    for joint in mechanism.joints:
+        for body in joint.bodies:
+            touching.setdefault(body, []).append(joint)
+    for branch in spanning_tree(mechanism).branches:
+        at = joint_points(branch.joint) if branch.joint is not None else []
+        if not at:  # a free body, or a joint without a point: the first point any joint has on it
+            at = [q for joint in touching.get(branch.child, ()) for q in joint_points(joint, branch.child)]
+        position = at[0] if at else mechanism.body(branch.child).origin
+        origins[branch.child] = (1.0 / length_unit) * vec(position)
+    return Frames(length_unit, origins, tuple(body.name for body in mechanism.moving))
+
+
+def measured(mechanism: Mechanism) -> tuple[float, Frames]:
+    """A large mechanism's size, and frames whose unit of length is near the size of its bodies; powers of two of metres."""
+    whole = frames(mechanism)
+    points: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+    for joint in mechanism.joints:
+        for body in joint.bodies:
+            points[body] += joint_points(joint, body)
+    extents = [max(max(axis) - min(axis) for axis in zip(*points[body], strict=True)) for body in whole.moving if points[body]]
+    sizes = [extent for extent in extents if extent > 0.0]
+    unit = 2.0 ** round(math.log2(median(sizes))) if sizes else whole.unit
+    return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
+
+
+def _size(mechanism: Mechanism) -> float:
+    """The extent of the joints' points [m]; where they have none, as around a single pivot, of these and all others.
+
+    A metre in its place would be the unit of a mechanism of micrometres: its residuals are too small to be seen, and its
+    singular values too.
+    """
+    joints = [point for joint in mechanism.joints for point in joint_points(joint)]
+    for places in (joints, joints + [point.position for point in mechanism.points]):
+        extent = max((max(axis) - min(axis) for axis in zip(*places, strict=True)), default=0.0)
+        if extent > 0.0:
+            return extent
+    return 1.0
+
+
+def joint_points(joint: Joint, body: str | None = None) -> list[tuple[float, float, float]]:
+    """The points of a joint, global at design [m]; only those on the body if one is named."""
+    point, pair = getattr(joint, "point", None), getattr(joint, "points", ())
+    if point is not None:
+        return [point]
+    return [q for q, owner in zip(pair, joint.bodies, strict=False) if body in (None, owner)]
+
+
+class Style(StrEnum):
+    """How rows are written; the same solutions, the same machinery."""
+
+    NATIVE = "native"
+    PAPER = "paper"
+    CONVENTIONAL = "conventional"
+    MIXED = "mixed"
+    RELATIVE = "relative"
+
+    @classmethod
+    def _missing_(cls, value: object) -> Never:
+        raise SolveError(f"there is no style {value!r}; known: {', '.join(cls)}")
+
+
+def constraints(
+    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE, *, keep_fixed: bool = False
+) -> list[Constraint | Relation]:
+    """All constraints: joints in order, then couplers, then drivers in order.
+
+    Args:
+        drives: the motion of each driver by name; drivers not named hold their design value.
+        style: how rows are written. MIXED and RELATIVE name the coordinates of all axial joints, the others those of couplers.
+        keep_fixed: fixed bodies move in principle and are held by ground rows, as in the paper's count; else they are ground.
+    """
+    mixed = style in (Style.MIXED, Style.RELATIVE)
+    coupled = {f"{joint}.{freedom}" for c in mechanism.couplers for joint, freedom in zip(c.joints, c.freedoms, strict=True)}
+    found: list[Constraint | Relation] = []
+    if keep_fixed:
+        found += [Constraint(body.name, p.Ground(), GROUND, body.name) for body in mechanism.bodies if body.fixed]
+    for original in mechanism.joints:
+        if isinstance(original, AxialJoint):
+            found += _axial(original, frame, coupled, mixed=mixed, fixed_last=mechanism.is_fixed(original.j))
+            continue
+        # the ground as body i: its rows are constant and the simplified ones need nothing of body j
+        joint = original.reversed() if original.symmetric and mechanism.is_fixed(original.j) else original
+        i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
+        composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
+        found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
+    for coupler in mechanism.couplers:
+        terms = zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)
+        found.append(_relation(coupler.name, {f"{joint}.{freedom}": k for joint, freedom, k in terms}, frame))
+    found += [_driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed) for each in mechanism.drivers]
+    return _restyled(found, style)
+
+
+def _axial(
+    original: AxialJoint, frame: Frames, coupled: Collection[str], *, mixed: bool, fixed_last: bool
+) -> list[Constraint | Relation]:
+    """An axial joint; its coordinates are named where they are coupled, related to each other, or the style names all."""
+    related = {f"{original.name}.{freedom}" for relation in original.relations for freedom in relation}
+    named = [f for f in original.freedoms if mixed or (name := f"{original.name}.{f}") in coupled or name in related]
+    # the ground as body i: its rows are constant; but a named coordinate is that of body j relative to body i, in this order
+    joint = original.reversed() if fixed_last and not named else original
+    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
+    scaled = joint.scaled(1.0 / frame.unit)
+    composed = [(primitive, "") for primitive in scaled.primitives(i, j)]
+    if mixed:
+        composed = [(primitive, freedom * (freedom in joint.freedoms)) for primitive, freedom in scaled.mixed(i, j)]
+    else:
+        composed += [(scaled.measured(freedom, i, j), freedom) for freedom in named]
+    found: list[Constraint | Relation] = [
+        Constraint(joint.name, primitive, joint.i, joint.j, f"{joint.name}.{freedom}" if freedom else "")
+        for primitive, freedom in composed
+    ]
+    weights = ({f"{joint.name}.{freedom}": k for freedom, k in relation.items()} for relation in original.relations)
+    return found + [_relation(joint.name, each, frame) for each in weights]
+
+
+def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relation:
+    """Weights in metres and radians to weights in units and radians, the largest made one."""
+    scaled = {name: k * (frame.unit if name.endswith(".translation") else 1.0) for name, k in weights.items()}
+    largest = max(map(abs, scaled.values()))
+    return Relation(owner, {name: k / largest for name, k in scaled.items()})
+
+
+def _driven(mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, mixed: bool) -> Constraint | Relation:
+    """The constraint of a driver that moves as the drive says."""
+    if isinstance(driver, PointCoordinate):
+        point = mechanism.point(driver.point)
+        arm = frame.arm(point.body, point.position)
+        return Constraint(driver.name, p.DrivenCoordinate(unit(driver.direction), arm, drive), GROUND, point.body)
+    joint = mechanism.joint(driver.joint) if isinstance(driver, JointDriver) else None
+    if not isinstance(joint, AxialJoint) or not isinstance(driver, JointDriver):
+        raise SolveError(f"driver {driver.name!r} ({driver.type}) is of a kind the native formulation cannot drive")
+    if mixed:
+        return Relation(driver.name, {f"{joint.name}.{driver.freedom}": 1.0}, drive)
+    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
+    primitive: Any = joint.scaled(1.0 / frame.unit).measured(driver.freedom, i, j)
+    return Constraint(driver.name, replace(primitive, drive=drive), joint.i, joint.j)
+
+
+def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
+    """The constraints with every primitive replaced by its twins in the style."""
+    if style not in (Style.PAPER, Style.CONVENTIONAL):
+        return list(found)
+    from ...primitives import conventional, paper  # rarely asked for
+
+    twins = {Style.PAPER: paper.TWINS, Style.CONVENTIONAL: conventional.TWINS}[style]
+    styled: list[Constraint | Relation] = []
+    for c in found:
+        styled += [c] if isinstance(c, Relation) else [replace(c, primitive=t) for t in twins[type(c.primitive)](c.primitive)]
+    return styled

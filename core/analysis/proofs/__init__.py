@@ -1,0 +1,1 @@
+"""Samples that are proved: exact numbers, ball arithmetic, Krawczyk's test."""

@@ -1,0 +1,217 @@
+"""Proofs: near an approximate pose there is exactly one solution, and here is a ball that contains it.
+
+Krawczyk's test. F(X) = 0 are the residuals of the traced equations over displacements, Euler parameters and coordinates, and the
+lengths of the Euler parameters. With an approximate solution X, any matrix Y near the inverse of F', and B the box of radius r
+around X, let
+
+    c = |Y F(X)|,      k = |I - Y F'(B)|           (largest component, largest row sum; evaluated in balls)
+
+If c + k r < r, B holds exactly one zero of F; it is no farther from X than c / (1 - k). F' is the derivative of the traced
+residuals, so nothing rests on the rows that the solver uses. That the zero is on the intended branch is proved by the sign of the
+branch tests. Velocities and accelerations follow from F(X(t), t) = 0, expanded in the time: linear systems with the matrix F'.
+
+In a singular pose F' has no inverse, the test cannot succeed, and the sample is reported as not proved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import KincheckError
+from ...program.ball_executor import ORDER, Ball, evaluate, flint
+from ...trajectory import Array
+from .exact import Equations
+
+# Radii of B that are tried, in units of the mechanism's size: the largest that succeeds says how far around the solution is alone.
+RADII = tuple(2.0**-k for k in (7, 14, 21, 28, 35, 42, 49))
+# A step of Newton's iteration gains three digits or more, but near a singular pose.
+MOST_STEPS = 60
+# Steps end this many bits above the working precision, where their own round-off begins.
+SPARE_BITS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosure:
+    """A proved sample.
+
+    Attributes:
+        points: position less that of the design [m], velocity [m/s] and acceleration [m/s^2] of each point, as balls, shape (3, 3).
+        alone: radius of the box in which the solution is the only one [units of the mechanism's size, or rad].
+        contraction: k of the test in that box: below one.
+        left_out: the rows that were left out, at the solution: zero where the redundant rows agree with the others.
+        branch: the branch tests, all proved positive.
+    """
+
+    points: Mapping[str, Sequence[Sequence[Ball]]]
+    alone: float
+    contraction: float
+    left_out: Sequence[Ball]
+    branch: Sequence[Ball]
+
+
+class UnprovedError(KincheckError, ArithmeticError):
+    """There is no proof for a sample; the message says why."""
+
+
+def enclose(equations: Equations, points: Sequence[str], pose: Array, drives: Sequence[Sequence[Ball]], bits: int) -> Enclosure:
+    """Prove one sample; to be called at the precision of the equations.
+
+    Args:
+        points: names of the points, as the equations were made for.
+        pose: approximate state, shape (size,).
+        drives: for each moving driver value [units or rad], velocity and acceleration, exact or as balls.
+        bits: the precision.
+
+    Raises:
+        UnprovedError: the pose is singular, too far from a solution, or near one on another branch.
+    """
+    sample, start = _Sample(equations, drives), [flint().arb(x) for x in pose.tolist()]
+    X, c, inverse = _refine(sample, start, bits)
+    alone, contraction = _alone(sample, inverse, X, c)
+    moved = _float(_largest([x - x0 for x, x0 in zip(X, start, strict=True)]))
+    if moved > alone:
+        raise UnprovedError(
+            f"the solution that Newton's iteration reaches is {moved:.3g} of the mechanism's size from the approximate pose, and "
+            f"proved to be the only one within {alone:.3g}: it may be another one"
+        )
+    solution = [x + _around(c / (1 - contraction)) for x in X]
+    tests = sample.tests(solution)
+    left_out, branch = tests[: equations.left_out], tests[equations.left_out :]
+    for value in branch:
+        if not value > 0:
+            raise UnprovedError(f"the solution is not on the intended branch, axes are turned over: their cosine is {value.str(5)}")
+    try:
+        motion = sample.motion(solution)
+    except ZeroDivisionError:
+        raise UnprovedError("singular pose: the Jacobian is not proved to have an inverse") from None
+    return Enclosure(dict(zip(points, motion, strict=True)), alone, _float(contraction), left_out, branch)
+
+
+class _Sample:
+    """The equations at the drivers' values of one sample; vectors are columns of balls."""
+
+    def __init__(self, equations: Equations, drives: Sequence[Sequence[Ball]]) -> None:
+        self._equations = equations
+        arb, series = flint().arb, flint().arb_series
+        self._still: list[Ball] = []
+        self._moving: list[Ball] = []
+        for value, velocity, acceleration in drives:
+            half = arb(value) / 2
+            self._still += [arb(value), half.cos(), half.sin()]
+            moving = series([value, velocity, arb(acceleration) / 2], prec=ORDER)
+            self._moving += [moving, (moving / 2).cos(), (moving / 2).sin()]
+
+    def _run(self, name: str, state: Sequence[Ball], drives: Sequence[Ball]) -> dict[int, Ball]:
+        return evaluate(getattr(self._equations, name), [*state, *drives, *self._equations.geometry])
+
+    def residuals(self, state: Sequence[Ball]) -> Any:
+        """F, shape (size, 1)."""
+        return _column([*self._run("residuals", state, self._still).values()])
+
+    def derivative(self, state: Sequence[Ball]) -> Any:
+        """F', shape (size, size)."""
+        n = self._equations.size
+        matrix = flint().arb_mat(n, n)
+        for slot, value in self._run("derivative", state, self._still).items():
+            matrix[divmod(slot, n)] = value
+        return matrix
+
+    def tests(self, state: Sequence[Ball]) -> list[Ball]:
+        """The rows that were left out, then the branch tests."""
+        return [*self._run("tests", state, self._still).values()]
+
+    def motion(self, state: Sequence[Ball]) -> list[list[list[Ball]]]:
+        """Displacement, velocity and acceleration of each point, shape (points, 3, 3).
+
+        Raises:
+            ZeroDivisionError: F' is not proved to have an inverse.
+        """
+        series, inverse = flint().arb_series, self.derivative(state).inv()
+        coefficients = [list(state)]
+        for order in (1, 2):  # the unknown coefficient enters its own order through F' alone
+            known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
+            rest = [_coefficient(x, order) for x in self._run("residuals", known, self._moving).values()]
+            coefficients.append((-inverse * _column(rest)).entries())
+        known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
+        moved = [*self._run("points", known, self._moving).values()]
+        motions = [[factor * _coefficient(x, order) for x in moved] for order, factor in enumerate((1, 1, 2))]
+        return [[each[k : k + 3] for each in motions] for k in range(0, len(moved), 3)]
+
+
+def _inverse(sample: _Sample, x: Sequence[Ball]) -> Array:
+    """The inverse of F' in double precision."""
+    try:
+        inverse = np.linalg.inv(np.array(sample.derivative(x).tolist(), dtype=np.float64)).astype(np.float64)
+    except np.linalg.LinAlgError:
+        raise UnprovedError("singular pose: the Jacobian has no inverse") from None
+    if not np.isfinite(inverse).all():
+        raise UnprovedError("singular pose: the Jacobian has no finite inverse")
+    return inverse
+
+
+def _refine(sample: _Sample, start: Sequence[Ball], bits: int) -> tuple[list[Ball], Ball, Array]:
+    """The pose after Newton's iteration, c there, and Y; taken anew where it gains less than three digits a step."""
+    x, inverse, before = list(start), _inverse(sample, start), float("inf")
+    for _ in range(MOST_STEPS):
+        step = flint().arb_mat(inverse.tolist()) * sample.residuals(x)
+        c = _largest(step.entries())
+        if c < flint().arb(2) ** (SPARE_BITS - bits):
+            return x, c, inverse
+        size = _float(c)
+        if not size < 0.5 * before:
+            break
+        x = [(old - change).mid() for old, change in zip(x, step.entries(), strict=True)]
+        if size > 1e-3 * before:
+            inverse = _inverse(sample, x)
+        before = size
+    raise _singular(f"or no solution near: Newton's iteration stops at steps of {before:.1g}", inverse)
+
+
+def _alone(sample: _Sample, inverse: Array, X: Sequence[Ball], c: Ball) -> tuple[float, Ball]:
+    """The largest radius tried for which the test succeeds, and k there."""
+    Y, identity, smallest = flint().arb_mat(inverse.tolist()), flint().arb_mat(len(X), len(X), 1), float("inf")
+    for radius in RADII:
+        box = [x + _around(flint().arb(radius)) for x in X]
+        rows = (identity - Y * sample.derivative(box)).tolist()
+        k = _largest([sum((abs(x) for x in row), flint().arb(0)) for row in rows])
+        if c + k * radius < radius:
+            return radius, k
+        smallest = min(smallest, _float(k))
+    raise _singular(f"or near one: contraction {smallest:.3g} in the best box, expected below 1", inverse)
+
+
+def _singular(how: str, inverse: Array) -> UnprovedError:
+    smallest = 1.0 / float(np.linalg.norm(inverse, 2))
+    return UnprovedError(f"singular pose, {how}; the smallest singular value of the Jacobian is {smallest:.2g}")
+
+
+def _column(values: Sequence[Ball]) -> Any:
+    return flint().arb_mat(len(values), 1, list(values))
+
+
+def _coefficient(x: Ball, order: int) -> Ball:
+    """Of a series; a program may also put out a number that does not depend on the time."""
+    if isinstance(x, flint().arb_series):
+        return x[order]
+    return x if order == 0 else flint().arb(0)
+
+
+def _largest(values: Sequence[Ball]) -> Ball:
+    """A number not below any |value|; infinite where a ball is not finite."""
+    if not all(value.is_finite() for value in values):
+        return flint().arb.pos_inf()
+    return max((value.abs_upper() for value in values), default=flint().arb(0))
+
+
+def _around(radius: Ball) -> Ball:
+    """The ball of that radius around zero."""
+    return flint().arb(0, radius.abs_upper())
+
+
+def _float(x: Ball) -> float:
+    """An upper bound as a float, for people to read."""
+    return float(np.nextafter(float(x.abs_upper()), np.inf))

@@ -1,0 +1,142 @@
+"""Proved samples of a sweep: the native solution of each sample, and the ball that is proved to hold the true one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ...algebra import ZERO, Quat, vec
+from ...mechanism import Mechanism
+from ...motions import Path, outwards
+from ...primitives.base import GROUND_POSE, Drive, Pose
+from ...program.ball_executor import Ball, flint, precision
+from ...trajectory import Array, BodyMotion, Trajectory
+from ..equations.cartesian import Cartesian
+from ..equations.constraints import Constraint, Frames, constraints, frames
+from ..model import compile_model
+from ..request import Request
+from ..singular.choice import chosen_at
+from ..sweep import sweep
+from .enclosure import Enclosure, UnprovedError, enclose
+from .exact import Reading, equations, exact_mechanism
+
+Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]
+"""Value from the design, velocity and acceleration [SI] of each moving driver at every sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proofs:
+    """Proofs of all samples.
+
+    Attributes:
+        samples: in the order of the path.
+        seconds: of each sample, without the native solution [s].
+        native: the native solution, from which the proofs start; they do not rest on it.
+        rows: the equations that the proofs are about, as "joint: primitive".
+        redundant: those that were left out, because the others say the same at the design position.
+        others: by sample, those left out where the choice at the design is worse than need be.
+    """
+
+    samples: Sequence[Enclosure | UnprovedError]
+    seconds: Sequence[float]
+    native: Trajectory
+    rows: Sequence[str]
+    redundant: Sequence[str]
+    others: Mapping[int, Sequence[str]]
+
+
+def prove(
+    mechanism: Mechanism, path: Path, points: Sequence[str], drives: Drives, reading: Reading, bits: int, tol: float
+) -> Proofs:
+    """Prove the samples of a path.
+
+    Args:
+        points: names of the points whose motion is wanted.
+        drives: the exact values of the moving drivers, which the path has as doubles.
+        reading: how the numbers of the mechanism are understood.
+        bits: working precision.
+        tol: of the native solution; see `solve`.
+
+    Raises:
+        SolveError: as `solve`.
+        KincheckError: python-flint is not installed.
+    """
+    flint()
+    model = compile_model(mechanism, Request(tuple(path.motions), tuple(points), tuple(body.name for body in mechanism.moving)))
+    native = sweep(model, path, tol)
+    poses = _states(mechanism, native, path.times)
+    samples: list[Enclosure | UnprovedError] = []
+    seconds: list[float] = []
+    others: dict[int, Sequence[str]] = {}
+    names = [f"{owner}: {primitive}" for owner, primitive in Cartesian(constraints(mechanism, model.frame, {}), ()).owners]
+    with precision(bits):
+        exact, kept = exact_mechanism(mechanism, reading), model.selection.kept
+        traced = {kept: equations(exact, tuple(drives), points, kept)}
+        unit = traced[kept].frame.unit
+        units = [1 if mechanism.driver(name).type == "joint_angle" else Fraction(unit) for name in drives]
+        for k, reached in enumerate(native.solved):
+            started = perf_counter()
+            driven = [[_ball(x / unit) for x in drives[name][k]] for name, unit in zip(drives, units, strict=True)]
+            try:
+                if not reached:
+                    raise UnprovedError(f"there is no approximate pose to start from: {native.message}")
+                change = {name: float(drives[name][k][0]) for name in drives}
+                rows = chosen_at(mechanism, change, poses[k], kept) if model.selection.dropped else kept
+                if rows not in traced:
+                    traced[rows] = equations(exact, tuple(drives), points, rows)
+                if rows != kept:
+                    others[k] = [names[row] for row in range(len(names)) if row not in rows]
+                samples.append(enclose(traced[rows], points, poses[k], driven, bits))
+            except UnprovedError as error:
+                samples.append(error)
+            seconds.append(perf_counter() - started)
+    solved, redundant = ([names[k] for k in each] for each in (kept, model.selection.dropped))
+    return Proofs(samples, seconds, native, solved, redundant, others)
+
+
+def _ball(x: Fraction) -> Ball:
+    return flint().arb(flint().fmpq(x.numerator, x.denominator))
+
+
+def _states(mechanism: Mechanism, native: Trajectory, times: Array) -> Array:
+    """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies, shape (n, size)."""
+    frame = frames(mechanism)
+    poses = {name: _pose(mechanism, frame, name, motion) for name, motion in native.bodies.items()}
+    found = [x for name in frame.moving for x in poses[name].u]
+    found += [x for name in frame.moving for x in poses[name].q]
+    named = {c.coordinate: c for c in constraints(mechanism, frame, {}) if isinstance(c, Constraint) and c.coordinate}
+    found += [_coordinate(c, poses, times, native) for c in named.values()]
+    return np.stack(found, axis=1)
+
+
+def _pose(mechanism: Mechanism, frame: Frames, name: str, motion: BodyMotion) -> Pose:
+    """Displacement of the internal origin [units] and rotation since the design, from the motion of the body's own frame."""
+    body = mechanism.body(name)
+    e0, *e = body.euler_parameters
+    q = Quat(motion.p.T[0], vec([*motion.p.T[1:]])) * Quat(e0, vec(e)).conjugate()
+    turned = Pose.of(ZERO, q)
+    lever = frame.origins[name] - (1.0 / frame.unit) * vec(body.origin)
+    return Pose.of((1.0 / frame.unit) * (vec([*motion.r.T]) - vec(body.origin)) + turned.swing(lever), q)
+
+
+def _coordinate(c: Constraint, poses: Mapping[str, Pose], times: Array, native: Trajectory) -> Array:
+    """A joint's own turn [rad] or displacement [units], from the residual that would vanish at it, shape (n,)."""
+
+    def residual(**drive: float) -> Array:
+        primitive: Any = c.primitive
+        (value,) = replace(primitive, drive=Drive(**drive)).phi(poses.get(c.i, GROUND_POSE), poses.get(c.j, GROUND_POSE))
+        return value
+
+    if c.coordinate.endswith(".translation"):
+        return residual(c=0.0)
+    turn = 2.0 * np.arctan2(residual(half_cos=1.0, half_sin=0.0), -residual(half_cos=0.0, half_sin=1.0))
+    # turns are counted from the design outwards; a sweep so coarse that they are miscounted fails to be proved
+    for side in outwards(times, 0.0):
+        outward = side[native.solved[side]]
+        turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
+    return turn

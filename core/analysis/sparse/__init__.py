@@ -1,0 +1,1 @@
+"""Large mechanisms that cannot be divided: one sparse system."""

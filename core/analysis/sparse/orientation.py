@@ -1,0 +1,57 @@
+"""The signs of the determinants of a large sparse matrix, block by block: as `Elimination.orientation` has them of a small one."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from ...trajectory import Array
+from ..structure.factors import Indices
+
+
+class Blocks:
+    """The blocks of a pattern that can be solved one after the other.
+
+    All but the largest are taken to be small: they are made dense.
+    """
+
+    def __init__(self, rows: Indices, columns: Indices, n: int) -> None:
+        sparse: Any = importlib.import_module("scipy.sparse")
+        graphs: Any = importlib.import_module("scipy.sparse.csgraph")
+        pattern = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+        row_of: Indices = graphs.maximum_bipartite_matching(pattern, perm_type="row")
+        needs = sparse.csr_array((np.ones(len(rows)), (rows, row_of[columns])), shape=(n, n))
+        _, block = graphs.connected_components(needs, directed=True, connection="strong")
+        sizes = np.bincount(block)
+        sizes[sizes.argmax()] = 0
+        # of every row its place in its block, and of every column that of its row
+        order = np.argsort(block, kind="stable")
+        place = np.empty(n, np.intp)
+        place[order] = np.arange(n) - np.searchsorted(block[order], block[order])
+        inside = block[rows] == block[row_of[columns]]
+        self._groups: list[tuple[int, Indices, Indices]] = []
+        for size in np.unique(sizes[sizes > 0]).tolist():
+            number = np.where(sizes == size, np.cumsum(sizes == size) - 1, -1)
+            entries = np.flatnonzero(inside & (number[block[rows]] >= 0))
+            at = (number[block[rows[entries]]] * size + place[rows[entries]]) * size + place[row_of[columns[entries]]]
+            self._groups.append((size, entries, at))
+
+    def orientation(self, values: Array, whole: Array) -> list[bytes]:
+        """Of several poses the sign of each block's determinant, each right at all values, or at none.
+
+        Args:
+            values: of the entries, in the order of the pattern, shape (entries, poses).
+            whole: of the sign of the whole determinant, from which that of the largest block follows, shape (poses,).
+        """
+        poses = len(whole)
+        signs = [np.ones((poses, 1))]
+        for size, entries, at in self._groups:
+            dense = np.zeros((poses, at.max() // (size * size) + 1, size, size))
+            dense.reshape(poses, -1)[:, at] = values.take(entries, axis=0).T
+            # most blocks are of one row
+            signs.append(np.sign(dense[..., 0, 0]) if size == 1 else np.linalg.slogdet(dense)[0])
+        small = np.concatenate(signs, axis=1)
+        found = np.column_stack([small, np.sign(whole) * small.prod(axis=1)])
+        return [each.tobytes() for each in found.astype(np.int8)]

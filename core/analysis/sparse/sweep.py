@@ -1,0 +1,245 @@
+"""Sweep a large mechanism as one sparse system, outwards from the design position."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...algebra import Quat, Vec3, cross, rotation_less_identity, vec
+from ...mechanism import Mechanism
+from ...motions import Path, outwards
+from ...primitives.base import Motion, Pose
+from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ..march import HALVINGS, Headway
+from .model import FailedError, SparseModel, Stand
+from .together import REMEMBERED
+from .turning import euler_parameters
+
+
+def solve_sparse(
+    mechanism: Mechanism | SparseModel,
+    path: Path,
+    points: Sequence[str] = (),
+    bodies: Sequence[str] = (),
+    order: int = 2,
+    tol: float = 1e-12,
+) -> Trajectory:
+    """Solve a mechanism over the samples of a path, as one sparse system.
+
+    Args:
+        mechanism: what to solve; made ready (`SparseModel`) where it is to be solved more than once.
+        points, bodies: names whose motion is wanted.
+        order: 0 for positions, 1 for velocities too, 2 for accelerations too.
+        tol: largest accepted constraint residual, relative to the size of the bodies.
+
+    Returns:
+        The motion; NaN where a sample cannot be reached, and the reason in its message.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
+    """
+    model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
+    return _Sweep(model, path, tol, _Wanted(model, points), _Wanted(model, bodies, frames=True)).solve(order)
+
+
+AT_ONCE = 64
+"""Stands whose motions are computed together: one alone takes as many calls of numpy."""
+WORTH = 4
+"""Samples on one side that are worth making tables for: that takes what 12 (43 bodies) to 36 (1,999) save, once for all sweeps."""
+
+
+class _Wanted:
+    """Points whose motion is wanted: of bodies the origins, and how their frames turn."""
+
+    def __init__(self, model: SparseModel, names: Sequence[str], *, frames: bool = False) -> None:
+        m, self.names, self._model = model.mechanism, names, model
+        found = [(name, m.body(name).origin) if frames else (m.point(name).body, m.point(name).position) for name in names]
+        number = {name: k for k, name in enumerate(model.frame.moving)}
+        # what is not among the moving bodies comes after them, and stands still
+        self._body = np.array([number.get(body, len(number)) for body, _ in found], np.intp)
+        self._position = _columns([position for _, position in found], 3)
+        self._arm = _columns([tuple(model.frame.arm(body, position)) for body, position in found], 3)
+        self._frame = _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
+
+    def _taken(self, at: Sequence[Stand]) -> list[Array]:
+        """What their motion follows from: poses, rates and accelerations of their bodies, shapes (7 or 6, stands, names)."""
+        n, found = self._model.bodies, list[Array]()
+        for rows, each in ((7, [k.state for k in at]), (6, [k.rates for k in at]), (6, [k.accelerations for k in at])):
+            whole = np.zeros((rows, len(at), n + 1))
+            whole[:, :, :n] = np.array(each)[:, : rows * n].reshape(len(at), rows, n).swapaxes(0, 1)
+            found.append(whole)
+        found[0][3, :, n] = 1.0
+        return [each[:, :, self._body] for each in found]
+
+    def motions(self, at: Sequence[Stand]) -> Array:
+        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape (stands, components, names)."""
+        metres, (poses, rates, accelerations) = self._model.frame.unit, self._taken(at)
+        pose, motion = Pose.of(vec([*poses[:3]]), euler_parameters(poses[3:])), Motion(vec([*rates[:3]]), vec([*rates[3:]]))
+        v_t, w_t = vec([*accelerations[:3]]), vec([*accelerations[3:]])
+        arm = vec([*self._arm])
+        turned = pose.turn(arm)
+        found: list[Vec3 | Quat] = [
+            vec([*self._position]) + metres * (pose.u + pose.swing(arm)),
+            metres * motion.of(turned),
+            metres * (v_t + cross(w_t, turned) + motion.centripetal(turned)),
+        ]
+        if self._frame is not None:
+            p = pose.q * euler_parameters(self._frame)
+            to_body = rotation_less_identity(p).T
+            found += [p, motion.w + to_body @ motion.w, w_t + to_body @ w_t]
+        shape = len(at), len(self.names)
+        return np.stack([np.broadcast_to(component, shape) for each in found for component in each], axis=1)
+
+
+def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
+    return np.array(rows).reshape(-1, count).T
+
+
+@dataclass
+class _Sweep:
+    """A path through a model, and what is found along it."""
+
+    model: SparseModel
+    path: Path
+    tol: float
+    points: _Wanted
+    bodies: _Wanted
+    messages: list[str] = field(default_factory=list[str])
+    smallest_pivot: float = np.inf
+
+    def solve(self, order: int) -> Trajectory:
+        """The motion at all samples."""
+        path, n = self.path, len(self.path.times)
+        stands = {name: np.full(n, np.nan) for name in ("closure", "leftover", "iterations")}
+        wanted = (self.points, self.bodies)
+        found = [np.full((n, size, len(each.names)), np.nan) for each, size in zip(wanted, (9, 19), strict=True)]
+        departure = self._departure()
+        for side in outwards(path.times, path.start):
+            if departure is None or not len(side):
+                continue
+            followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
+            while some := list(islice(followed, AT_ONCE)):
+                reached = [k for _, k in some]
+                for name, values in stands.items():
+                    values[reached] = [getattr(at, name) for at, _ in some]
+                for into, each in zip(found, wanted, strict=True):
+                    if each.names:
+                        into[reached] = each.motions([at for at, _ in some])
+        return self._trajectory(found, stands, order)
+
+    def _departure(self) -> Stand | None:
+        """Where the samples are followed from: the design, or the first sample where it is elsewhere; None if that cannot be."""
+        model, path, here, start = self.model, self.path, self.model.design, self.path.start
+        try:
+            if not path.from_design:
+                way = path.lead_in()
+                here = model.moving(here, 0.0, model.drives(way, np.zeros(1))[:, 0])
+                for there in self._follow(here, way, way.times):
+                    here = there
+                if self.messages:
+                    self.messages[:] = [f"on the way to the first sample: {self.messages[0]}"]
+                    return None
+            return model.moving(here, start, model.drives(path, np.array([start]))[:, 0])
+        except FailedError as error:
+            self.messages.append(f"the motion cannot start at {path.where(start)}: {error}")
+            return None
+
+    def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
+        """Where the motion stands at each of the times, outwards, until it ends; then there is a message."""
+        drives, together = self.model.drives(path, times), self.model.together if len(times) >= WORTH else None
+        before: deque[Stand] = deque([here], REMEMBERED)
+        k = alone = 0
+        while k < len(times):
+            found: list[Stand] = []
+            if together and k >= alone:
+                found = together.reach(before, times[k:], drives[:, k:], self.tol)
+                if not found:  # from here on by pivots that are chosen
+                    alone = k + together.width
+                    try:
+                        here = self.model.moving(here, here.time, self.model.drives(path, np.array([here.time]))[:, 0])
+                    except FailedError as error:
+                        self._end(here, path, times, k, str(error))
+                        return
+            if not found:
+                here, why = self._reach(here, path, float(times[k]), drives[:, k])
+                if why:
+                    self._end(here, path, times, k, why)
+                    return
+                found = [here]
+                if together and together.outgrown:
+                    together.order(self.model)
+            for here in found:
+                if here.time == before[-1].time:
+                    before.pop()
+                before.append(here)
+                self.smallest_pivot = min(self.smallest_pivot, here.pivot)
+                yield here
+            k += len(found)
+
+    def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> tuple[Stand, str]:
+        """Go to a time, in parts where need be: where that ends, and why before that time."""
+        headway = Headway(here.time)
+        while not (stopped := headway.stopped(here.time, time)):
+            try:
+                return self.model.reach(here, time, drives, self.tol), ""
+            except FailedError:
+                try:
+                    here = self._part(here, path, time)
+                except FailedError as error:
+                    return here, str(error)
+        return here, stopped
+
+    def _part(self, here: Stand, path: Path, time: float) -> Stand:
+        """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).
+
+        Raises:
+            FailedError: there is none.
+        """
+        last, longer = FailedError(), None
+        for k in range(1, HALVINGS + 1):
+            part = here.time + (time - here.time) * 0.5**k
+            try:
+                found = self.model.reach(here, part, self.model.drives(path, np.array([part]))[:, 0], self.tol)
+            except FailedError as error:
+                last, longer = error, None
+                continue
+            if longer is not None:
+                return longer
+            longer = found
+        raise last
+
+    def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
+        where = path.where
+        self.smallest_pivot = min(self.smallest_pivot, here.pivot)
+        last = f"last reachable sample at {where(float(times[k - 1]))}" if k else "no sample reached on this side"
+        self.messages.append(
+            f"cannot be followed beyond {where(here.time)} (wanted {where(float(times[k]))}): {reason}; smallest pivot there "
+            f"{here.pivot:.3g} (zero at a lock-up or dead centre); {last}; "
+            "shorten the sweep or drive another coordinate"
+        )
+
+    def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array], order: int) -> Trajectory:
+        (points, bodies), unit = found, self.model.frame.unit
+        solved: NDArray[np.bool_] = ~np.isnan(tests["closure"])
+        closure, leftover = (largest_found(tests[name][solved]) * unit for name in ("closure", "leftover"))
+        # rates of place and of rotation stand side by side
+        rates = [np.concatenate([bodies[:, k : k + 3], bodies[:, k + 10 : k + 13]], axis=1) for k in (3, 6)]
+        series = [points[:, 3 * k : 3 * k + 3] for k in range(order + 1)]
+        missing = [None] * (2 - order)
+        return Trajectory(
+            points={name: PointMotion(*(each[:, :, k] for each in series), *missing) for k, name in enumerate(self.points.names)},
+            solved=solved,
+            iterations=np.where(solved, tests["iterations"], 0.0).astype(np.int64),
+            residual=closure,
+            message="; ".join(self.messages),
+            details=self.model.details | {"redundant_residual": leftover, "smallest_pivot": self.smallest_pivot},
+            bodies={
+                name: BodyMotion(bodies[:, :3, k], bodies[:, 9:13, k], *(each[:, :, k] for each in rates[:order]), *missing)
+                for k, name in enumerate(self.bodies.names)
+            },
+        )

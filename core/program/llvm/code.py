@@ -1,0 +1,174 @@
+"""LLVM code over a vector of lanes, line by line; what is written of it is in the modules beside this one.
+
+The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are reduced and summed in place. The W
+lanes of a vector stand together in memory, slot by slot: what a program touches is one stretch of a few kilobytes.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+
+from ..lowering import FUSED
+
+# The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after reduction.
+SINE_TERMS, COSINE_TERMS = 9, 9
+# pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
+HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
+BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
+CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
+
+
+class Lines:
+    """The body of a function over vectors of W lanes, written line by line in single assignment."""
+
+    def __init__(self, width: int, prefix: str = "x", lane: str = "%lane") -> None:
+        self.width, self.prefix, self.lines, self._lane = width, prefix, list[str](), lane
+        self.vector = f"<{width} x double>"
+        self._known: dict[str, str] = {}
+
+    def let(self, text: str) -> str:
+        """The name of the value of an expression, computed once."""
+        if text not in self._known:
+            self._known[text] = self.anew(text)
+        return self._known[text]
+
+    def anew(self, text: str) -> str:
+        """The name of the value of an expression, computed here even where it has been before."""
+        name = f"%{self.prefix}{len(self.lines)}"
+        self.lines.append(f"{name} = {text}")
+        return name
+
+    @property
+    def text(self) -> str:
+        """The lines, indented."""
+        return "\n  ".join(self.lines)
+
+    def sum(self, a: str | int, b: str | int) -> str:
+        """Of two whole numbers."""
+        return self.let(f"add i64 {a}, {b}")
+
+    def product(self, a: str | int, b: str | int) -> str:
+        """Of two whole numbers."""
+        return self.let(f"mul i64 {a}, {b}")
+
+    def number(self, pointer: str, index: str | int) -> str:
+        """Where a number of an array stands."""
+        return self.let(f"getelementptr double, ptr {pointer}, i64 {index}")
+
+    def spread(self, x: str) -> str:
+        """A vector of W times the same number."""
+        one = self.let(f"insertelement {self.vector} poison, double {x}, i64 0")
+        return self.let(f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.width} x i32> zeroinitializer")
+
+    def turned(self, x: str) -> str:
+        """The lanes in the opposite order."""
+        order = ", ".join(f"i32 {k}" for k in reversed(range(self.width)))
+        return self.let(f"shufflevector {self.vector} {x}, {self.vector} poison, <{self.width} x i32> <{order}>")
+
+    def slot(self, number: str | int) -> str:
+        """Where a slot of the lanes stands."""
+        return self.let(f"getelementptr {self.vector}, ptr {self._lane}, i64 {number}")
+
+    def read(self, number: str | int) -> str:
+        """A slot of the lanes."""
+        return self.let(f"load {self.vector}, ptr {self.slot(number)}, align 8")
+
+    def write(self, number: str | int, value: str) -> None:
+        """Set a slot of the lanes."""
+        self.lines.append(f"store {self.vector} {value}, ptr {self.slot(number)}, align 8")
+
+    def constant(self, x: float) -> str:
+        """A vector of equal numbers, exact to the last bit."""
+        bits = struct.unpack("<Q", struct.pack("<d", x))[0]
+        return "<" + ", ".join([f"double 0x{bits:016X}"] * self.width) + ">"
+
+    def call(self, name: str, *operands: str) -> str:
+        """One of LLVM's own vector functions."""
+        arguments = ", ".join(f"{self.vector} {x}" for x in operands)
+        # nsz: which of two zeros is the larger does not matter, and costs three more instructions
+        return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
+
+    def umax(self, a: str, b: str) -> str:
+        """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and NaN comes last.
+
+        As whole numbers with a sign, although they have none: AVX2 compares only those, and takes four instructions for others.
+        """
+        words = f"<{self.width} x i64>"
+        x, y = (self.let(f"bitcast {self.vector} {each} to {words}") for each in (a, b))
+        larger = self.let(f"call {words} @llvm.smax.v{self.width}i64({words} {x}, {words} {y})")
+        return self.let(f"bitcast {words} {larger} to {self.vector}")
+
+    def arithmetic(self, op: str, a: str, b: str) -> str:
+        """a op b."""
+        return self.let(f"{BINARY[op]} {self.vector} {a}, {b}")
+
+    def fused(self, op: str, a: str, b: str, c: str) -> str:
+        """A product and a sum; see `lowering.FUSED`. Rounded once where the processor can."""
+        first = self.let(f"fneg {self.vector} {a}") if op == "fnma" else a
+        last = self.let(f"fneg {self.vector} {c}") if op == "fms" else c
+        return self.call("fmuladd", first, b, last)
+
+    def choose(self, mask: str, p: str, q: str) -> str:
+        """p where the mask is true, else q."""
+        return self.let(f"select <{self.width} x i1> {mask}, {self.vector} {p}, {self.vector} {q}")
+
+    def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
+        """By Horner, lowest coefficient first."""
+        total = self.constant(coefficients[-1])
+        for c in reversed(coefficients[:-1]):
+            total = self.fused("fma", total, x, self.constant(c))
+        return total
+
+    def trigonometric(self, x: str, quadrant: float) -> str:
+        """sin(x + quadrant * pi/2)."""
+        k = self.call("rint", self.arithmetic("*", x, self.constant(2.0 / math.pi)))
+        y = x
+        for part in HALF_PI:
+            # not rounded once: the products are exact, the differences must be seen as such
+            y = self.arithmetic("-", y, self.arithmetic("*", k, self.constant(part)))
+        z = self.arithmetic("*", y, y)
+        odd = [(-1.0) ** n / math.factorial(2 * n + 1) for n in range(SINE_TERMS)]
+        even = [(-1.0) ** n / math.factorial(2 * n) for n in range(COSINE_TERMS)]
+        sine, cosine = self.arithmetic("*", y, self.polynomial(z, odd)), self.polynomial(z, even)
+        turn = self.arithmetic("+", k, self.constant(quadrant))
+        quarter = self.arithmetic("*", turn, self.constant(0.25))
+        q = self.arithmetic("-", turn, self.arithmetic("*", self.call("floor", quarter), self.constant(4.0)))
+        half = self.arithmetic("*", q, self.constant(0.5))
+        swapped = self.let(f"fcmp one {self.vector} {self.call('floor', half)}, {half}")
+        negative = self.let(f"fcmp oge {self.vector} {q}, {self.constant(2.0)}")
+        value = self.choose(swapped, cosine, sine)
+        return self.choose(negative, self.let(f"fneg {self.vector} {value}"), value)
+
+    def operation(self, op: str, operands: Sequence[str]) -> str:
+        """The value of a traced operation."""
+        if op in BINARY:
+            return self.arithmetic(op, *operands)
+        if op in FUSED:
+            return self.fused(op, *operands)
+        if op == "umax":
+            return self.umax(*operands)
+        if op in CALLS:
+            return self.call(CALLS[op], *operands)
+        if op == "neg":
+            return self.let(f"fneg {self.vector} {operands[0]}")
+        if op == "larger":
+            return self.let(f"fcmp ogt {self.vector} {self.call('fabs', operands[0])}, {self.call('fabs', operands[1])}")
+        if op == "where":
+            return self.choose(*operands)
+        if op == "before":
+            order = ", ".join(f"i32 {k}" for k in (self.width, *range(self.width - 1)))
+            return self.let(
+                f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]}, <{self.width} x i32> <{order}>"
+            )
+        return self.trigonometric(operands[0], {"sin": 0.0, "cos": 1.0}[op])
+
+
+def declarations(width: int) -> str:
+    """LLVM's own vector functions that programs use."""
+    vector = f"<{width} x double>"
+    one = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector})" for name in ("sqrt", "fabs", "rint", "floor"))
+    two = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})" for name in ("minimum", "maximum"))
+    words, three = f"<{width} x i64>", f"declare {vector} @llvm.fmuladd.v{width}f64({vector}, {vector}, {vector})"
+    return f"{one}\n{two}\n{three}\ndeclare {words} @llvm.smax.v{width}i64({words}, {words})\n"

@@ -1,0 +1,171 @@
+"""Programs as LLVM code: functions of a vector of lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from ..lowering import lowered
+from ..straight_line import Program
+from ..trace import LEAVES, Node, operands, place_of
+from .code import Lines
+from .ordering import ordered
+
+# Values held at once, of 32 registers: LLVM's own schedule moves lines about. With 16, narrower vectors, LLVM does as well alone.
+HELD, WIDE = 24, 8
+# So many more lines for each node, to put values away and fetch them, cost as much as waiting for divisions does.
+PUT_AWAY = 0.4
+
+
+def function(program: Program, width: int) -> str:
+    """A program as a function of its W lanes.
+
+    In the order in which it waits least, where there are registers for that: with 16 it takes up to half as long again.
+    """
+    program = lowered(program)
+    if program.times > 1:
+        return _repeated(program, width)
+    straight = _Straight(program, width)
+    if width == WIDE and (waiting := ordered(program)) is not program:
+        other = _Straight(waiting, width)
+        if len(other.lines) - len(straight.lines) <= PUT_AWAY * len(program.nodes):
+            straight = other
+    return f"define void @{program.name}(ptr noalias %lane, ptr %table) {{\n  {straight.text}\n  ret void\n}}\n"
+
+
+def _repeated(program: Program, width: int) -> str:
+    """A program that is run several times, as a loop that keeps the largest of each output."""
+    body, end = Lines(width, lane="%here"), Lines(width, "e")
+    values = list[str]()
+    for node in program.nodes:
+        known = body.read(int(node[1])) if node[0] == "input" else body.constant(float(node[1])) if node[0] == "const" else None
+        values.append(known or body.operation(node[0], [values[k] for k in operands(node)]))
+    largest = list[str]()
+    for k, (slot, number) in enumerate(program.outputs.items()):
+        found = body.umax(f"%largest{k}", values[number])
+        largest.append(f"%largest{k} = phi {body.vector} [zeroinitializer, %entry], [{found}, %run]")
+        end.write(slot, found)
+    phis = "\n  ".join(largest)
+    return f"""define void @{program.name}(ptr noalias %lane, ptr %table) {{
+entry:
+  br label %run
+run:
+  %k = phi i64 [0, %entry], [%next, %run]
+  {phis}
+  %here = getelementptr {body.vector}, ptr %lane, i64 %k
+  {body.text}
+  %next = add i64 %k, 1
+  %more = icmp ult i64 %next, {program.times}
+  br i1 %more, label %run, label %end
+end:
+  {end.text}
+  ret void
+}}
+"""
+
+
+class _Straight(Lines):
+    """The lines of a program that holds no more values at once than there are registers for.
+
+    What is too much goes to memory: that which is used again last (Belady 1966), inputs to where they came from. Left to itself,
+    LLVM's allocator takes as long for that as all else together, and its code is a few percent slower.
+    """
+
+    def __init__(self, program: Program, width: int) -> None:
+        super().__init__(width)
+        self._nodes, self._most = program.nodes, HELD if width == WIDE else len(program.nodes)
+        self._held, self._masks = dict[int, str](), dict[int, str]()
+        self._stacked, self._free, self._room = dict[int, int](), list[int](), 0
+        self._due, writes = _uses(program)
+        for number, node in enumerate(program.nodes):
+            if node[0] not in LEAVES:
+                self._step(number, node)
+                if number in writes:
+                    self._write_all(writes[number])
+        self._write_all(writes.get(len(program.nodes), ()))
+        if self._room:
+            self.lines.insert(0, f"%stack = alloca {self.vector}, i64 {self._room}, align 64")
+
+    def _step(self, number: int, node: Node) -> None:
+        wanted = operands(node)
+        values = [self._held.get(k) or self._fetched(k, wanted) for k in wanted]
+        result = self.operation(node[0], values)
+        self._used(wanted)
+        if node[0] == "larger":
+            self._masks[number] = result
+        else:
+            self._hold(number, result, ())
+
+    def _write_all(self, writes: Sequence[tuple[int, int]]) -> None:
+        """Write slots; all that stands in slots is read before."""
+        values = [(slot, self._held.get(k) or self._fetched(k, ())) for slot, k in writes]
+        for slot, value in values:
+            self.write(slot, value)
+        self._used(k for _, k in writes)
+
+    def _fetched(self, k: int, wanted: Sequence[int]) -> str:
+        """The name of a value that is not held; for it, none of those wanted with it is given up."""
+        node = self._nodes[k]
+        if node[0] == "const":
+            return self.constant(float(node[1]))
+        if node[0] == "larger":
+            return self._masks[k]
+        if node[0] == "node":
+            place = self.number(self.slot(int(node[1])), place_of(int(node[2]), self.width)[1])
+            name = self.spread(self.anew(f"load double, ptr {place}, align 8"))
+        else:
+            place = self.slot(int(node[1])) if node[0] == "input" else self._place(self._stacked[k])
+            name = self.anew(f"load {self.vector}, ptr {place}, align 8")
+        self._hold(k, name, wanted)
+        return name
+
+    def _hold(self, k: int, name: str, wanted: Sequence[int]) -> None:
+        if len(self._held) >= self._most:
+            last = max((x for x in self._held if x not in wanted), key=lambda x: self._due[x][-1])
+            value = self._held.pop(last)
+            if self._nodes[last][0] not in LEAVES and last not in self._stacked:
+                if not self._free:
+                    self._free.append(self._room)
+                    self._room += 1
+                self._stacked[last] = self._free.pop()
+                self.lines.append(f"store {self.vector} {value}, ptr {self._place(self._stacked[last])}, align 8")
+        self._held[k] = name
+
+    def _used(self, values: Iterable[int]) -> None:
+        """What will not be used again needs no place any more."""
+        for k in values:
+            due = self._due[k]
+            due.pop()
+            if not due:
+                self._held.pop(k, None)
+                if k in self._stacked:
+                    self._free.append(self._stacked.pop(k))
+
+    def _place(self, number: int) -> str:
+        return self.let(f"getelementptr {self.vector}, ptr %stack, i64 {number}")
+
+
+def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, int]]]]:
+    """By value, the operations that use it, the first one last; by operation, the slots written after it, with their values.
+
+    A slot is written as soon as its value is there and nothing is to read what stood in it before.
+    """
+    nodes, end = program.nodes, len(program.nodes)
+    due: list[list[int]] = [[] for _ in nodes]
+    for number in reversed(range(end)):
+        for k in operands(nodes[number]):
+            due[k].append(number)
+    last_read: dict[int, int] = {}
+    for k, node in enumerate(nodes):
+        if node[0] in ("input", "node") and due[k]:
+            last_read[int(node[1])] = max(due[k][0], last_read.get(int(node[1]), 0))
+    stands = {slot: int(nodes[k][1]) for slot, k in program.outputs.items() if nodes[k][0] in ("input", "node")}
+    # what stands in a slot is put out where it is used last anyway, if nobody reads what it overwrites
+    read = last_read.keys() | stands.values()
+    early = {slot for slot in stands if due[program.outputs[slot]] and slot not in read}
+    last_read |= {source: end for slot, source in stands.items() if slot not in early}
+    writes: dict[int, list[tuple[int, int]]] = {}
+    for slot, k in program.outputs.items():
+        when = due[k][0] if slot in early else end if nodes[k][0] in LEAVES else max(k, last_read.get(slot, 0))
+        writes.setdefault(when, []).append((slot, k))
+        due[k] = sorted([*due[k], when], reverse=True)
+    return due, writes
