@@ -65,7 +65,7 @@ def test_what_contradicts_redundant_rows_is_no_assembly(monkeypatch):
     mechanism = replace(four_bar(), joints=tilted)
     start = perturbed(mechanism, 0.1, 0.0, np.random.default_rng(1), 4)
     assert assemble(mechanism, start, {"turn": 1.0}).converged.all()
-    monkeypatch.setattr("kincheck.core.analysis.assemble.CONSISTENT", 1e-12)
+    monkeypatch.setattr("kincheck.core.analysis.assembly.assemble.CONSISTENT", 1e-12)
     found = assemble(mechanism, start, {"turn": 1.0})
     assert found.spurious.all()
     assert not found.converged.any()
@@ -91,7 +91,7 @@ def test_exact_rows_do_worse_and_their_spurious_zeros_are_told():
 
 def test_damping_is_what_mends_offsets(monkeypatch):
     damped = found_from(mcpherson(), 0.8, 1.0)[1]
-    monkeypatch.setattr("kincheck.core.analysis.assemble.DAMPING", 1e-9)
+    monkeypatch.setattr("kincheck.core.analysis.assembly.assemble.DAMPING", 1e-9)
     assert found_from(mcpherson(), 0.8, 1.0)[1] < damped - 0.2
 
 

@@ -46,7 +46,7 @@ def solve(case, complete=True):
     for name, motion in again.points.items():
         np.testing.assert_array_equal(motion.acceleration, first.points[name].acceleration)  # made of all before it
     assert again.solved.all() or not complete, again.message
-    assert again.residual <= TOL
+    assert again.residual <= TOL or not again.solved.any()
     return again
 
 

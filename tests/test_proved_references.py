@@ -183,7 +183,7 @@ def test_the_command_writes_what_the_run_is_judged_by(kincheck_main, tmp_path, c
 def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsys):
     two = replace(crank().sweep, values=np.array([0.0, 1.0]))
     monkeypatch.setattr(kincheck.cases, "load", lambda name: replace(crank(), sweep=two, reference={}))
-    monkeypatch.setattr("kincheck.core.analysis.enclosure.MOST_STEPS", 0)
+    monkeypatch.setattr("kincheck.core.analysis.proofs.enclosure.MOST_STEPS", 0)
     assert kincheck_main("reference", "crank") == 1
     out = capsys.readouterr().out
     assert "crank: 0 of 2 samples proved" in out
