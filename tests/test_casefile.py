@@ -156,7 +156,12 @@ def test_default_outputs_say_that_they_are(tmp_path: Path):
 
 def test_an_output_without_tolerance_gets_the_default(tmp_path: Path):
     (output,) = load_case(write(tmp_path, edited(('atol = 1e-9\nwhy = "made up for this test"', "")))).outputs
-    assert (output.atol, output.why) == (casefile.DEFAULT_ATOL, casefile.DEFAULT_WHY)
+    assert (output.atol, output.rtol, output.why) == (casefile.DEFAULT_ATOL, casefile.DEFAULT_RTOL, casefile.DEFAULT_WHY)
+
+
+def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path: Path):
+    (output,) = load_case(write(tmp_path, BASE)).outputs
+    assert (output.atol, output.rtol) == (1e-9, 0.0)
 
 
 @pytest.mark.parametrize(("start", "stop", "steps", "values"), [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.1", "1", [0.2])])

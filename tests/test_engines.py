@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.core import Distance
+from kincheck.core.harness.reading.casefile import load_case
+from kincheck.core.harness.reading.tolerance import DEFAULT_ATOL
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
@@ -105,3 +108,13 @@ def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
         worst = [deviation.max_abs for _, deviation in deviations.items()]
         assert all(error <= limit for error, limit in zip(worst, limits, strict=True)), worst
     assert found.outcome is Outcome.PASS
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "exudyn"])
+def test_round_off_near_a_singular_pose_is_within_the_default_tolerance(name):
+    """It is more than a nanometre at the driver's pace: there the end of the rod goes seven thousand times as fast."""
+    case = load_case(Path(__file__).parent / "data" / "fast_loop.toml")
+    _, found = run([case], [engine("native"), engine(name)], tol=1e-12).records
+    worst = max((each.acceleration for each in found.errors.values()), key=lambda each: each.max_abs)
+    assert DEFAULT_ATOL * case.sweep.rate**2 < worst.max_abs < 1e-12 * 1855.0
+    assert worst.within

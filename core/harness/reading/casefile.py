@@ -27,7 +27,7 @@ from .schema import (
     kind_of,
     own_fields,
 )
-from .tolerance import DEFAULT_ATOL, DEFAULT_WHY, tolerance
+from .tolerance import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY, tolerance
 
 if TYPE_CHECKING:
     from .suspension import SuspensionTable
@@ -128,7 +128,7 @@ def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Co
     if not keys.points:
         raise fault(file, "points", "found no point, expected one whose motion is compared; add [points.NAME]")
     outputs: tuple[Quantity, ...] = tuple(
-        Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
+        Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
         for point in mechanism.points
         for axis, along in AXES.items()
     )

@@ -14,7 +14,7 @@ from ....motions import Motion
 from ....trajectory import Array
 from ...case import Case, Output, Sweep, Truth
 from ...reading.casefile import AXES
-from ...reading.tolerance import DEFAULT_ATOL, DEFAULT_WHY
+from ...reading.tolerance import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
 from ..truth import Truth as Known
 from ..truth import followed
 
@@ -91,7 +91,7 @@ def as_case(
 def coordinates(points: Iterable[str]) -> tuple[Output, ...]:
     """All coordinates of points, as outputs."""
     return tuple(
-        Output(f"{name}.{axis}", name, along, False, DEFAULT_ATOL, 0.0, DEFAULT_WHY)
+        Output(f"{name}.{axis}", name, along, False, DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
         for name in points
         for axis, along in AXES.items()
     )
