@@ -18,6 +18,7 @@ from ..core.analysis.continuity import continuous
 from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
+from ..core.harness.compare import size
 from ..core.joints import Joint
 from ..core.motions import Path, outwards
 from ..core.trajectory import Array, PointMotion, Trajectory, largest_found
@@ -121,8 +122,7 @@ class Walk:
     def __init__(self, model: ProjectionModel, case: Case, tol: float, corrections: int | None = None) -> None:
         self.model, self.case, self.tol, self.corrections = model, case, tol, corrections
         self.drivers = [driver.name for driver in case.mechanism.drivers]
-        corners = [np.asarray(case.mechanism.point(name).position) for name in case.points]
-        self.size = max(1e-3, float(np.ptp(np.stack([*corners, *_joint_points(case)]), axis=0).max()))
+        self.size = size(case)
         model.reset()
         model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
@@ -133,7 +133,8 @@ class Walk:
         if self.rank < self.unknowns:
             raise SolveError(
                 f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns} coordinates of the simulator's model are "
-                "left free by joints and drivers at the design position; add a driver, or join what moves freely"
+                "left free by joints and drivers at the design position; add a driver, or join what moves freely; if their number "
+                "is right a driver does not move it there (a lock-up): give the design in another pose"
             )
 
     def linear(self, A: Array, b: Array) -> Array:
@@ -270,12 +271,3 @@ def _stopped(path: Path, reached: NDArray[np.intp], t: float, wanted: int) -> st
         f"cannot be followed beyond {path.where(t)} (wanted {path.where(path.times[wanted])}): Newton does not converge or jumps "
         f"to another assembly; {last}; shorten the sweep or drive another coordinate"
     )
-
-
-def _joint_points(case: Case) -> list[Array]:
-    """All joint points at design: the mechanism's extent."""
-    found: list[Array] = []
-    for joint in case.mechanism.joints:
-        point, pair = getattr(joint, "point", None), getattr(joint, "points", ())
-        found += [np.asarray(each, dtype=float) for each in ([point] if point is not None else list(pair))]
-    return found

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck.core.harness.case import Case, Truth
-from kincheck.core.harness.reading import casefile
 from kincheck.core.harness.reading.casefile import load_case
+from kincheck.core.harness.reading.tolerance import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
 from kincheck.core.joints import Distance, Joint, Spherical
 from kincheck.core.joints.base import length, position
 
@@ -156,7 +156,16 @@ def test_default_outputs_say_that_they_are(tmp_path: Path):
 
 def test_an_output_without_tolerance_gets_the_default(tmp_path: Path):
     (output,) = load_case(write(tmp_path, edited(('atol = 1e-9\nwhy = "made up for this test"', "")))).outputs
-    assert (output.atol, output.rtol, output.why) == (casefile.DEFAULT_ATOL, casefile.DEFAULT_RTOL, casefile.DEFAULT_WHY)
+    assert (output.atol, output.rtol, output.why) == (DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
+
+
+@pytest.mark.parametrize("where", ["named", "all"])
+def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path: Path, where: str):
+    """The tip is 5 um from the joint: a nanometre would let pass what is wrong in the fourth digit."""
+    text = BASE[: BASE.index("[outputs") if where == "all" else BASE.index("atol")]
+    for large, small in (("[1.5, 2.0, 3.0]", "[1.000005, 2.0, 3.0]"), ("-0.1", "-1e-7"), ("stop = 0.1", "stop = 1e-7")):
+        text = text.replace(large, small)
+    assert load_case(write(tmp_path, text)).outputs[0].atol == pytest.approx(5e-12, rel=1e-9)
 
 
 def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path: Path):

@@ -7,7 +7,7 @@ import pytest
 from kincheck.core.drivers import PointCoordinate
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.case import Output, Series
-from kincheck.core.harness.compare import as_numbers, describe, deviation, deviations, output_series, pace
+from kincheck.core.harness.compare import NO_SIZE, as_numbers, describe, deviation, deviations, output_series, pace, size
 from kincheck.core.mechanism import Mechanism
 
 from .fakes import RADIUS, SAMPLES, crank, exact, partial, solution
@@ -91,6 +91,17 @@ def test_derivatives_scale_with_the_rate_per_radian():
     assert [each.tolerance for _, each in found.items()] == pytest.approx([1e-9, 3e-9, 9e-9])
 
 
+def test_points_that_coincide_to_rounding_have_no_size():
+    case = crank()
+    m, at = case.mechanism, (0.1, 0.2, 0.3)
+    joints = [joint.changed(point=at) for joint in m.joints]
+    for tip, expected in ((at, NO_SIZE), ((0.1, 0.2, 0.1 + 0.2), NO_SIZE), ((0.1, 0.2, 0.3 + 1e-9), 1e-9)):
+        points = [replace(point, position=tip) for point in m.points]
+        assert size(replace(case, mechanism=Mechanism(m.name, m.bodies, joints, points, m.drivers))) == pytest.approx(
+            expected, rel=1e-6
+        )
+
+
 def test_derivatives_scale_with_the_rate_over_the_size_of_the_mechanism():
     case = crank(rate=1.0)
     lift = PointCoordinate("lift", "tip", (0.0, 1.0, 0.0))
@@ -104,7 +115,7 @@ def test_derivatives_scale_with_the_rate_over_the_size_of_the_mechanism():
     assert pace(replace(case, sweep=replace(case.sweep, values=np.zeros(1)))) == pytest.approx(1.0 / RADIUS)
 
 
-@pytest.mark.parametrize("scale", [1e-2, 1.0, 1e2])
+@pytest.mark.parametrize("scale", [1e-9, 1e-2, 1e6])
 @pytest.mark.parametrize("rate", [1e-3, 1.0, 1e3])
 def test_a_relative_error_of_a_millionth_in_an_acceleration_is_out_of_tolerance(scale, rate):
     case = crank(rate=rate, atol=1e-9 * scale)

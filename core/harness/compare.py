@@ -36,8 +36,9 @@ from ..trajectory import Array, PointMotion, Trajectory
 from .case import MARKER, Case, Quantity, Series
 from .record import Deviation, Deviations, OutputSeries
 
-# D of a mechanism whose points all coincide [m]: keeps the pace finite and is smaller than any mechanism driven in earnest.
-SMALLEST_SIZE = 1e-3
+# D of a mechanism whose points all coincide, to rounding, [m]: keeps the pace finite.
+NO_SIZE = 1e-3
+ROUNDING = 1e-12
 NOTHING = "these are compared with nothing"
 """Said of samples that the standard has no value at."""
 
@@ -52,13 +53,18 @@ def pace(case: Case) -> float:
 
 
 def size(case: Case) -> float:
-    """Largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m]."""
+    """Largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m].
+
+    Where nothing is compared yet, all points count.
+    """
     path = case.sweep.path
     values, _, _ = path.drive(list(path.motions), path.times)
-    points = [case.mechanism.point(name).position for name in case.points if not name.startswith(MARKER)]
+    compared = case.points or [point.name for point in case.mechanism.points]
+    points = [case.mechanism.point(name).position for name in compared if not name.startswith(MARKER)]
     points += [position for joint in case.mechanism.joints for position in _positions(joint)]
     shift = float(np.ptp(values[~_turning(case)], axis=1).max(initial=0.0))
-    return max(SMALLEST_SIZE, float(np.ptp(np.array(points), axis=0).max()), shift)
+    extent = max(float(np.ptp(np.array(points), axis=0).max()), shift)
+    return extent if extent > ROUNDING * float(np.abs(points).max()) else NO_SIZE
 
 
 def _turning(case: Case) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from ..errors import CaseError
 from ..joints import Coupler
 from ..motions import Absolute
 from .case import MARKER, TIME, Case, Output
-from .reading.casefile import AXES
+from .reading.coordinates import AXES
 from .reading.schema import SCHEMA, own_fields
 
 # What a body has unless the file says otherwise.

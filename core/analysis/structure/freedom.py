@@ -136,10 +136,11 @@ def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> st
     drivers = [repr(each.name) for each in mechanism.drivers if each.name in involved]
     joints = [repr(name) for name in involved if repr(name) not in drivers]
     many = len(drivers) > 1
+    what = " and ".join([*filter(None, [", ".join(joints)]), *["each other"] * many])
     return (
         f"mechanism {mechanism.name!r}: driver{'s' * many} {', '.join(drivers)} do{'es' * (not many)} not move it at the design "
         f"position (lock-up or dead centre): what {'they prescribe' if many else 'it prescribes'} there follows already from "
-        f"{', '.join([*joints, *['each other'] * many])}; give the design in another pose, some degrees on, and sweep from there, "
+        f"{what}; give the design in another pose, some degrees on, and sweep from there, "
         "or drive another coordinate"
     )
 

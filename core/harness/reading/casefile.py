@@ -12,6 +12,7 @@ from ...joints import Coupler, Joint, Kind
 from ...mechanism import Body, Mechanism, Point, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, Truth
 from ..compare import size
+from .coordinates import AXES, with_all_coordinates
 from .document import as_table, class_of, explained, fault, join, parse, read_text, remedy, shown, typed
 from .driving import read_drivers, read_sweep
 from .reference import Convert, ReferenceKeys, is_derivative, read_reference
@@ -27,7 +28,7 @@ from .schema import (
     kind_of,
     own_fields,
 )
-from .tolerance import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY, tolerance
+from .tolerance import tolerance
 
 if TYPE_CHECKING:
     from .suspension import SuspensionTable
@@ -39,7 +40,6 @@ _PARTS = ("bodies", "joints", "points", "drivers", "outputs")
 
 LENGTHS: Mapping[str, Convert] = {"m": float, "mm": lambda x: x / 1000.0}
 ANGLES: Mapping[str, Convert] = {"rad": float, "deg": math.radians}
-AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def load_case(path: str | Path) -> Case:
@@ -127,17 +127,13 @@ def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Co
     mechanism = case.mechanism
     if not keys.points:
         raise fault(file, "points", "found no point, expected one whose motion is compared; add [points.NAME]")
-    outputs: tuple[Quantity, ...] = tuple(
-        Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
-        for point in mechanism.points
-        for axis, along in AXES.items()
-    )
     if keys.suspension is None:
-        return replace(case, outputs=_outputs(file, keys, None, case, units) or outputs)
+        outputs = _outputs(file, keys, None, case, units)
+        return replace(case, outputs=outputs) if outputs else with_all_coordinates(case)
     from . import suspension  # many classes, and few cases have a wheel
 
     table = suspension.read_suspension(file, keys.suspension, mechanism, units["m"], units["rad"])
-    outputs = _outputs(file, keys, table, case, units) or outputs
+    outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=suspension.with_markers(mechanism, outputs), outputs=outputs)
     return replace(case, outputs=suspension.with_slopes(outputs, size(case))) if table.per_travel else case
 
@@ -161,10 +157,10 @@ def _output(
         cls = class_of(file, key, "output", value, {COORDINATE: Output, **SuspensionOutput.registry})
         if issubclass(cls, SuspensionOutput):
             return read_output(file, key, cls, name, value, table, case, units)
-    return _coordinate(file, key, name, value, keys, units["m"])
+    return _coordinate(file, key, name, value, keys, case, units["m"])
 
 
-def _coordinate(file: Path, key: str, name: str, value: object, keys: CaseKeys, length: Convert) -> Output:
+def _coordinate(file: Path, key: str, name: str, value: object, keys: CaseKeys, case: Case, length: Convert) -> Output:
     output = typed(file, key, value, OutputKeys)
     if output.point not in keys.points:
         raise fault(file, join(key, "point"), f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}")
@@ -178,4 +174,4 @@ def _coordinate(file: Path, key: str, name: str, value: object, keys: CaseKeys, 
         case component, _:
             what = "neither component nor direction" if component is None else "both component and direction"
             raise fault(file, key, f'found {what}, expected one of them; give component = "x" or direction = [x, y, z]')
-    return Output(name, output.point, direction, output.relative, *tolerance(file, key, output, length))
+    return Output(name, output.point, direction, output.relative, *tolerance(file, key, output, length, size(case)))

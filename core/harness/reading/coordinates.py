@@ -1,19 +1,20 @@
-"""What is compared where a file names no outputs: every coordinate of every point."""
+"""Coordinates of points as outputs: what is compared where nothing else is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
-from ...mechanism import Point
-from ..case import Output
-from .casefile import AXES
-from .tolerance import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
+from ...mechanism import Vector
+from ..case import Case, Output
+from ..compare import size
+from .tolerance import default
+
+AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def all_coordinates(points: Sequence[Point]) -> tuple[Output, ...]:
-    """x, y and z of all points, as POINT.x and so on, in the order of the points."""
-    return tuple(
-        Output(f"{point.name}.{axis}", point.name, along, False, DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
-        for point in points
-        for axis, along in AXES.items()
-    )
+def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Case:
+    """The case with x, y and z of its points, or of those named, as outputs POINT.x and so on; tolerances are the default ones."""
+    given, names = default(size(case)), [point.name for point in case.mechanism.points] if points is None else points
+    outputs = [Output(f"{name}.{axis}", name, along, False, *given) for name in names for axis, along in AXES.items()]
+    return replace(case, outputs=tuple(outputs))

@@ -16,6 +16,7 @@ from msgspec import Meta
 from ...algebra import vec
 from ...mechanism import Mechanism, Point, Vector
 from ..case import Case, Quantity
+from ..compare import size
 from ..suspension import Axle, Convention, PerTravel, Rate, Reaction, Side, SuspensionOutput, Vehicle, own_keys
 from .document import fault, join, remedy, shown, typed
 from .reference import Convert
@@ -174,7 +175,7 @@ def read_output(
         if getattr(vehicle, need) is None:
             raise fault(file, join("suspension", need), f"missing, expected it for {key} of type {cls.type!r}; add it")
     given = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
-    output = cls(name, vehicle, *tolerance(file, key, keys, units[cls.measure], cls.measure), **given)
+    output = cls(name, vehicle, *tolerance(file, key, keys, units[cls.measure], size(case), cls.measure), **given)
     if problem := output.problem:
         raise fault(file, key, problem)
     for each in own_keys(cls):

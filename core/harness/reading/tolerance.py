@@ -16,9 +16,12 @@ DEFAULT_ATOL = 1e-9
 # 3e-10 m/s^2, which 1e-9 m at that pace does not allow.
 DEFAULT_RTOL = 1e-9
 _OF_RANGE = "; and of values whose range is larger, as much of the range"
+# Of mechanisms below a millimetre: a nanometre is as large as some of them.
+PART_OF_SIZE = 1e-6
 DEFAULT_WHY = (
-    "the default of 1e-9 m: a thousandth of the micrometre that hardpoints are measured to, and millions of times the round-off "
-    f"of metre-sized coordinates in double precision{_OF_RANGE}"
+    "the default of 1e-9 m, or a millionth of the size of mechanisms below a millimetre: a thousandth of the micrometre that "
+    "hardpoints are measured to, and millions of times the round-off of metre-sized coordinates in double precision"
+    f"{_OF_RANGE}"
 )
 _DEFAULTS: Mapping[str, str] = {
     "m": DEFAULT_WHY,
@@ -35,11 +38,19 @@ _DEFAULTS: Mapping[str, str] = {
 """The reason for the default by the unit of the output."""
 
 
-def tolerance(file: Path, key: str, keys: ToleranceKeys, convert: Convert, unit: str = "m") -> tuple[float, float, str]:
+def default(size: float, unit: str = "m") -> tuple[float, float, str]:
+    """atol [unit], rtol [-] and the reason for them, where a mechanism of that size [m] is told none."""
+    return min(DEFAULT_ATOL, PART_OF_SIZE * size) if unit == "m" else DEFAULT_ATOL, DEFAULT_RTOL, _DEFAULTS[unit]
+
+
+def tolerance(
+    file: Path, key: str, keys: ToleranceKeys, convert: Convert, size: float, unit: str = "m"
+) -> tuple[float, float, str]:
     """atol [unit], rtol [-] and the reason for them.
 
     Args:
         convert: from the file's unit of the output to SI.
+        size: of the mechanism [m].
 
     Raises:
         CaseError: a tolerance without a reason, or a reason without a tolerance.
@@ -47,7 +58,7 @@ def tolerance(file: Path, key: str, keys: ToleranceKeys, convert: Convert, unit:
     if keys.atol is None and keys.rtol is None:
         if keys.why is not None:
             raise fault(file, join(key, "why"), "found a reason without a tolerance, expected both; add atol or rtol")
-        return DEFAULT_ATOL, DEFAULT_RTOL, _DEFAULTS[unit]
+        return default(size, unit)
     if keys.why is None:
         raise fault(file, join(key, "why"), "missing, expected the reason for the tolerance; add the key 'why'")
     return convert(keys.atol or 0.0), keys.rtol or 0.0, keys.why

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,9 +11,9 @@ from ...errors import KincheckError
 from ..attempt import Pair
 from ..case import Case
 from ..engine import Engine
+from ..reading.coordinates import with_all_coordinates
 from ..writing import case_text
 from .families import Specimen
-from .families.base import coordinates
 from .outcomes import Judgement, Verdict, judged
 from .reduce import fewer_samples, reduced
 from .results import Finding
@@ -29,7 +28,7 @@ def judge(case: Case, engine: Engine, tol: float, truth: Callable[[Case], Truth]
     Raises:
         KincheckError: the truth cannot be had.
     """
-    watched = dataclasses.replace(case, outputs=coordinates(case.points))
+    watched = with_all_coordinates(case, case.points)
     return judge_as(Specimen(case.name, lambda: watched, truth, tol), watched, engine)
 
 

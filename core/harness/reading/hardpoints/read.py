@@ -12,8 +12,7 @@ from ....drivers import PointCoordinate
 from ....mechanism import GROUND, Body, Mechanism, Point, Vector
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
-from ..casefile import AXES
-from ..coordinates import all_coordinates
+from ..coordinates import AXES, with_all_coordinates
 from ..document import MOST_NAMED, brief, decimal, explained, fault, remedy, shown, similar
 from ..supplied import LEFT_OUT, Supplied
 from .table import HardpointTable, placed, require_size
@@ -56,7 +55,7 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x forward, y left, z up{LEFT_OUT}"
     source += _listed(others)
-    return Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), all_coordinates(watched))
+    return with_all_coordinates(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ()))
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:

@@ -10,7 +10,7 @@ from ....drivers import JointAngle, JointDisplacement, JointDriver
 from ....joints import Fixed, Revolute
 from ....mechanism import Body, Mechanism, Point
 from ...case import Case, Sweep, Truth
-from ..coordinates import all_coordinates
+from ..coordinates import with_all_coordinates
 from ..document import explained, fault, remedy
 from ..supplied import LEFT_OUT, Supplied
 from .attributes import MAKE_BODIES, ROOT, WRITE_OUT
@@ -59,7 +59,7 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     model = root.attributes.get("model", file.stem)
     source = f"MJCF model {model!r} of {file.name}, from its pose qpos0{LEFT_OUT}{', '.join(others) or 'nothing'}"
     sweep = Sweep(driving.joint, driving.values, design=tree.joints[driving.joint].ref)
-    return Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, all_coordinates(points))
+    return with_all_coordinates(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
 
 
 def _require_model(root: Element) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,9 +12,8 @@ import numpy as np
 from ....mechanism import Mechanism
 from ....motions import Motion
 from ....trajectory import Array
-from ...case import Case, Output, Sweep, Truth
-from ...reading.casefile import AXES
-from ...reading.tolerance import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
+from ...case import Case, Sweep, Truth
+from ...reading.coordinates import with_all_coordinates
 from ..truth import Truth as Known
 from ..truth import followed
 
@@ -83,18 +82,7 @@ def as_case(
 ) -> Case:
     """The case of a mechanism, all coordinates of all its points as outputs."""
     sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
-    return Case(
-        mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, coordinates(point.name for point in mechanism.points)
-    )
-
-
-def coordinates(points: Iterable[str]) -> tuple[Output, ...]:
-    """All coordinates of points, as outputs."""
-    return tuple(
-        Output(f"{name}.{axis}", name, along, False, DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
-        for name in points
-        for axis, along in AXES.items()
-    )
+    return with_all_coordinates(Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
 
 
 def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:
