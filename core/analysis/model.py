@@ -98,6 +98,7 @@ class Model:
         bound: what is made of it for a thread.
         rows: name of a motion or test -> its rows among what is kept of a sample.
         kept: how many rows there are.
+        plan: the programs and how they are looped.
     """
 
     def __init__(self, mechanism: Mechanism, request: Request, tracing: Tracing) -> None:
@@ -114,7 +115,7 @@ class Model:
         kept = [slot for name in self._wanted() for slot in self.vectors[name]]
         self.rows = self._rows()
         self.kept = len(kept) + len(self._tests)
-        self._plan = Plan(
+        self.plan = Plan(
             self.programs,
             self.slots,
             after=("outputs",),
@@ -136,7 +137,7 @@ class Model:
             most=MAX_ITERATIONS,
         )
         compiled = self.request.compiled and available()
-        self._code = LlvmCode(self._plan) if compiled else None
+        self._code = LlvmCode(self.plan) if compiled else None
         self.bound = Bound()
         self.design = np.full(len(self.slots), np.nan) if request.rows else self._solve_design()
 
@@ -213,7 +214,7 @@ class Model:
 
         Whoever asks for as many gets the same memory, and sets all that it reads.
         """
-        return self.bound(lanes, lambda: LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes))
+        return self.bound(lanes, lambda: LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self.plan, lanes))
 
     def samples(self, times: Array, drive: Array) -> Array:
         """What `sampled` holds at the times, shape (sampled, n).
@@ -232,15 +233,10 @@ class Model:
         self.start(executor, sample)
         return executor.get(every)[:, 0]
 
-    @property
-    def plan(self) -> Plan:
-        """The programs and how they are looped."""
-        return self._plan
-
     @cached_property
     def ahead(self) -> list[int]:
         """The places of what lanes are predicted from."""
-        return [target for _, target in self._plan.carried]
+        return [target for _, target in self.plan.carried]
 
     def start(self, executor: Executor, sample: Array) -> None:
         """Make solved lanes those that go on from where they stand, with the rates that a sample of the drives gives them."""
