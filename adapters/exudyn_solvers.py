@@ -178,7 +178,7 @@ class _Solved:
             each.newton.useModifiedNewton = self.how.modified
         alpha = settings.timeIntegration.generalizedAlpha
         alpha.spectralRadius, alpha.useNewmark, alpha.useIndex2Constraints = 0.6, False, False
-        alpha.computeInitialAccelerations = True
+        alpha.computeInitialAccelerations = False  # it would take the drivers, which it knows by their values, for unaccelerated
         return settings
 
     def run(self, leg: Leg) -> Iterator[Pose]:
@@ -188,14 +188,19 @@ class _Solved:
         # the times of all steps, those of the samples among them as they are
         times = np.interp(np.arange(n + 1) / steps, np.arange(len(leg.samples)), leg.times)
         driven = leg.drive(times)
+        if not n:  # its sensors store what solvers go through
+            known = self.start.points.copy()
+            if self.how.kind == "static":
+                known[1:] = np.nan
+            yield Pose(known, 0.0, 0)
+            return
         self.table.rows = driven.tolist()
         self.set_off(leg, driven)
         failed = ""
-        if n:
-            try:
-                self.advance(n, abs(float(times[-1] - times[0])))
-            except RuntimeError as error:  # Exudyn's SolverError; what is stored up to there is good
-                failed = str(error).strip().split("\n")[0]
+        try:
+            self.advance(n, abs(float(times[-1] - times[0])))
+        except RuntimeError as error:  # Exudyn's SolverError; what is stored up to there is good
+            failed = str(error).strip().split("\n")[0]
         yield from self.poses(driven)
         if failed:
             raise SimulationEndedError(f"Exudyn: {failed}")
@@ -206,6 +211,7 @@ class _Solved:
         n = self.of.coordinates
         state.SetODE2Coordinates(self.start.configuration[:n], initial)
         state.SetODE2Coordinates_t(leg.sign * self.start.v[:n], initial)
+        state.SetODE2Coordinates_tt(self.start.a[:n], initial)
         if self.angles:
             state.SetDataCoordinates([0.0 if value is None else driven[0, value, 0] for value in self.angles], initial)
 

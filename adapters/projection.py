@@ -83,6 +83,7 @@ class _Sample:
     saved: Any
     x: Array
     v: Array
+    a: Array
     rows: tuple[Array, Array, Array]
     corrected: Array
     iterations: int
@@ -186,7 +187,7 @@ class Walk:
         if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
             return None
         position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
-        return _Sample(t, self.model.save(), position.ravel(), v, (position, velocity, acceleration), *done)
+        return _Sample(t, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), *done)
 
     def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
         """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t).

@@ -1,8 +1,9 @@
 """Simulate mode, shared by the simulators: where they set off, which way, and what counts as having arrived.
 
-A simulator starts at the sample nearest to the design, in a pose and at rates that its projection model gives, because none of them
-checks its initial values, and goes from there in two legs. Backwards is the same motion seen in reverse: its own time still grows,
-rates change their sign and accelerations do not. What a simulator then reports is its own, soft constraints and drift included.
+A simulator starts at the sample nearest to the design that can be reached, in a pose and at rates that its projection model gives,
+because none of them checks its initial values, and goes from there in two legs. Backwards is the same motion seen in reverse: its
+own time still grows, rates change their sign and accelerations do not. What a simulator then reports is its own, soft constraints
+and drift included.
 """
 
 from __future__ import annotations
@@ -33,12 +34,13 @@ class SimulationEndedError(KincheckError):
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A consistent pose at the sample nearest to the design.
+    """A consistent pose at a sample near the design.
 
     Attributes:
         sample: its index.
         configuration: what the model's `save` gave there.
-        v: rates of the unknowns there.
+        v, a: rates of the unknowns there, and theirs.
+        points: position, velocity and acceleration of each of case.points there, shape (3, points, 3).
         size: of the mechanism [m].
         independent: whether the rows of the model are.
     """
@@ -46,6 +48,8 @@ class Start:
     sample: int
     configuration: Any
     v: Array
+    a: Array
+    points: Array
     size: float
     independent: bool
 
@@ -97,18 +101,19 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
     """Where to set off.
 
     Raises:
-        SolveError: the design does not close, or the sample next to it cannot be reached.
+        SolveError: the design does not close, or the samples next to it, on either side, cannot be reached.
     """
     walk, path = Walk(model, case, START), case.sweep.path
     origin, message = walk.start(path)
     if origin is None:
         raise SolveError(f"case {case.name!r}: {message}")
-    k = int(np.abs(path.times - origin.t).argmin())
-    aim = float(path.times[k])
-    at, reached = walk.advance(path, origin, aim, abs(aim - origin.t))
-    if not reached:
-        raise SolveError(f"case {case.name!r}: the sample nearest to the design cannot be reached; let the sweep come nearer to it")
-    return Start(k, at.saved, at.v, walk.size, walk.rows == walk.rank)
+    nearest = [int(side[0]) for side in outwards(path.times, origin.t) if len(side)]
+    for k in sorted(nearest, key=lambda k: abs(float(path.times[k]) - origin.t)):
+        aim = float(path.times[k])
+        at, reached = walk.advance(path, origin, aim, abs(aim - origin.t))
+        if reached:
+            return Start(k, at.saved, at.v, at.a, np.array(at.rows), walk.size, walk.rows == walk.rank)
+    raise SolveError(f"case {case.name!r}: no sample next to the design can be reached; let the sweep come nearer to it")
 
 
 def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[str, Any]) -> Trajectory:
@@ -142,7 +147,11 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
 
 
 def legs(case: Case, start: int) -> list[Leg]:
-    """The ways from a sample to both ends of the sweep; samples at the same time as the start come in the first."""
+    """The ways from a sample to both ends of the sweep; samples at the same time as the start come in the first.
+
+    Where there is none but the start, it is a leg of its own.
+    """
     times = case.sweep.path.times
     sides = [np.concatenate([[start], side[side != start]]) for side in outwards(times, float(times[start]))]
-    return [Leg(case, side, sign) for side, sign in zip(sides, (1.0, -1.0), strict=True) if len(side) > 1 or sign > 0.0]
+    ways = [Leg(case, side, sign) for side, sign in zip(sides, (1.0, -1.0), strict=True)]
+    return [leg for leg in ways if len(leg.samples) > 1] or ways[:1]

@@ -25,7 +25,8 @@ class PointCoordinate(Driver):
     Attributes:
         point: name of the driven point.
         direction: global direction, any length but zero [-].
-        relative: the value is the change from the design position (default), else the coordinate itself [m].
+        relative: the value is the change from the design position (default), else the coordinate itself [m]; see
+            `Mechanism.design_value`.
     """
 
     type: ClassVar[str] = "point_coordinate"

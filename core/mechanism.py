@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
-from .joints.base import Coupler, Joint, Kind
+from .joints.base import Coupler, Joint, Kind, unit
 from .joints.given import require_finite, triple
 
 GROUND = "ground"
@@ -146,6 +146,13 @@ class Mechanism:
     def driver(self, name: str) -> Driver:
         """The driver of that name."""
         return self._named["drivers"][name]
+
+    def design_value(self, name: str) -> float:
+        """The value of a driver at the design position, as its values are given: the coordinate of its point [m], or zero."""
+        driver = self.driver(name)
+        if not isinstance(driver, PointCoordinate) or driver.relative:
+            return 0.0
+        return sum((d * x for d, x in zip(unit(driver.direction), self.point(driver.point).position, strict=True)), 0.0)
 
     @cached_property
     def _named(self) -> Mapping[str, Mapping[str, Any]]:

@@ -104,7 +104,8 @@ class Table(Motion):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if len(self.times) != len(self.values) or len(self.times) < 2:
             raise MechanismError(
-                f"table motion: {len(self.times)} times and {len(self.values)} values, expected as many of each, two or more"
+                f"table motion: {len(self.times)} times and {len(self.values)} values, expected as many of each, two or more; "
+                "give a value for each time"
             )
         if not all(map(math.isfinite, (*self.times, *self.values))):
             raise MechanismError("table motion: a time or value is not finite; give numbers")
@@ -140,6 +141,12 @@ class Absolute(Motion):
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         value, velocity, acceleration = self.motion.at(t)
         return value - self.design, velocity, acceleration
+
+
+def from_design(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:
+    """Motions of drivers, by name, as changes from their design values, which are given where they are not zero."""
+    there = {name: motion for name, motion in motions.items() if name in design and not isinstance(motion, Absolute)}
+    return {**motions, **{name: Absolute(motion, design[name]) for name, motion in there.items()}}
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ BROKEN = {
         ('"translational"', '"qqq"'),
         ["joints.guide.type", "known: constant_velocity, cylindrical"],
     ),
-    "no joint type": (('type = "translational"', ""), ["joints.guide.type", "expected a joint type"]),
+    "no joint type": (('type = "translational"', ""), ["joints.guide.type", "missing, expected a joint type; add it"]),
     "joint type of another kind": (('type = "translational"', "type = [1]"), ["joints.guide.type", "[1]"]),
     "unknown driver": (('"joint_displacement"', '"joint_shift"'), ["drivers.push.type", "'joint_shift'", "joint_displacement"]),
     "missing body": (

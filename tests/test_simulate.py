@@ -9,7 +9,19 @@ import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.adapters.jointed import jointed
-from kincheck.core import Body, Distance, Gear, JointAngle, Mechanism, Point, Revolute, solve
+from kincheck.core import (
+    Body,
+    Distance,
+    Gear,
+    JointAngle,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    Revolute,
+    Translational,
+    solve,
+)
 from kincheck.core.harness import cli
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
 from kincheck.core.harness.record import Outcome, from_json
@@ -207,3 +219,44 @@ def test_the_command_line_keeps_modes_apart(tmp_path, capsys, monkeypatch):
     assert "engine 'exudyn-static' has the mode 'simulate', not 'projection'" in capsys.readouterr().err
     assert cli.main(["list"]) == 0
     assert "exudyn-static-modified" in capsys.readouterr().out
+
+
+def slide(values, motion=None):
+    """A block on a rail, driven along it."""
+    rail = Translational("rail", "ground", "block", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    mechanism = Mechanism(
+        "slide", [Body("block")], [rail], [Point("tip", "block", (1.0, 0.2, 0.0))], [JointDisplacement("x", "rail")]
+    )
+    sweep = Sweep("time", np.array(values), motions={"x": motion}) if motion else Sweep("x", np.array(values))
+    return Case(
+        "slide", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, (Output("x", "tip", (1.0, 0.0, 0.0), False, 1e-5, 0.0, "test"),)
+    )
+
+
+@pytest.mark.parametrize("values", [[0.0, -0.1, -0.2], [-0.1, -0.15, -0.2], [0.0], [-0.1]], ids=str)
+@pytest.mark.parametrize("name", adapters.SIMULATIONS)
+def test_sweeps_to_one_side_only_or_of_one_sample(name, values):
+    found = record(slide(values), simulation(name))
+    assert found.solved == len(values), found.message
+    assert worst(found)[0] <= 1e-6
+
+
+@pytest.mark.parametrize("name", ["exudyn", "exudyn-alpha"])
+def test_a_motion_may_begin_with_an_acceleration(name):
+    """The sine of 90 degrees: 0.5 (2 pi)^2 m/s^2 at once; an integrator that begins without is off by as much."""
+    found = record(slide(np.linspace(0.0, 0.1, 41), Sine(0.5, 1.0, np.pi / 2.0)), simulation(name))
+    assert worst(found)[2] <= 0.02 * 0.5 * (2.0 * np.pi) ** 2
+
+
+@pytest.mark.parametrize("name", ["mujoco-projecting", "pinocchio", "exudyn", "exudyn-static"])
+def test_where_the_nearest_sample_cannot_be_reached_the_other_side_is(name):
+    """An arm whose tip is at 0.6 m and gets to 1 m."""
+    hinge = Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    lift = PointCoordinate("y", "tip", (0.0, 1.0, 0.0))
+    mechanism = Mechanism("arm", [Body("arm")], [hinge], [Point("tip", "arm", (0.8, 0.6, 0.0))], [lift])
+    output = Output("x", "tip", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "test")
+    case = Case("arm", "test", Truth.CONSENSUS_ONLY, mechanism, Sweep("y", np.array([-0.5, 0.45])), (output,))
+    found = record(case, simulation(name))
+    assert (found.outcome, found.solved) == (Outcome.FAIL, 1)
+    assert "cannot be followed to y = 0.45" in found.message
+    assert found.outputs["x"].position[0] == pytest.approx(np.sqrt(1.0 - 0.1**2), abs=1e-9)

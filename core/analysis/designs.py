@@ -56,7 +56,8 @@ def solve_designs(
 
     Args:
         mechanism: the nominal design.
-        driver, values, rate, points, tol, motions: as for `solve`; drivers are measured from the design position of each design.
+        driver, values, rate, points, tol, motions: as for `solve`; drivers are measured from the design position of each design,
+            so that a point that varies can be driven by its change only.
         geometry: what varies [m or -]: by place, named as in a case file ("joints.tie_rod.points.0", "joints.hinge.axis",
             "points.wheel_center.position", a length), values of shape (V, 3), or (V,) of a length. Places that are one hardpoint
             are each to be given.
@@ -67,6 +68,11 @@ def solve_designs(
     """
     path, request = asked(mechanism, driver, values, rate, points, (), order, tol, "native", motions)
     known = places(mechanism)
+    for name in path.design:
+        moved = f"points.{getattr(mechanism.driver(name), 'point', '')}.position"
+        if moved in geometry:
+            problem = f"driver {name!r} gives the absolute position of a point that varies, {moved}"
+            raise SolveError(f"solve_designs: {problem}; drive it with relative = True, or leave the point")
     numbers: list[Array] = []
     for place, given in geometry.items():
         if place not in known:

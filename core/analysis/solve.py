@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..motions import Motion, Path, Ramp
+from ..motions import Motion, Path, Ramp, from_design
 from ..trajectory import Array, Trajectory
 from .equations.constraints import Style
 from .prepare import prepare
@@ -30,14 +30,15 @@ def solve(
     style: str = "native",
     motions: Mapping[str, Motion] | None = None,
 ) -> Trajectory:
-    """Sweep one driver over values, measured from the design position.
+    """Sweep one driver over values.
 
     What was made ready for the last few mechanisms is kept in the process: the next call for one of them costs a fraction.
 
     Args:
         mechanism: what to solve.
         driver: name of the driver that moves; the others hold their design value.
-        values: driver values [m or rad], in any order; solved from zero outwards.
+        values: driver values [m or rad], in any order: measured from the design position, or the coordinate itself where the
+            driver is not relative. They are solved from the design position outwards.
         rate: driver units per second; velocities and accelerations are per second at this constant rate.
         points: points whose motion is wanted; all of them unless given.
         bodies: bodies whose motion is wanted, in the paper's variables.
@@ -46,7 +47,8 @@ def solve(
         style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes), "conventional" (full
             products), "mixed" (joint coordinates as further unknowns) or "relative" (joint coordinates of a tree as the only
             ones); the solutions are the same.
-        motions: of further drivers, over the time in which the swept one goes from zero at the rate; the others hold.
+        motions: of further drivers, their values measured likewise, over the time in which the swept one goes from its design
+            value at the rate; the others hold.
 
     Returns:
         The motion; NaN where a sample cannot be reached, and the reason in its message.
@@ -97,10 +99,11 @@ def asked(
             if name not in there:
                 require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
                 raise SolveError(f"solve: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
+    design = {name: value for name in (driver, *(motions or {})) if (value := mechanism.design_value(name))}
     with np.errstate(over="ignore"):
-        times = values / rate
+        times = (values - design.get(driver, 0.0)) / rate
     _require(bool(np.isfinite(times).all()), f"rate is {rate}: no number is the time of the values then; give a larger one")
-    path = Path({**(motions or {}), driver: Ramp(rate)}, times)
+    path = Path({**from_design(motions or {}, design), driver: Ramp(rate)}, times, design)
     return path, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style))
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from ...algebra import Vec3, vec
 from ...mechanism import Mechanism
 from ...motions import Path
-from ...primitives.base import GROUND_POSE, Motion
+from ...primitives.base import GROUND_POSE, Drive, Motion
 from ...trajectory import Array, Trajectory
 from ..equations.cartesian import Cartesian
 from ..equations.constraints import Frames, constraints
@@ -118,6 +118,7 @@ def conditioning(
     at = {int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()}
     at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
     geometry = _slopes(mechanism, varied)
+    elsewhere = placed(mechanism, geometry)
     looked, matrices = list[Pose](), list[Array]()
     seen = sorted(at & set(reached.tolist()))
     for k in seen:
@@ -134,7 +135,7 @@ def conditioning(
         U, sizes, V = np.linalg.svd(solved)
         inverse = (V.T / sizes) @ U.T
         metres = inverse / np.where(_is_length(formulation, solved), frame.unit, 1.0)
-        changed = Cartesian(constraints(placed(mechanism, geometry), frame, drives), frame.moving)
+        changed = Cartesian(constraints(elsewhere, frame, _held(mechanism, elsewhere, drives, frame)), frame.moving)
         phi = changed.phi(configuration)
         by_geometry = np.array([np.broadcast_to(derivatives(x), (_count(mechanism, varied),)) for x in phi])
         shift = -inverse @ by_geometry[kept]
@@ -155,6 +156,12 @@ def conditioning(
     nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
     turned = _orientations(matrices, jacobian(still, still.configuration(still.design)), nearest)
     return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], numbers)
+
+
+def _held(mechanism: Mechanism, elsewhere: Mechanism, drives: Mapping[str, Drive], frame: Frames) -> dict[str, Drive]:
+    """Drives whose values stay where the geometry changes: from the design, which goes elsewhere, an absolute one is another."""
+    shift = {name: (elsewhere.design_value(name) - mechanism.design_value(name)) * (1.0 / frame.unit) for name in drives}
+    return {name: replace(drive, c=drive.c - shift[name]) for name, drive in drives.items()}
 
 
 def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> list[float]:

@@ -55,7 +55,9 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
     for style in Style:
         found = {place: _swept(case, mechanism, style) for place, mechanism in places.items()}
         # where positions alone are asked for, rates are a program of their own: it is run where the motion begins
-        size = solve(case.mechanism, case.sweep.driver, [0.0], order=0, style=style).details["program"]
+        size = solve(
+            case.mechanism, case.sweep.driver, [case.mechanism.design_value(case.sweep.driver)], order=0, style=style
+        ).details["program"]
         programs.append(ProgramSize(style.value, size["newton"]["flops"], size["tangent"]["flops"]))
         outputs = {place: _outputs(replace(case, mechanism=places[place]), each) for place, each in found.items()}
         reference = np.array([[getattr(case.reference[output.name], name) for name in MOTIONS] for output in case.outputs])
@@ -67,7 +69,8 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
 
 def _swept(case: Case, mechanism: Mechanism, style: str) -> Trajectory:
     sweep = case.sweep
-    found = solve(mechanism, sweep.driver, sweep.change, rate=sweep.rate, points=case.points, style=style)
+    values = sweep.change + mechanism.design_value(sweep.driver)
+    found = solve(mechanism, sweep.driver, values, rate=sweep.rate, points=case.points, style=style)
     if not found.solved.all():
         raise SolveError(f"bench formulation: case {case.name!r}, style {style!r}: {found.message}; choose a sweep it can finish")
     return found

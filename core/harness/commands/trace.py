@@ -59,7 +59,7 @@ def _trace(options: argparse.Namespace, house: House) -> int:
     curves = [trace(case.mechanism, driver, length=options.length)]
     if not curves[0].closed:
         curves.append(trace(case.mechanism, driver, length=options.length, direction=-1))
-    design = case.sweep.design if driver == case.sweep.driver else 0.0
+    design = case.mechanism.design_value(driver)
     unit = "rad" if case.mechanism.driver(driver).type == "joint_angle" else "m"
     out = sys.stderr if options.json == "-" else sys.stdout
     for direction, curve in zip((1, -1), curves, strict=False):

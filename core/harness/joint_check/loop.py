@@ -68,12 +68,12 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
 
 
 def _solved(case: Case) -> Trajectory:
-    return solve(case.mechanism, case.sweep.driver, case.sweep.change, rate=case.sweep.rate, tol=TOL)
+    return solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate, tol=TOL)
 
 
 def _rates(case: Case) -> Iterator[Finding]:
     """Velocities and accelerations against differences, which know nothing of rows and right-hand sides."""
-    first, *_, last = grid = case.sweep.change.tolist()
+    first, *_, last = grid = case.sweep.values.tolist()
     values: Array = np.linspace(first, last, FINER * (len(grid) - 1) + 1, dtype=np.float64)
     fine = solve(case.mechanism, case.sweep.driver, values, rate=case.sweep.rate, tol=TOL)
     dt, motion = float(values[1] - values[0]) / case.sweep.rate, fine.points[case.points[0]]

@@ -236,7 +236,10 @@ def class_of(file: Path, key: str, what: str, value: object, known: Mapping[str,
     Raises:
         CaseError: not a table, or no such type.
     """
-    name = as_table(file, key, value).get("type", "")
+    table = as_table(file, key, value)
+    if "type" not in table:
+        raise fault(file, join(key, "type"), f"missing, expected a {what} type; add it, one of {', '.join(known)}")
+    name = table["type"]
     if not isinstance(name, str) or name not in known:
         raise fault(file, join(key, "type"), f"found {shown(name)}, expected a {what} type; {remedy(str(name), known)}")
     return known[name]

@@ -10,7 +10,6 @@ import msgspec
 import numpy as np
 
 from ...drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
-from ...joints.base import unit
 from ...mechanism import Mechanism
 from ...motions import Absolute, Measure, Motion
 from ...trajectory import Array
@@ -55,7 +54,7 @@ def read_sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Convert
     convert, design = float, 0.0
     if sweep.driver != TIME:
         driver = mechanism.driver(sweep.driver)
-        convert, design = _unit(driver, length, angle), _design(mechanism, driver)
+        convert, design = _unit(driver, length, angle), mechanism.design_value(sweep.driver)
     grid = np.array([convert(value) for value in np.linspace(sweep.start, sweep.stop, sweep.steps).tolist()])
     found = Sweep(sweep.driver, grid, convert(1.0 if sweep.rate is None else sweep.rate), design, motions)
     for name, motion in motions.items():
@@ -97,7 +96,7 @@ def _motion(file: Path, mechanism: Mechanism, name: str, value: object, length: 
     }
     with explained(file, key):
         motion = cls(**given)
-    design = _design(mechanism, driver)
+    design = mechanism.design_value(name)
     return Absolute(motion, design) if design else motion
 
 
@@ -121,10 +120,3 @@ def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
 def _unit(driver: Driver, length: Convert, angle: Convert) -> Convert:
     """What makes SI of a driver's values."""
     return angle if isinstance(driver, JointDriver) and driver.freedom == "rotation" else length
-
-
-def _design(mechanism: Mechanism, driver: Driver) -> float:
-    """The driver's value at the design position [m or rad]."""
-    if isinstance(driver, PointCoordinate) and not driver.relative:
-        return float(np.dot([*unit(driver.direction)], mechanism.point(driver.point).position))
-    return 0.0

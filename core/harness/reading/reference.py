@@ -27,7 +27,7 @@ from msgspec import Meta
 from ...trajectory import Array
 from ..case import PER_TRAVEL, Quantity, Series
 from ..references import read, series
-from .document import decimal, fault, read_text, remedy, shown
+from .document import LARGEST, decimal, fault, read_text, remedy, shown
 
 LARGEST_FILE = 64_000_000
 # As many samples as a sweep can have, and as many lines between them.
@@ -195,10 +195,9 @@ def _number(file: Path, line: str, column: str, cell: str) -> float:
         number = decimal(cell)
     except ValueError:
         number = math.nan
-    if not math.isfinite(number):
-        raise fault(
-            file, f"{line}, column {column}", f"found {shown(cell)}, expected a finite number; correct it or leave the column out"
-        )
+    if not abs(number) <= LARGEST:
+        expected = f"expected a finite number, at most {LARGEST:g}"
+        raise fault(file, f"{line}, column {column}", f"found {shown(cell)}, {expected}; correct it or leave the column out")
     return number
 
 
@@ -214,7 +213,8 @@ def _check_columns(samples: _Samples, names: Sequence[str], outputs: Sequence[st
     if not names:
         raise fault(samples.file, samples.header, f"found no column of an output, expected some of {', '.join(outputs)}; add one")
     if samples.columns[0] in known:
-        problem = f"found {samples.columns[0]!r} first, expected the driver values; put their column first"
+        problem = f"found {samples.columns[0]!r} first, the name of an output, expected the driver values"
+        problem += "; put their column first, or name it otherwise"
         raise fault(samples.file, samples.header, problem)
     for name in names:
         if counts[name] > 1:
