@@ -93,5 +93,6 @@ def __getattr__(name: str) -> Any:
         for room in _ROOMS:  # what is quick to import first
             found = getattr(import_module(room, __name__), name, None)
             if found is not None:
+                globals()[name] = found
                 return found
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -16,12 +16,13 @@ from typing import Any, TypeAlias
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
 from .joints.base import Coupler, Joint, Kind, unit
-from .joints.given import require_finite, triple
+from .joints.given import held, require_finite, triple
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
 
 Vector: TypeAlias = tuple[float, float, float]
+EULER_PARAMETERS = "four numbers, e0 first"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +44,13 @@ class Body:
         who = f"body {self.name!r}: origin"
         object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
         require_finite(who, self.origin, Kind.POSITION.value)
-        p = [float(e) for e in self.euler_parameters]
+        p = held(who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, EULER_PARAMETERS)
+        require_finite(who, p, EULER_PARAMETERS)
         length = math.sqrt(sum(e * e for e in p))
         # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
-        if len(p) != 4 or not abs(length - 1.0) < 1e-3:
+        if not abs(length - 1.0) < 1e-3:
             raise MechanismError(
-                f"body {self.name!r}: euler_parameters {p} have length {length:.6g}, expected four numbers of "
+                f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected four numbers of "
                 "length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
             )
         object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import assemble, solve
+from kincheck.core import SolveError, assemble, find_assemblies, solve
 
 from .mechanisms import four_bar, mcpherson
 
@@ -124,3 +124,16 @@ def test_estimates_that_lead_nowhere_are_nan():
     found = assemble(mechanism, {"knuckle": (np.array([knuckle.origin]), np.array([knuckle.euler_parameters]))}, {"stroke": 0.6})
     assert not found.converged.any()
     assert np.isnan(found.bodies["knuckle"].r).all()
+
+
+def test_without_estimates_it_closes_from_the_design():
+    found = assemble(four_bar(), {})
+    assert found.converged.tolist() == [True]
+
+
+@pytest.mark.parametrize("close", [assemble, find_assemblies])
+def test_names_that_are_not_there_are_told(close):
+    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no body 'crnk'; known: .*crank"):
+        close(four_bar(), {"crnk": (np.zeros((1, 3)), np.zeros((1, 4)))})
+    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no driver 'trn'; known: "):
+        close(four_bar(), {}, {"trn": 0.1})

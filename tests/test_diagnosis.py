@@ -22,7 +22,7 @@ from kincheck.core import (
 )
 from kincheck.core.analysis.diagnosis.rank import Ranks
 from kincheck.core.analysis.diagnosis.screws import free_motions
-from kincheck.core.analysis.equations.geometry import places
+from kincheck.core.analysis.equations.geometry import directions, places
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
@@ -257,3 +257,34 @@ def test_points_that_are_fixed_do_not_depend_on_anything_but_themselves():
     found = diagnose(case(mechanism, [0.01], "bolt"), samples=1, tol=1e-12)
     assert {each.number for each in found.sensitivities} == {f"points.bolt.position {axis}" for axis in "xyz"}
     assert {each.shift for each in found.budgets} == {0.0}
+
+
+@pytest.mark.parametrize("length", [1.0, 0.125, 0.3])
+def test_what_a_blocked_shift_asks_of_turns_is_by_the_metre(length):
+    """A point on an arm, driven across the plane it moves in: the hinge would have to turn about the axes of that plane."""
+    arm = Mechanism(
+        "arm",
+        [Body("arm")],
+        [Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+        [Point("tip", "arm", (length, 0.0, 0.0))],
+        [PointCoordinate("z", "tip", (0.0, 0.0, 1.0))],
+    )
+    (blocked,) = Ranks(arm).blocked
+    # the least motion: v + w L = 1, weighted by the frame's unit u of length, is w u = L/u / (1 + (L/u)^2)
+    part = length / Ranks(arm).frame.unit
+    turn = part / (1.0 + part**2) / Ranks(arm).frame.unit
+    about = [each.amount for each in blocked.rows if "about" in each.row.holds]
+    assert np.abs(about) == pytest.approx([turn])
+
+
+def test_directions_are_told_by_what_they_are_not_by_their_names():
+    """A joint may be called as a field is."""
+    joints = [Revolute("rear.axis", "ground", "arm", (3.0, 4.0, 0.0), (0.0, 0.0, 2.0))]
+    points = [Point("tip", "arm", (4.0, 4.0, 0.0))]
+    arm = Mechanism("arm", [Body("arm")], joints, points, [JointAngle("turn", "rear.axis")])
+    assert directions(arm) == {"joints.rear.axis.axis"}
+    output = Output("y", "tip", (0.0, 1.0, 0.0), False, 1e-9, 0.0, "test")
+    case = Case("arm", "test", Truth.CONSENSUS_ONLY, arm, Sweep("turn", np.array([0.5])), (output,))
+    found = {each.number: (each.unit, each.by_sample[0]) for each in diagnose(case, samples=1, tol=1e-12).sensitivities}
+    # the tip, in the arm, is its place at design less the point's: it turns about the point
+    assert found["joints.rear.axis.point x"] == ("m/m", pytest.approx(-np.sin(0.5)))

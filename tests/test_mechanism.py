@@ -78,3 +78,9 @@ def test_what_is_no_point_is_told_so(name):
     with pytest.raises(MechanismError) as told:
         make()
     assert message in str(told.value)
+
+
+@pytest.mark.parametrize("given", [None, "abcd", 1.0, (1.0, 0.0, 0.0), (float("nan"), 0.0, 0.0, 0.0)])
+def test_euler_parameters_that_are_none_are_told(given):
+    with pytest.raises(MechanismError, match="body 'a': euler_parameters"):
+        Body("a", euler_parameters=given)

@@ -2,11 +2,15 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from gc import collect
+from threading import Thread
+from weakref import WeakSet
 
 import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.analysis import march, model, route
+from kincheck.core.analysis.bound import Bound
 from kincheck.core.analysis.cascade import cascade
 from kincheck.core.analysis.cascade import sweep as cascade_sweep
 from kincheck.core.analysis.prepare import prepare
@@ -202,3 +206,23 @@ def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
     with ThreadPoolExecutor(1) as threads:
         threads.submit(solve, large, driver, values).result()
     assert len(made) == 2
+
+
+def test_what_was_made_for_a_thread_goes_with_it():
+    bound = Bound()
+    made = WeakSet()
+
+    class Made:
+        pass
+
+    def ask():
+        one, other = (bound("key", Made) for _ in range(2))
+        assert one is other
+        made.add(one)
+
+    ask()
+    thread = Thread(target=ask)
+    thread.start()
+    thread.join()
+    collect()
+    assert len(made) == 1

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Hashable
+from threading import local
 from typing import Any, TypeVar
 
 Made = TypeVar("Made")
 
 
-class Bound:
-    """What is made of something, by key and thread: made once, and kept."""
+class Bound(local):
+    """What is made of something, by key: made once for each thread, and kept as long as that lives."""
 
     def __init__(self) -> None:
-        self._found: dict[Any, Any] = {}
+        self._found: dict[Hashable, Any] = {}
 
     def __call__(self, key: Hashable, make: Callable[[], Made]) -> Made:
         """What was made under this key for this thread before; or is made now."""
-        key = threading.get_ident(), key
         if key not in self._found:
             self._found[key] = make()
         return self._found[key]

@@ -1,4 +1,4 @@
-"""Why a lane of a march was not accepted: the tests of `Tracer.test`, in words."""
+"""Why a lane of a march was not accepted: the tests of `following`, in words."""
 
 from __future__ import annotations
 

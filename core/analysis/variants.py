@@ -48,7 +48,7 @@ class Variants:
 def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     """Solve all variants at all samples. Drivers are measured from the design position of each variant.
 
-    A variant's numbers depend on its own geometry only, not on which others are solved with it.
+    A variant's numbers depend to round-off on its own geometry only, not on which others are solved with it.
 
     Args:
         route: of a model with varied places.

@@ -12,12 +12,13 @@ A cap on the turn of a step (0.15 to 1.2 rad) was tried besides: it changes thes
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...primitives.base import Pose
 from ...program import NumpyExecutor, Plan, Program, program
@@ -73,10 +74,21 @@ def assemble(
         style: how the rows are written; "mixed" leads to the intended branch from farthest.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match.
+        SolveError: drivers and degrees of freedom do not match, or there is no body or driver of a name.
     """
+    require_named("assemble", mechanism, estimates, values or {})
     closing = Closing(mechanism, values or {}, style)
-    return closing.run(displaced(mechanism, closing.tracer.frame, estimates), len(next(iter(estimates.values()))[0]), tol)
+    n = max((len(r) for r, _ in estimates.values()), default=1)
+    return closing.run(displaced(mechanism, closing.tracer.frame, estimates), n, tol)
+
+
+def require_named(who: str, mechanism: Mechanism, bodies: Iterable[str], drivers: Iterable[str]) -> None:
+    """Raise SolveError unless there are bodies and drivers of these names."""
+    for what, names, known in (("body", bodies, mechanism.bodies), ("driver", drivers, mechanism.drivers)):
+        there = [each.name for each in known]
+        for name in names:
+            if name not in there:
+                raise SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
 
 
 class Closing:

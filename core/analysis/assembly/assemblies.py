@@ -16,7 +16,7 @@ from ...topology import spanning_tree
 from ...trajectory import Array
 from ..equations.constraints import Frames
 from ..equations.poses import displaced
-from .assemble import Closing
+from .assemble import Closing, require_named
 from .signature import Branches
 
 # Starts around an estimate: turned by up to this [rad], and shifted by about this part of the mechanism's size. Bodies that are
@@ -91,8 +91,9 @@ def find_assemblies(
         tol: largest accepted residual, relative to the mechanism's size.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match.
+        SolveError: drivers and degrees of freedom do not match, or there is no body or driver of a name.
     """
+    require_named("find_assemblies", mechanism, estimate, values or {})
     closing = Closing(mechanism, values or {})
     frame = closing.tracer.frame
     near = displaced(mechanism, frame, estimate)

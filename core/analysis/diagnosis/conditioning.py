@@ -11,6 +11,7 @@ out of J need not hold for the changed geometry: its residual then says how much
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +25,7 @@ from ...trajectory import Array, Trajectory
 from ..equations.cartesian import Cartesian
 from ..equations.constraints import Frames, constraints
 from ..equations.formulation import Configuration
-from ..equations.geometry import placed, places
+from ..equations.geometry import directions, placed, places
 from ..equations.poses import displaced, jacobian, state_of
 from ..model import compile_model, standing_drives
 from ..request import Request
@@ -151,7 +152,11 @@ def conditioning(
                 by_geometry[dropped] + rest @ shift,
             )
         )
-    numbers = [(place, k, _length(place, value)) for place, value in _varied(mechanism, varied).items() for k in range(len(value))]
+    # a derivative by the components of a direction becomes one by its angle
+    lengths = {place: math.hypot(*value) for place, value in _varied(mechanism, varied).items() if place in directions(mechanism)}
+    numbers = [
+        (place, k, lengths.get(place, 1.0)) for place, value in _varied(mechanism, varied).items() for k in range(len(value))
+    ]
     still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
     turned = _orientations(matrices, jacobian(still, still.configuration(still.design)), nearest)
@@ -194,11 +199,6 @@ def _varied(mechanism: Mechanism, varied: Sequence[str]) -> dict[str, tuple[floa
 
 def _count(mechanism: Mechanism, varied: Sequence[str]) -> int:
     return sum(map(len, _varied(mechanism, varied).values()))
-
-
-def _length(place: str, value: Sequence[float]) -> float:
-    """Of a direction, so that a derivative by its components becomes one by its angle; 1 for a point or a length."""
-    return float(np.linalg.norm(value)) if ".axis" in place or ".axes" in place else 1.0
 
 
 def _slopes(mechanism: Mechanism, varied: Sequence[str]) -> dict[str, tuple[Slope, ...]]:

@@ -194,15 +194,16 @@ class Ranks:
             given = joints @ least
             turns = isinstance(driver, JointDriver) and driver.freedom == "rotation"
             if np.abs(given).max(initial=0.0) > OWED or against > OWED:
-                scale = self.frame.unit if turns else 1.0
-                found.append(Blocked(driver.name, tuple(self._violations(given, scale))))
+                # by a radian of the driver, or by a metre
+                units = (self.frame.unit, 1.0) if turns else (1.0, 1.0 / self.frame.unit)
+                found.append(Blocked(driver.name, tuple(self._violations(given, *units))))
         return found
 
-    def _violations(self, amounts: Array, length: float) -> list[Violation]:
-        """The rows with the largest amounts; those of lengths are in this unit."""
+    def _violations(self, amounts: Array, length: float, angle: float = 1.0) -> list[Violation]:
+        """The rows with the largest amounts; those of lengths and of angles are in these units."""
         largest = np.abs(amounts).max(initial=0.0)
         order = [k for k in _largest_first(amounts) if abs(amounts[k]) > max(SHARE * largest, OWED * OWED)]
-        units = [length if "along" in self.rows[k].holds else 1.0 for k in order]
+        units = [length if "along" in self.rows[k].holds else angle for k in order]
         return [Violation(self.rows[k], float(amounts[k]) * unit) for k, unit in zip(order, units, strict=True)]
 
     @cached_property

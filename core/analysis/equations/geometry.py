@@ -30,6 +30,16 @@ def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
     return found | {f"points.{point.name}.position": point.position for point in mechanism.points}
 
 
+def directions(mechanism: Mechanism) -> frozenset[str]:
+    """The places that hold directions: what varies there is an angle."""
+    found: set[str] = set()
+    for joint in mechanism.joints:
+        for name, kind in _fields(joint):
+            place = f"joints.{joint.name}.{name}"
+            found |= {Kind.DIRECTION: {place}, Kind.DIRECTIONS: {f"{place}.0", f"{place}.1"}}.get(kind, set())
+    return frozenset(found)
+
+
 def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mechanism:
     """The mechanism with other values at some places, numbers of any kind; they are not checked again."""
     joints = [joint.changed(**_changes(joint, values)) for joint in mechanism.joints]

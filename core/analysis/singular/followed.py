@@ -171,7 +171,7 @@ class Followed:
         found = march(end.route, self.tol, low=low)
         further = found.solved & ~self.found.solved[samples]
         taken = samples[further]
-        self.found.kept[:, taken], self.found.solved[taken] = found.kept[:, further], True
+        self.found.kept[:, taken], self.found.solved[taken], self.part_of[taken] = found.kept[:, further], True, number
         return [each for each in found.ends if side * (each.wanted - end.route.start) >= 0.0]
 
     def _missing(self, number: int, side: float, wanted: float) -> NDArray[np.intp]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import msgspec
 import numpy as np
 
-from ...analysis.equations.geometry import places
+from ...analysis.equations.geometry import directions, places
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
 from ...analysis.route import Route
@@ -70,7 +70,7 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
         case: with its truth.
     """
     values = places(case.mechanism)
-    varied = tuple(name for name in values if "axis" not in name and "axes" not in name)
+    varied = tuple(name for name in values if name not in directions(case.mechanism))
     path = case.sweep.path
     model = compile_model(case.mechanism, Request(tuple(path.motions), case.points, varied=varied))
     nominal = np.array([number for name in varied for number in values[name]])

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...algebra import Vec3, vec
 from ...analysis.diagnosis.conditioning import Conditioning, Gradient, Pose
+from ...analysis.equations.geometry import directions
 from ...jet import Jet
 from ...trajectory import Array
 from ..case import Case, Quantity
@@ -94,7 +95,7 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
 def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> list[Sensitivity]:
     """The derivatives that are not zero throughout, the largest of each output first."""
     scales = np.array([scale for _, _, scale in found.numbers])
-    names = _names(found)
+    names, turning = _names(found), directions(case.mechanism)
     result: list[Sensitivity] = []
     for output in case.outputs:
         if output.orders != ORDERS:
@@ -103,8 +104,7 @@ def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> 
         own: list[Sensitivity] = []
         for k, (place, _, _) in enumerate(found.numbers):
             if np.abs(table[:, k]).max() > NOTHING:
-                turns = ".axis" in place or ".axes" in place
-                by = f"{output.unit}/{'rad' if turns else 'm'}"
+                by = f"{output.unit}/{'rad' if place in turning else 'm'}"
                 own.append(Sensitivity(output.name, names[k], by, table[:, k].tolist()))
         result += sorted(own, key=lambda each: -abs(each.largest))
     return result
