@@ -88,3 +88,12 @@ def test_sensitivities_hold_the_coordinate_where_the_point_moves():
         x = np.sqrt(1.0 - 0.7**2)
         assert known["x"] == pytest.approx(expected["x"] / x, abs=1e-14)
         assert known.get("y", 0.0) == pytest.approx(expected["y"], abs=1e-14)
+
+
+def test_where_nothing_is_solved_nothing_is_found():
+    """Of residuals zero would be the best there is."""
+    found = solve(ARM, "y", [1.2])
+    assert not found.solved.any()
+    details = [found.details[name] for name in ("redundant_residual", "smallest_singular_value")]
+    assert np.isnan([found.residual, *details]).all()
+    assert np.isnan(solve(ARM, "y", []).residual)
