@@ -12,9 +12,10 @@ from .joints.given import require_direction, require_finite, triple
 
 @dataclass(frozen=True)
 class Driver:
-    """Base of the drivers."""
+    """Base of the drivers. One that turns has its values in radians, any other in metres."""
 
     type: ClassVar[str]
+    turns: ClassVar[bool] = False
     name: str
 
 
@@ -64,6 +65,7 @@ class JointAngle(JointDriver):
     """Drives the rotation of a joint's second body relative to its first, about the axis by the right hand [rad]."""
 
     type: ClassVar[str] = "joint_angle"
+    turns: ClassVar[bool] = True
     freedom: ClassVar[str] = "rotation"
 
 

@@ -22,7 +22,7 @@ GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
 
 Vector: TypeAlias = tuple[float, float, float]
-EULER_PARAMETERS = "four numbers, e0 first"
+FOUR_NUMBERS = "four numbers, e0 first"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +44,8 @@ class Body:
         who = f"body {self.name!r}: origin"
         object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
         require_finite(who, self.origin, Kind.POSITION.value)
-        p = held(who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, EULER_PARAMETERS)
-        require_finite(who, p, EULER_PARAMETERS)
+        p = held(who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS)
+        require_finite(who, p, FOUR_NUMBERS)
         length = math.sqrt(sum(e * e for e in p))
         # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
         if not abs(length - 1.0) < 1e-3:

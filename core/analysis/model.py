@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drivers import Driver, JointAngle
+from ..drivers import Driver
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..primitives.base import Drive
@@ -72,7 +72,7 @@ def given_by(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
     """
     found = np.empty((len(drivers), 5, drive.shape[-1]))
     for numbers, driver, motion in zip(found, drivers, drive.swapaxes(0, 1), strict=True):
-        numbers[:3] = motion * (1.0 if isinstance(driver, JointAngle) else 1.0 / unit)
+        numbers[:3] = motion * (1.0 if driver.turns else 1.0 / unit)
         numbers[3], numbers[4] = np.cos(0.5 * motion[0]), np.sin(0.5 * motion[0])
     return found.reshape(5 * len(drivers), drive.shape[-1])
 

@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import Vec3
-from ..drivers import Driver, JointDriver
 from ..errors import CaseError
 from ..jet import Jet
 from ..joints.base import Joint, Kind
@@ -69,11 +68,7 @@ def size(case: Case) -> float:
 
 def _turning(case: Case) -> NDArray[np.bool_]:
     """Which of the moving drivers turn, shape (drivers,)."""
-    return np.array([_turns(case.mechanism.driver(name)) for name in case.sweep.path.motions], dtype=np.bool_)
-
-
-def _turns(driver: Driver) -> bool:
-    return isinstance(driver, JointDriver) and driver.freedom == "rotation"
+    return np.array([case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_)
 
 
 def _positions(joint: Joint) -> Iterator[tuple[float, float, float]]:

@@ -121,7 +121,7 @@ class Closing:
         for name, value in state_of(self.tracer.formulation, mechanism, frame, poses, self.values).items():
             executor.put(vectors[name], np.array([np.broadcast_to(x, (n,)) for x in value]))
         for name, value in self.values.items():
-            c = value if mechanism.driver(name).type == "joint_angle" else value / frame.unit
+            c = value if mechanism.driver(name).turns else value / frame.unit
             executor.put(vectors[f"drive {name}"], np.array([[c], [0.0], [0.0], [np.cos(0.5 * value)], [np.sin(0.5 * value)]]))
         iterations, done = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
         for _ in range(MAX_ITERATIONS):

@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ...drivers import JointDriver
 from ...mechanism import Mechanism
 from ...trajectory import Array
 from ..equations.cartesian import COLUMNS, Cartesian
@@ -192,10 +191,9 @@ class Ranks:
             hold = np.linalg.svd(drives, full_matrices=True)[2][int(rank) :].T
             least = start + hold @ np.linalg.lstsq(joints @ hold, -joints @ start, rcond=RANK_TOLERANCE)[0]
             given = joints @ least
-            turns = isinstance(driver, JointDriver) and driver.freedom == "rotation"
             if np.abs(given).max(initial=0.0) > OWED or against > OWED:
                 # by a radian of the driver, or by a metre
-                units = (self.frame.unit, 1.0) if turns else (1.0, 1.0 / self.frame.unit)
+                units = (self.frame.unit, 1.0) if driver.turns else (1.0, 1.0 / self.frame.unit)
                 found.append(Blocked(driver.name, tuple(self._violations(given, *units))))
         return found
 

@@ -49,25 +49,25 @@ class Relative:
     @cached_property
     def _tree_columns(self) -> Mapping[str, int]:
         """First unknown of every step of the tree, by the name of its state."""
-        found: dict[str, int] = {}
+        found, count = dict[str, int](), 0
         for step in (step for chain in self.chains for step in chain.steps):
-            found[step.name] = self._count(found)
+            found[step.name] = count
+            count += step.unknowns
         return found
 
-    def _count(self, before: Mapping[str, int]) -> int:
-        sizes = {step.name: step.unknowns for chain in self.chains for step in chain.steps}
-        return sum(sizes[name] for name in before)
+    @cached_property
+    def _tree_unknowns(self) -> int:
+        return sum(step.unknowns for chain in self.chains for step in chain.steps)
 
     @cached_property
     def _own(self) -> Mapping[str, int]:
         """Unknowns for coordinates of joints that are not in the tree; they come last."""
-        tree_unknowns = self._count(self._tree_columns)
         names = [name for name in self.closed.coordinates if f"x {name}" not in self._tree_columns]
-        return {name: tree_unknowns + k for k, name in enumerate(names)}
+        return {name: self._tree_unknowns + k for k, name in enumerate(names)}
 
     @property
     def unknowns(self) -> int:
-        return self._count(self._tree_columns) + len(self._own)
+        return self._tree_unknowns + len(self._own)
 
     @property
     def design(self) -> Mapping[str, Sequence[float]]:

@@ -78,7 +78,7 @@ def prove(
         exact, kept = exact_mechanism(mechanism, reading), model.selection.kept
         traced = {kept: equations(exact, tuple(drives), points, kept)}
         unit = traced[kept].frame.unit
-        units = [1 if mechanism.driver(name).type == "joint_angle" else Fraction(unit) for name in drives]
+        units = [1 if mechanism.driver(name).turns else Fraction(unit) for name in drives]
         for k, reached in enumerate(native.solved):
             started = perf_counter()
             driven = [[_ball(x / unit) for x in drives[name][k]] for name, unit in zip(drives, units, strict=True)]

@@ -24,7 +24,7 @@ from ..equations.cartesian import COLUMNS, Cartesian
 from ..equations.constraints import Frames, constraints, joint_points
 from ..equations.formulation import Formulation
 from ..equations.geometry import places
-from .freedom import EULER_PARAMETERS, FreedomAccount, Selection, design_jacobian
+from .freedom import COORDINATES, FreedomAccount, Selection, design_jacobian
 from .redundancy import independent_rows
 
 ORIGIN = "origin "
@@ -224,7 +224,7 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
     dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))
     found = FreedomAccount(
         bodies=len(frame.moving),
-        coordinates=EULER_PARAMETERS * len(frame.moving),
+        coordinates=COORDINATES * len(frame.moving),
         equations=sum(joint.rows for joint in mechanism.joints) + len(frame.moving),
         moving_coordinates=formulation.unknowns,
         rows=len(matrix) - drivers,

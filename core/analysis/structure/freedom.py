@@ -19,7 +19,7 @@ from ..equations.constraints import Frames, constraints
 from ..equations.formulation import Formulation
 from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independent_rows
 
-EULER_PARAMETERS = 7
+COORDINATES = 7
 """Coordinates of a body in the paper's count: r and p."""
 
 
@@ -83,7 +83,7 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners[:joint_rows]]
     return FreedomAccount(
         bodies=len(mechanism.bodies),
-        coordinates=EULER_PARAMETERS * len(mechanism.bodies),
+        coordinates=COORDINATES * len(mechanism.bodies),
         equations=sum(joint.rows for joint in mechanism.joints) + len(mechanism.couplers) + COLUMNS * fixed + len(mechanism.bodies),
         moving_coordinates=formulation.unknowns,
         rows=joint_rows,

@@ -60,7 +60,7 @@ def _trace(options: argparse.Namespace, house: House) -> int:
     if not curves[0].closed:
         curves.append(trace(case.mechanism, driver, length=options.length, direction=-1))
     design = case.mechanism.design_value(driver)
-    unit = "rad" if case.mechanism.driver(driver).type == "joint_angle" else "m"
+    unit = "rad" if case.mechanism.driver(driver).turns else "m"
     out = sys.stderr if options.json == "-" else sys.stdout
     for direction, curve in zip((1, -1), curves, strict=False):
         print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)

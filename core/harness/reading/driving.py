@@ -119,4 +119,4 @@ def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
 
 def _unit(driver: Driver, length: Convert, angle: Convert) -> Convert:
     """What makes SI of a driver's values."""
-    return angle if isinstance(driver, JointDriver) and driver.freedom == "rotation" else length
+    return angle if driver.turns else length

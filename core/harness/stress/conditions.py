@@ -105,7 +105,7 @@ def conditions(mechanism: Mechanism) -> Conditions:
             driven.append((row, 1.0 / writer.unit))
         elif isinstance(driver, JointDriver):
             writer.coordinate(row, mechanism.joint(driver.joint), driver.freedom, 1.0)
-            driven.append((row, 1.0 if driver.freedom == "rotation" else 1.0 / writer.unit))
+            driven.append((row, 1.0 if driver.turns else 1.0 / writer.unit))
         else:
             raise NotStatedError(f"driver {driver.name!r} ({driver.type}): the stress truth cannot drive it")
     return writer.finished(driven)

@@ -15,7 +15,6 @@ from ...analysis.proofs.enclosure import enclose
 from ...analysis.proofs.exact import as_double, equations, exact_mechanism
 from ...analysis.singular.choice import chosen_at
 from ...analysis.structure.freedom import select_rows
-from ...drivers import JointAngle
 from ...program.ball_executor import flint, precision
 from ...trajectory import Array
 from .extended import Real, extended, unit
@@ -46,7 +45,7 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
         traced = equations(exact_mechanism(mechanism, as_double), tuple(path.motions), points, kept)
         driven = [
             [
-                flint().arb(_exact(x)) / (1.0 if isinstance(mechanism.driver(name), JointAngle) else traced.frame.unit)
+                flint().arb(_exact(x)) / (1.0 if mechanism.driver(name).turns else traced.frame.unit)
                 for x in drives[:, system.names.index(name)]
             ]
             for name in path.motions

@@ -43,7 +43,7 @@ class LlvmExecutor:
 
     def get(self, slots: Sequence[int]) -> Array:
         """See `Executor`."""
-        found = np.empty((len(slots), self._groups, self.margin))
+        found = np.empty((len(slots), self._groups, self.group))
         found[:] = self._memory[:, _places(slots)].transpose(1, 0, 2)
         return found.reshape(len(slots), -1)[:, : self.lanes]
 
@@ -56,7 +56,7 @@ class LlvmExecutor:
         padded = np.empty((len(table), self.room), table.dtype)
         padded[:, : self.lanes] = table
         padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
-        found: Any = padded.reshape(len(table), self._groups, self.margin).transpose(1, 0, 2)
+        found: Any = padded.reshape(len(table), self._groups, self.group).transpose(1, 0, 2)
         return found
 
     def run(self, name: str) -> None:
@@ -81,7 +81,7 @@ class LlvmExecutor:
     @property
     def room(self) -> int:
         """See `Executor`."""
-        return self._groups * self.margin
+        return self._groups * self.group
 
     def table(self, columns: int) -> Array:
         """See `Executor`."""
