@@ -192,7 +192,7 @@ class _Solved:
             known = self.start.points.copy()
             if self.how.kind == "static":
                 known[1:] = np.nan
-            yield Pose(known, 0.0, 0)
+            yield Pose(known, self.start.residual, 0)
             return
         self.table.rows = driven.tolist()
         self.set_off(leg, driven)

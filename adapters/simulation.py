@@ -41,6 +41,7 @@ class Start:
         configuration: what the model's `save` gave there.
         v, a: rates of the unknowns there, and theirs.
         points: position, velocity and acceleration of each of case.points there, shape (3, points, 3).
+        residual: of the projection model there [m or -].
         size: of the mechanism [m].
         independent: whether the rows of the model are.
     """
@@ -50,6 +51,7 @@ class Start:
     v: Array
     a: Array
     points: Array
+    residual: float
     size: float
     independent: bool
 
@@ -112,7 +114,7 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
         aim = float(path.times[k])
         at, reached = walk.advance(path, origin, aim, abs(aim - origin.t))
         if reached:
-            return Start(k, at.saved, at.v, at.a, np.array(at.rows), walk.size, walk.rows == walk.rank)
+            return Start(k, at.saved, at.v, at.a, np.array(at.rows), at.residual, walk.size, walk.rows == walk.rank)
     raise SolveError(f"case {case.name!r}: no sample next to the design can be reached; let the sweep come nearer to it")
 
 

@@ -143,7 +143,7 @@ class Absolute(Motion):
         return value - self.design, velocity, acceleration
 
 
-def from_design(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:
+def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:
     """Motions of drivers, by name, as changes from their design values, which are given where they are not zero."""
     there = {name: motion for name, motion in motions.items() if name in design and not isinstance(motion, Absolute)}
     return {**motions, **{name: Absolute(motion, design[name]) for name, motion in there.items()}}

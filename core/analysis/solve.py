@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..motions import Motion, Path, Ramp, from_design
+from ..motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
 from .equations.constraints import Style
 from .prepare import prepare
@@ -103,7 +103,7 @@ def asked(
     with np.errstate(over="ignore"):
         times = (values - design.get(driver, 0.0)) / rate
     _require(bool(np.isfinite(times).all()), f"rate is {rate}: no number is the time of the values then; give a larger one")
-    path = Path({**from_design(motions or {}, design), driver: Ramp(rate)}, times, design)
+    path = Path({**as_changes(motions or {}, design), driver: Ramp(rate)}, times, design)
     return path, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style))
 
 
