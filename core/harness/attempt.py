@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
@@ -168,8 +167,8 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
             trajectory, last, own = solve()
             warm.append(last)
             undisturbed.append(own)
-        seconds["warm"] = statistics.median(warm)
-        seconds["waited"] = seconds["warm"] - statistics.median(undisturbed)
+        seconds["warm"] = float(np.median(warm))
+        seconds["waited"] = seconds["warm"] - float(np.median(undisturbed))
     solved = np.asarray(trajectory.solved, dtype=np.bool_)
     return Answer(
         outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import statistics
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -134,7 +133,7 @@ def calibration() -> float:
             for step in range(500):
                 total += step * 0.5
         times.append(perf_counter() - begin - (waited() - before))
-    return statistics.median(times)
+    return float(np.median(times))
 
 
 def _facts(case: Case) -> dict[str, Any]:

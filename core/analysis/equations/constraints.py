@@ -11,7 +11,6 @@ from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from statistics import median
 from typing import Any, Never
 
 from ... import primitives as p
@@ -88,8 +87,8 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
         for body in joint.bodies:
             points[body] += joint_points(joint, body)
     extents = [max(max(axis) - min(axis) for axis in zip(*points[body], strict=True)) for body in whole.moving if points[body]]
-    sizes = [extent for extent in extents if extent > 0.0]
-    unit = 2.0 ** round(math.log2(median(sizes))) if sizes else whole.unit
+    sizes = sorted(extent for extent in extents if extent > 0.0)
+    unit = 2.0 ** round(math.log2(sizes[len(sizes) // 2])) if sizes else whole.unit
     return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
 
 
