@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, reduce
 from typing import Any
 
-from ..algebra import ZERO, Quat, Scalar, cross, rotation_less_identity, vec
+from ..algebra import Quat, Scalar, Vec3, vec
 from ..mechanism import Mechanism, Vector
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose
 from ..program import (
@@ -29,9 +29,10 @@ from ..program import (
     minimum,
     program,
 )
+from .equations.carried import motion_of_frame, motion_of_point
 from .equations.cartesian import Cartesian, Given
 from .equations.constraints import Style, constraints, frames
-from .equations.formulation import Acceleration, Formulation, State
+from .equations.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
 from .equations.geometry import placed, places
 from .equations.relative import Relative
 from .request import BLOCKS, GIVEN, ORIENTATION, RATE, RATE_T, SIGMA, Layout, Request
@@ -165,51 +166,27 @@ class Tracer:
         }
         motions = self.formulation.motions(self.at, v)
         accelerations = self.formulation.accelerations(self.at, v, a)
+
+        def moving(body: str) -> tuple[Pose, Motion, Acceleration]:
+            pose, motion = self.at.poses.get(body, GROUND_POSE), motions.get(body, GROUND_MOTION)
+            return pose, motion, accelerations.get(body, GROUND_ACCELERATION)
+
+        def of_point(body: str, position: Vector) -> tuple[Vec3, Vec3, Vec3]:
+            return motion_of_point(position, self.frame.arm(body, position), self.frame.unit, *moving(body))
+
         for name in self.request.points:
             point = self.mechanism.point(name)
-            self._store_point(
-                out, ("position", "velocity", "acceleration"), name, point.body, point.position, motions, accelerations
-            )
+            self._store_motion(out, ("position", "velocity", "acceleration"), name, of_point(point.body, point.position))
         for name in self.request.bodies:
-            origin = self.mechanism.body(name).origin
-            self._store_point(out, ("r", "rdot", "rddot"), name, name, origin, motions, accelerations)
-            self._store_rotation(out, name, motions, accelerations)
+            body = self.mechanism.body(name)
+            e0, *e = body.euler_parameters
+            self._store_motion(out, ("r", "rdot", "rddot"), name, of_point(name, body.origin))
+            self._store_motion(out, ("p", "omega", "omega_t"), name, motion_of_frame(Quat(e0, vec(e)), *moving(name)))
         return program("outputs", self.tape, out, self.prepared)
 
-    def _store_point(
-        self,
-        out: dict[int, Scalar],
-        labels: tuple[str, str, str],
-        name: str,
-        body: str,
-        position: Vector,
-        motions: Mapping[str, Motion],
-        accelerations: Mapping[str, Acceleration],
-    ) -> None:
-        """Position, velocity and acceleration of a point in metres; its displacement is formed first, and added once."""
-        pose, motion = self.at.poses.get(body, GROUND_POSE), motions.get(body, GROUND_MOTION)
-        acceleration = accelerations.get(body, Acceleration(ZERO, ZERO))
-        arm, metres = self.frame.arm(body, position), self.frame.unit
-        turned = pose.turn(arm)
-        found = (
-            vec(position) + metres * (pose.u + pose.swing(arm)),
-            metres * motion.of(turned),
-            metres * (acceleration.v_t + cross(acceleration.w_t, turned) + motion.centripetal(turned)),
-        )
+    def _store_motion(self, out: dict[int, Scalar], labels: Sequence[str], name: str, found: Iterable[Iterable[Scalar]]) -> None:
+        """Add a motion as far as an order wants it."""
         for label, value in zip(labels[: self.request.order + 1], found, strict=False):
-            self.store(out, f"{label} {name}", value)
-
-    def _store_rotation(
-        self, out: dict[int, Scalar], name: str, motions: Mapping[str, Motion], accelerations: Mapping[str, Acceleration]
-    ) -> None:
-        """p, omega' and omega'dot of a body's own frame: the paper's variables."""
-        pose, motion = self.at.poses.get(name, GROUND_POSE), motions.get(name, GROUND_MOTION)
-        e0, *e = self.mechanism.body(name).euler_parameters
-        p = pose.q * Quat(e0, vec(e))
-        to_body = rotation_less_identity(p).T
-        w_t = accelerations.get(name, Acceleration(ZERO, ZERO)).w_t
-        found = (p, motion.w + to_body @ motion.w, w_t + to_body @ w_t)
-        for label, value in zip(("p", "omega", "omega_t")[: self.request.order + 1], found, strict=False):
             self.store(out, f"{label} {name}", value)
 
 

@@ -78,7 +78,7 @@ class Branches:
     def of(mechanism: Mechanism, frame: Frames, values: Mapping[str, float]) -> Branches:
         """The branches of a mechanism whose drivers have these values, from design."""
         formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
-        matrix = jacobian(formulation, formulation.configuration(formulation.design))
+        matrix = jacobian(formulation)
         kept = independent_rows(matrix, len(mechanism.drivers), formulation.conditions)
         triples = {joint.name: triple for joint in mechanism.joints if (triple := _triple(mechanism, frame, joint)) is not None}
         return Branches(mechanism, frame, formulation, values, kept, _orientation(matrix[kept]), triples)

@@ -22,6 +22,7 @@ from ...mechanism import Mechanism
 from ...motions import Path
 from ...primitives.base import GROUND_POSE, Drive, Motion
 from ...trajectory import Array, Trajectory
+from ..equations.carried import position_of
 from ..equations.cartesian import Cartesian
 from ..equations.constraints import Frames, constraints
 from ..equations.formulation import Configuration
@@ -159,7 +160,7 @@ def conditioning(
     ]
     still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
-    turned = _orientations(matrices, jacobian(still, still.configuration(still.design)), nearest)
+    turned = _orientations(matrices, jacobian(still), nearest)
     return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], numbers)
 
 
@@ -236,6 +237,5 @@ def _gradient(
     # the body carries its point along: A times the change of where it is at design
     design = np.array([np.broadcast_to(derivatives(x), shift.shape[1:]) for x in moved])
     along = np.array([np.broadcast_to(derivatives(x), shift.shape[1:]) for x in pose.turn(moved)])
-    position = vec(point.position) + frame.unit * (pose.u + pose.swing(arm))
-    here, there = np.array([*position]), np.array(point.position)
+    here, there = np.array([*position_of(point.position, arm, frame.unit, pose)]), np.array(point.position)
     return Gradient(here, there, by_unknowns @ inverse, by_unknowns @ shift + along, design)

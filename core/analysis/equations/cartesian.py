@@ -12,11 +12,11 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any
 
-from ...algebra import ZERO, Quat, Scalar, Vec3, turned_by, vec
+from ...algebra import Quat, Scalar, Vec3, turned_by, vec
 from ...primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose, Primitive, Row
 from ...program import cos, sin, sqrt
 from .constraints import Constraint, Relation
-from .formulation import Acceleration, Condition, Configuration, Rows, State
+from .formulation import GROUND_ACCELERATION, Acceleration, Condition, Configuration, Rows, State
 
 COLUMNS = 6
 """Unknowns of a moving body: dr and dpi."""
@@ -28,7 +28,7 @@ class Given:
 
     pose: Pose = GROUND_POSE
     motion: Motion = GROUND_MOTION
-    acceleration: Acceleration = field(default_factory=lambda: Acceleration(ZERO, ZERO))
+    acceleration: Acceleration = GROUND_ACCELERATION
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
-from ...algebra import Scalar, Vec3
+from ...algebra import ZERO, Scalar, Vec3
 from ...primitives.base import Motion, Pose
 
 State: TypeAlias = Mapping[str, Sequence[Scalar]]
@@ -48,6 +48,9 @@ class Acceleration:
 
     v_t: Vec3
     w_t: Vec3
+
+
+GROUND_ACCELERATION = Acceleration(ZERO, ZERO)
 
 
 class Formulation(Protocol):

@@ -61,9 +61,9 @@ def state_of(
     return state
 
 
-def jacobian(formulation: Formulation, at: Configuration) -> Array:
-    """The Jacobian of all rows at one configuration, shape (rows, unknowns), in the units of the frames."""
-    rows = formulation.rows(at)
+def jacobian(formulation: Formulation, at: Configuration | None = None) -> Array:
+    """The Jacobian of all rows at one configuration, else at the design, shape (rows, unknowns), in the units of the frames."""
+    rows = formulation.rows(at or formulation.configuration(formulation.design))
     matrix = np.zeros((len(rows), formulation.unknowns))
     for k, row in enumerate(rows):
         matrix[k, list(row)] = list(row.values())

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import ZERO, Quat, vec
 from ...mechanism import Mechanism
 from ...motions import Path, outwards
 from ...primitives.base import GROUND_POSE, Drive, Pose
 from ...program.ball_executor import Ball, flint, precision
-from ...trajectory import Array, BodyMotion, Trajectory
+from ...trajectory import Array, Trajectory
 from ..equations.cartesian import Cartesian
-from ..equations.constraints import Constraint, Frames, constraints, frames
+from ..equations.constraints import Constraint, constraints, frames
+from ..equations.poses import displaced
 from ..model import compile_model
 from ..request import Request
 from ..singular.choice import chosen_at
@@ -106,22 +106,12 @@ def _ball(x: Fraction) -> Ball:
 def _states(mechanism: Mechanism, native: Trajectory, times: Array) -> Array:
     """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies, shape (n, size)."""
     frame = frames(mechanism)
-    poses = {name: _pose(mechanism, frame, name, motion) for name, motion in native.bodies.items()}
+    poses = displaced(mechanism, frame, {name: (motion.r, motion.p) for name, motion in native.bodies.items()})
     found = [x for name in frame.moving for x in poses[name].u]
     found += [x for name in frame.moving for x in poses[name].q]
     named = {c.coordinate: c for c in constraints(mechanism, frame, {}) if isinstance(c, Constraint) and c.coordinate}
     found += [_coordinate(c, poses, times, native) for c in named.values()]
     return np.stack(found, axis=1)
-
-
-def _pose(mechanism: Mechanism, frame: Frames, name: str, motion: BodyMotion) -> Pose:
-    """Displacement of the internal origin [units] and rotation since the design, from the motion of the body's own frame."""
-    body = mechanism.body(name)
-    e0, *e = body.euler_parameters
-    q = Quat(motion.p.T[0], vec([*motion.p.T[1:]])) * Quat(e0, vec(e)).conjugate()
-    turned = Pose.of(ZERO, q)
-    lever = frame.origins[name] - (1.0 / frame.unit) * vec(body.origin)
-    return Pose.of((1.0 / frame.unit) * (vec([*motion.r.T]) - vec(body.origin)) + turned.swing(lever), q)
 
 
 def _coordinate(c: Constraint, poses: Mapping[str, Pose], times: Array, native: Trajectory) -> Array:

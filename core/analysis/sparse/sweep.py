@@ -10,11 +10,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Quat, Vec3, cross, rotation_less_identity, vec
+from ...algebra import Quat, Vec3, vec
 from ...mechanism import Mechanism
 from ...motions import Path, outwards
 from ...primitives.base import Motion, Pose
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ..equations.carried import motion_of_frame, motion_of_point
+from ..equations.formulation import Acceleration
 from ..march import HALVINGS, Headway
 from .model import FailedError, SparseModel, Stand
 from .together import REMEMBERED
@@ -78,20 +80,15 @@ class _Wanted:
 
     def motions(self, at: Sequence[Stand]) -> Array:
         """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape (stands, components, names)."""
-        metres, (poses, rates, accelerations) = self._model.frame.unit, self._taken(at)
-        pose, motion = Pose.of(vec([*poses[:3]]), euler_parameters(poses[3:])), Motion(vec([*rates[:3]]), vec([*rates[3:]]))
-        v_t, w_t = vec([*accelerations[:3]]), vec([*accelerations[3:]])
-        arm = vec([*self._arm])
-        turned = pose.turn(arm)
-        found: list[Vec3 | Quat] = [
-            vec([*self._position]) + metres * (pose.u + pose.swing(arm)),
-            metres * motion.of(turned),
-            metres * (v_t + cross(w_t, turned) + motion.centripetal(turned)),
-        ]
+        poses, rates, accelerations = self._taken(at)
+        moving = (
+            Pose.of(vec([*poses[:3]]), euler_parameters(poses[3:])),
+            Motion(vec([*rates[:3]]), vec([*rates[3:]])),
+            Acceleration(vec([*accelerations[:3]]), vec([*accelerations[3:]])),
+        )
+        found: list[Vec3 | Quat] = [*motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)]
         if self._frame is not None:
-            p = pose.q * euler_parameters(self._frame)
-            to_body = rotation_less_identity(p).T
-            found += [p, motion.w + to_body @ motion.w, w_t + to_body @ w_t]
+            found += motion_of_frame(euler_parameters(self._frame), *moving)
         shape = len(at), len(self.names)
         return np.stack([np.broadcast_to(component, shape) for each in found for component in each], axis=1)
 

@@ -24,7 +24,8 @@ from ..equations.cartesian import COLUMNS, Cartesian
 from ..equations.constraints import Frames, constraints, joint_points
 from ..equations.formulation import Formulation
 from ..equations.geometry import places
-from .freedom import COORDINATES, FreedomAccount, Selection, design_jacobian
+from ..equations.poses import jacobian
+from .freedom import COORDINATES, FreedomAccount, Selection
 from .redundancy import independent_rows
 
 ORIGIN = "origin "
@@ -213,7 +214,7 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
     Raises:
         SolveError: they are too few.
     """
-    matrix, drivers = design_jacobian(formulation), len(mechanism.drivers)
+    matrix, drivers = jacobian(formulation), len(mechanism.drivers)
     kept = independent_rows(matrix, drivers, formulation.conditions)
     names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
     if len(kept) < formulation.unknowns:

@@ -17,6 +17,7 @@ from ...trajectory import Array
 from ..equations.cartesian import COLUMNS, Cartesian
 from ..equations.constraints import Frames, constraints
 from ..equations.formulation import Formulation
+from ..equations.poses import jacobian
 from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independent_rows
 
 COORDINATES = 7
@@ -65,15 +66,6 @@ class Selection:
     dropped: tuple[int, ...]
 
 
-def design_jacobian(formulation: Formulation) -> Array:
-    """The Jacobian of all rows at the design position, shape (rows, unknowns), in the units of the frames."""
-    rows = formulation.rows(formulation.configuration(formulation.design))
-    matrix = np.zeros((len(rows), formulation.unknowns))
-    for k, row in enumerate(rows):
-        matrix[k, list(row)] = list(row.values())
-    return matrix
-
-
 def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     """Count and measure the degrees of freedom at the design pose."""
     formulation, matrix = _matrix(mechanism, frame)
@@ -113,7 +105,7 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation, w
         SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
     """
     found, drivers = driven_account(mechanism, frame), len(mechanism.drivers)
-    matrix = design_jacobian(formulation)
+    matrix = jacobian(formulation)
     kept = wanted or independent_rows(matrix, drivers, formulation.conditions)
     if len(kept) < formulation.unknowns:
         raise SolveError(_locked(mechanism, formulation, matrix))
@@ -147,7 +139,7 @@ def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> st
 
 def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
-    return formulation, design_jacobian(formulation)
+    return formulation, jacobian(formulation)
 
 
 def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:

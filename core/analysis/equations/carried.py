@@ -1,0 +1,39 @@
+"""What a body carries, its points and its own frame: how they move, over any scalar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...algebra import Quat, Scalar, Vec3, cross, rotation_less_identity, vec
+from ...primitives.base import Motion, Pose
+from .formulation import Acceleration
+
+
+def position_of(position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose) -> Vec3:
+    """Where a point is [m]: its displacement is formed first, and added once.
+
+    Args:
+        position: at design [m].
+        arm: from the body's internal origin at design, in the unit of the frames.
+        metres: that unit.
+    """
+    return vec(position) + metres * (pose.u + pose.swing(arm))
+
+
+def motion_of_point(
+    position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose, motion: Motion, acceleration: Acceleration
+) -> tuple[Vec3, Vec3, Vec3]:
+    """Position [m], velocity and acceleration of a point; see `position_of`."""
+    turned = pose.turn(arm)
+    return (
+        position_of(position, arm, metres, pose),
+        metres * motion.of(turned),
+        metres * (acceleration.v_t + cross(acceleration.w_t, turned) + motion.centripetal(turned)),
+    )
+
+
+def motion_of_frame(design: Quat, pose: Pose, motion: Motion, acceleration: Acceleration) -> tuple[Quat, Vec3, Vec3]:
+    """p, omega' and omega'dot of a body's own frame, the paper's variables, from its Euler parameters at design."""
+    p = pose.q * design
+    to_body = rotation_less_identity(p).T
+    return p, motion.w + to_body @ motion.w, acceleration.w_t + to_body @ acceleration.w_t
