@@ -29,7 +29,6 @@ from typing import Any
 import numpy as np
 
 from ..core import joints
-from ..core.analysis.equations.constraints import joint_points
 from ..core.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ..core.joints.base import triad, unit
 from ..core.mechanism import GROUND, Mechanism
@@ -96,7 +95,7 @@ class Rows:
                 continue
             # Points and axes are given in global coordinates, so every node starts parallel to the global axes. It stands amid
             # the body's joints: case files may leave the origin far away, and long arms cost digits of the differences.
-            points = [q for joint in self.mechanism.joints if body.name in joint.bodies for q in joint_points(joint, body.name)]
+            points = [q for joint in self.mechanism.joints if body.name in joint.bodies for q in joint.points_on(body.name)]
             origin = np.mean(points, axis=0) if points else np.array(body.origin)
             node = self.mbs.AddNode(self.items.NodeRigidBodyEP(referenceCoordinates=[*origin, *NO_ROTATION]))
             # Exudyn asks for a mass and inertias; kinematics does not depend on them.

@@ -15,7 +15,8 @@ from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
-from .joints.base import Coupler, Joint, Kind, unit
+from .joints.base import Joint, Kind, unit
+from .joints.coupler import Coupler
 from .joints.given import held, require_finite, triple
 
 GROUND = "ground"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import SolveError, assemble, find_assemblies, solve
+from kincheck.core import Body, SolveError, assemble, find_assemblies, solve
 
 from .mechanisms import four_bar, mcpherson
 
@@ -133,7 +133,24 @@ def test_without_estimates_it_closes_from_the_design():
 
 @pytest.mark.parametrize("close", [assemble, find_assemblies])
 def test_names_that_are_not_there_are_told(close):
-    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no body 'crnk'; known: .*crank"):
+    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no moving body 'crnk'; known: .*crank"):
         close(four_bar(), {"crnk": (np.zeros((1, 3)), np.zeros((1, 4)))})
     with pytest.raises(SolveError, match=rf"{close.__name__}: there is no driver 'trn'; known: "):
         close(four_bar(), {}, {"trn": 0.1})
+
+
+def test_estimates_of_what_does_not_move_or_of_other_shapes_are_refused():
+    """A fixed body has no pose to be found, and lanes are the same for all bodies."""
+    mechanism = replace(four_bar(), bodies=[*four_bar().bodies, Body("wall", fixed=True)])
+    r, p = np.zeros((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    with pytest.raises(SolveError, match="assemble: there is no moving body 'wall'"):
+        assemble(mechanism, {"wall": (r, p)})
+    with pytest.raises(SolveError, match="find_assemblies: there is no moving body 'wall'"):
+        find_assemblies(mechanism, {"wall": (r[0], p[0])})
+    first, second = (body.name for body in mechanism.moving[:2])
+    with pytest.raises(SolveError, match=rf"origin r of body '{second}': shape \(3, 3\), expected \(2, 3\)"):
+        assemble(mechanism, {first: (r, p), second: (np.zeros((3, 3)), np.ones((3, 4)))})
+    with pytest.raises(SolveError, match=rf"Euler parameters p of body '{first}': shape \(2, 3\), expected \(2, 4\)"):
+        assemble(mechanism, {first: (r, r)})
+    with pytest.raises(SolveError, match=rf"find_assemblies: origin r of body '{first}': shape \(2, 3\), expected \(3,\)"):
+        find_assemblies(mechanism, {first: (r, p)})

@@ -22,7 +22,7 @@ from kincheck.core import (
 )
 from kincheck.core.analysis.diagnosis.rank import Ranks
 from kincheck.core.analysis.diagnosis.screws import free_motions
-from kincheck.core.analysis.equations.geometry import directions, places
+from kincheck.core.analysis.equations.geometry import kinds, places
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.route import Route
@@ -30,6 +30,7 @@ from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
 from kincheck.core.harness.cli import main
 from kincheck.core.harness.diagnosis import diagnose
+from kincheck.core.joints import Kind
 
 from .mechanisms import four_bar, mcpherson, slider_crank
 
@@ -282,7 +283,7 @@ def test_directions_are_told_by_what_they_are_not_by_their_names():
     joints = [Revolute("rear.axis", "ground", "arm", (3.0, 4.0, 0.0), (0.0, 0.0, 2.0))]
     points = [Point("tip", "arm", (4.0, 4.0, 0.0))]
     arm = Mechanism("arm", [Body("arm")], joints, points, [JointAngle("turn", "rear.axis")])
-    assert directions(arm) == {"joints.rear.axis.axis"}
+    assert [place for place, kind in kinds(arm).items() if kind is Kind.DIRECTION] == ["joints.rear.axis.axis"]
     output = Output("y", "tip", (0.0, 1.0, 0.0), False, 1e-9, 0.0, "test")
     case = Case("arm", "test", Truth.CONSENSUS_ONLY, arm, Sweep("turn", np.array([0.5])), (output,))
     found = {each.number: (each.unit, each.by_sample[0]) for each in diagnose(case, samples=1, tol=1e-12).sensitivities}

@@ -1,13 +1,16 @@
 """The same mechanism written differently, or of another size, in another place, at another rate: the same motion."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import Body, Mechanism, Point, PointCoordinate, Revolute
+from kincheck.core.analysis.equations.constraints import frames
+from kincheck.core.analysis.equations.geometry import places
 from kincheck.core.analysis.solve import solve
 from kincheck.core.joints import AxialJoint, Joint, ParallelAxes
+from kincheck.core.joints.base import position
 
 from .mechanisms import mcpherson, placed, slider_crank, swapped, without_fixed_bodies
 
@@ -156,3 +159,23 @@ def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, j
     np.testing.assert_allclose(motion.position[:, 0], size * cosine, rtol=2e-15)
     np.testing.assert_allclose(motion.velocity[:, 0], -size * sine / cosine, rtol=0, atol=2e-14 * size)
     np.testing.assert_allclose(motion.acceleration[:, 0], -size / cosine**3, rtol=1e-13)
+
+
+def test_the_points_of_a_joint_are_known_by_their_kind():
+    """Whatever a joint calls them, they are what the mechanism is measured by: a metre would be a million times its size."""
+
+    @dataclass(frozen=True)
+    class Pinned(Revolute):
+        pin: tuple[float, float, float] = position()
+
+        def primitives(self, i, j):
+            return Revolute(self.name, self.i, self.j, self.pin, self.axis).primitives(i, j)
+
+    size = 2.0**-20
+    corners = [(0.0, 0.0, 0.0), (0.0, size, 0.0), (3.0 * size, 2.0 * size, 0.0), (2.0 * size, 0.0, 0.0)]
+    links = ["ground", "crank", "coupler", "rocker", "ground"]
+    pins = [Pinned(f"pin {k}", *links[k : k + 2], point=None, axis=(0.0, 0.0, 1.0), pin=corner) for k, corner in enumerate(corners)]
+    mechanism = Mechanism("four-bar", [Body(name) for name in links[1:4]], pins)
+    assert frames(mechanism).unit == 4.0 * size  # three wide, to a power of two
+    assert [joint.points_on("coupler") for joint in pins] == [[each] for each in corners]
+    assert places(mechanism)["joints.pin 2.pin"] == corners[2]

@@ -19,8 +19,7 @@ wheel travel is one with an atol of its own, that of the output over D; its rate
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from collections.abc import Sequence
 
 import msgspec
 import numpy as np
@@ -29,7 +28,6 @@ from numpy.typing import NDArray
 from ..algebra import Vec3
 from ..errors import CaseError
 from ..jet import Jet
-from ..joints.base import Joint, Kind
 from ..mechanism import Vector
 from ..trajectory import Array, PointMotion, Trajectory
 from .case import MARKER, Case, Quantity, Series
@@ -60,7 +58,7 @@ def size(case: Case) -> float:
     values, _, _ = path.drive(list(path.motions), path.times)
     compared = case.points or [point.name for point in case.mechanism.points]
     points = [case.mechanism.point(name).position for name in compared if not name.startswith(MARKER)]
-    points += [position for joint in case.mechanism.joints for position in _positions(joint)]
+    points += [position for joint in case.mechanism.joints for position in joint.points_on()]
     shift = float(np.ptp(values[~_turning(case)], axis=1).max(initial=0.0))
     extent = max(float(np.ptp(np.array(points), axis=0).max()), shift)
     return extent if extent > ROUNDING * float(np.abs(points).max()) else NO_SIZE
@@ -69,14 +67,6 @@ def size(case: Case) -> float:
 def _turning(case: Case) -> NDArray[np.bool_]:
     """Which of the moving drivers turn, shape (drivers,)."""
     return np.array([case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_)
-
-
-def _positions(joint: Joint) -> Iterator[tuple[float, float, float]]:
-    for each in fields(joint):
-        if each.metadata.get("kind") is Kind.POSITION and getattr(joint, each.name) is not None:
-            yield getattr(joint, each.name)
-        elif each.metadata.get("kind") is Kind.POSITIONS:
-            yield from getattr(joint, each.name)
 
 
 def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Series:

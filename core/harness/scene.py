@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -13,7 +13,7 @@ from ..analysis.model import compile_model
 from ..analysis.request import Request
 from ..analysis.sweep import sweep
 from ..errors import KincheckError
-from ..joints import Joint, Kind
+from ..joints import Kind
 from ..mechanism import Vector
 from ..trajectory import Array, BodyMotion
 from .case import MARKER, Case
@@ -62,7 +62,7 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
             frames, motions, message = _poses(case)
         except KincheckError as error:
             message = f"no poses, this is the design position: {error}"
-    size = _size([body.origin for body in mechanism.bodies] + [point for joint in mechanism.joints for point in _points(joint)])
+    size = _size([body.origin for body in mechanism.bodies] + [point for joint in mechanism.joints for point in joint.points_on()])
     return Scene(
         bodies=[
             SceneBody(
@@ -80,8 +80,8 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
                 name=joint.name,
                 type=joint.type,
                 bodies=list(joint.bodies),
-                points=[list(point) for point in _points(joint)],
-                axes=[list(axis) for axis in _vectors(joint, Kind.DIRECTION, Kind.DIRECTIONS)],
+                points=[list(point) for point in joint.points_on()],
+                axes=[list(value) for _, kind, value in joint.parts() if kind is Kind.DIRECTION],
             )
             for joint in mechanism.joints
         ],
@@ -106,22 +106,6 @@ def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
     found = sweep(model, replace(path, times=path.times[taken]), TOL)
     reached = {name: replace(motion, r=motion.r[found.solved], p=motion.p[found.solved]) for name, motion in found.bodies.items()}
     return taken[found.solved].tolist(), reached if found.solved.any() else {}, found.message
-
-
-def _vectors(joint: Joint, one: Kind, pair: Kind) -> list[Vector]:
-    """What a joint's fields of a kind hold: vectors common to both bodies, or one on each."""
-    held: list[Vector] = []
-    for each in fields(joint):
-        value = getattr(joint, each.name)
-        if value is not None and each.metadata.get("kind") is one:
-            held.append(value)
-        elif value is not None and each.metadata.get("kind") is pair:
-            held += value
-    return held
-
-
-def _points(joint: Joint) -> list[Vector]:
-    return _vectors(joint, Kind.POSITION, Kind.POSITIONS)
 
 
 def _size(points: Sequence[Vector]) -> float:

@@ -3,8 +3,9 @@
 import importlib
 import pkgutil
 
-from .base import Attachment, AxialJoint, Coupler, Joint, Kind
+from .base import Attachment, AxialJoint, Joint, Kind
 from .constant_velocity import ConstantVelocity
+from .coupler import Coupler
 from .cylindrical import Cylindrical
 from .distance import Distance
 from .fixed import Fixed

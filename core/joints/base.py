@@ -6,12 +6,12 @@ method `primitives`. Declaring the class registers it: case files can name it at
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
 from enum import Enum
+from functools import partial
 from typing import Any, ClassVar, Self
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
@@ -29,6 +29,16 @@ class Kind(Enum):
     POSITIONS = "two points [[x, y, z] on the first body, [x, y, z] on the second]"
     DIRECTIONS = "two directions [[x, y, z] on the first body, [x, y, z] on the second]"
     LENGTH = "a length"
+
+    @property
+    def pair(self) -> bool:
+        """Whether it is one on each body."""
+        return self is not self.single
+
+    @property
+    def single(self) -> Kind:
+        """What each of a pair is; itself, where it is no pair."""
+        return {Kind.POSITIONS: Kind.POSITION, Kind.DIRECTIONS: Kind.DIRECTION}.get(self, self)
 
 
 def _geometry(kind: Kind, **options: Any) -> Any:
@@ -101,22 +111,19 @@ class Joint(ABC):
     def __post_init__(self) -> None:
         if self.i == self.j:
             raise MechanismError(f"{self}: joins {self.i!r} with itself; a joint needs two different bodies")
-        for each in fields(self):
-            kind, value = each.metadata.get("kind"), getattr(self, each.name)
-            if kind is None or value is None:
-                continue
-            who, expected = f"{self}: {each.name}", kind.value
+        for name, kind, value in self.geometry():
+            who, expected = f"{self}: {name}", kind.value
             if kind is Kind.LENGTH:
                 parts = [(value,)]
-            elif kind in (Kind.POSITIONS, Kind.DIRECTIONS):
+            elif kind.pair:
                 value = parts = tuple(triple(who, numbers, expected) for numbers in held(who, value, 2, expected))
             else:
                 value = triple(who, value, expected)
                 parts = [value]
-            object.__setattr__(self, each.name, value)
+            object.__setattr__(self, name, value)
             for numbers in parts:
                 require_finite(who, numbers, expected)
-                if kind in (Kind.DIRECTION, Kind.DIRECTIONS):
+                if kind.single is Kind.DIRECTION:
                     require_direction(who, numbers)
 
     def __str__(self) -> str:
@@ -127,21 +134,39 @@ class Joint(ABC):
         """Names of the first and the second body."""
         return self.i, self.j
 
+    def geometry(self) -> Sequence[tuple[str, Kind, Any]]:
+        """Name, kind and value of every geometry field that is given."""
+        found = [(each.name, each.metadata.get("kind"), getattr(self, each.name)) for each in fields(self)]
+        return [(name, kind, value) for name, kind, value in found if kind is not None and value is not None]
+
+    def parts(self, body: str | None = None) -> Sequence[tuple[str, Kind, Any]]:
+        """Likewise every single one, of a pair as "points.0" and "points.1"; only what is on the body if one is named."""
+        found = list[tuple[str, Kind, Any]]()
+        for name, kind, value in self.geometry():
+            if kind.pair:
+                found += [(f"{name}.{k}", kind.single, value[k]) for k in range(2) if body in (None, self.bodies[k])]
+            else:
+                found.append((name, kind, value))
+        return found
+
+    def points_on(self, body: str | None = None) -> list[tuple[float, float, float]]:
+        """Its points, global at design [m]; only those on the body if one is named."""
+        return [value for _, kind, value in self.parts(body) if kind is Kind.POSITION]
+
+    def mapped(self, ways: Mapping[Kind, Callable[[Any], Any]]) -> dict[str, Any]:
+        """Its geometry fields, each point, direction or length sent through the way for its kind, where there is one."""
+        given = [(name, kind.pair, ways[kind.single], value) for name, kind, value in self.geometry() if kind.single in ways]
+        return {name: tuple(map(way, value)) if pair else way(value) for name, pair, way, value in given}
+
     def reversed(self) -> Self:
         """The same joint seen from its second body: i and j exchanged, and so every pair."""
-        pairs = (Kind.POSITIONS, Kind.DIRECTIONS)
-        swapped = {f.name: getattr(self, f.name)[::-1] for f in fields(self) if f.metadata.get("kind") in pairs}
+        swapped = {name: value[::-1] for name, kind, value in self.geometry() if kind.pair}
         return self.changed(i=self.j, j=self.i, **swapped)
 
     def scaled(self, factor: float) -> Self:
         """The same joint with all lengths multiplied by the factor."""
-        changed = dict[str, Any]()
-        for each in fields(self):
-            kind, value = each.metadata.get("kind"), getattr(self, each.name)
-            if value is None or kind not in (Kind.POSITION, Kind.POSITIONS, Kind.LENGTH):
-                continue
-            changed[each.name] = _times(factor, value)
-        return self.changed(**changed)
+        times = partial(_times, factor)
+        return self.changed(**self.mapped({Kind.POSITION: times, Kind.LENGTH: times}))
 
     def changed(self, **values: Any) -> Self:
         """The same joint with other fields, not checked again: as good as this one, or of numbers that are known only later."""
@@ -197,52 +222,8 @@ class AxialJoint(Joint):
         return ()
 
 
-@dataclass(frozen=True)
-class Coupler(ABC):
-    """A linear relation between one coordinate each of two axial joints, zero at design.
-
-    Attributes:
-        joints: names of the two joints.
-        freedoms: which coordinate of each: "rotation" or "translation".
-
-    Raises:
-        MechanismError: one joint twice, or a weight that is zero or not finite.
-    """
-
-    type: ClassVar[str]
-    freedoms: ClassVar[tuple[str, str]]
-    registry: ClassVar[dict[str, type[Coupler]]] = {}
-
-    name: str
-    joints: tuple[str, str]
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        if "type" in cls.__dict__:
-            Coupler.registry[cls.type] = cls
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", held(f"{self}: joints", self.joints, 2, "two names"))
-        if self.joints[0] == self.joints[1]:
-            raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
-        if not all(weight and math.isfinite(weight) for weight in self.coefficients):
-            given = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ("name", "joints")}
-            raise MechanismError(
-                f"{self}: {', '.join(f'{name} = {value}' for name, value in given.items())} would lock or lose a joint; "
-                "give a finite number other than zero"
-            )
-
-    def __str__(self) -> str:
-        return f"joint {self.name!r} ({self.type})"
-
-    @property
-    @abstractmethod
-    def coefficients(self) -> tuple[float, float]:
-        """Weights of the two coordinates [m, rad]; their weighted sum stays zero."""
-
-
-def _times(factor: float, value: float | Sequence[Any]) -> Any:
-    return tuple(_times(factor, each) for each in value) if isinstance(value, Sequence) else factor * value
+def _times(factor: float, value: float | Sequence[float]) -> Any:
+    return tuple(factor * x for x in value) if isinstance(value, Sequence) else factor * value
 
 
 def unit(a: Sequence[Scalar]) -> Vec3:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .base import Coupler
+from .coupler import Coupler
 
 
 @dataclass(frozen=True)

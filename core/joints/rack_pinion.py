@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .base import Coupler, length
+from .base import length
+from .coupler import Coupler
 
 
 @dataclass(frozen=True)

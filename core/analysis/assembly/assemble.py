@@ -74,21 +74,31 @@ def assemble(
         style: how the rows are written; "mixed" leads to the intended branch from farthest.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or there is no body or driver of a name.
+        SolveError: drivers and degrees of freedom do not match, there is no moving body or driver of a name, or an estimate has
+            another shape.
     """
     require_named("assemble", mechanism, estimates, values or {})
+    n = next((len(np.atleast_2d(r)) for r, _ in estimates.values()), 1)
+    require_shapes("assemble", estimates, (n,))
     closing = Closing(mechanism, values or {}, style)
-    n = max((len(r) for r, _ in estimates.values()), default=1)
     return closing.run(displaced(mechanism, closing.tracer.frame, estimates), n, tol)
 
 
 def require_named(who: str, mechanism: Mechanism, bodies: Iterable[str], drivers: Iterable[str]) -> None:
-    """Raise SolveError unless there are bodies and drivers of these names."""
-    for what, names, known in (("body", bodies, mechanism.bodies), ("driver", drivers, mechanism.drivers)):
+    """Raise SolveError unless there are moving bodies and drivers of these names."""
+    for what, names, known in (("moving body", bodies, mechanism.moving), ("driver", drivers, mechanism.drivers)):
         there = [each.name for each in known]
         for name in names:
             if name not in there:
                 raise SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
+
+
+def require_shapes(who: str, estimates: Mapping[str, tuple[Array, Array]], lanes: tuple[int, ...]) -> None:
+    """Raise SolveError unless all origins and Euler parameters are given for these lanes."""
+    for name, pose in estimates.items():
+        for what, numbers, count in zip(("origin r", "Euler parameters p"), pose, (3, 4), strict=True):
+            if np.shape(numbers) != (*lanes, count):
+                raise SolveError(f"{who}: {what} of body {name!r}: shape {np.shape(numbers)}, expected {(*lanes, count)}")
 
 
 class Closing:

@@ -16,7 +16,7 @@ from ...topology import spanning_tree
 from ...trajectory import Array
 from ..equations.constraints import Frames
 from ..equations.poses import displaced
-from .assemble import Closing, require_named
+from .assemble import Closing, require_named, require_shapes
 from .signature import Branches
 
 # Starts around an estimate: turned by up to this [rad], and shifted by about this part of the mechanism's size. Bodies that are
@@ -91,9 +91,11 @@ def find_assemblies(
         tol: largest accepted residual, relative to the mechanism's size.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or there is no body or driver of a name.
+        SolveError: drivers and degrees of freedom do not match, there is no moving body or driver of a name, or an estimate has
+            another shape.
     """
     require_named("find_assemblies", mechanism, estimate, values or {})
+    require_shapes("find_assemblies", estimate, ())
     closing = Closing(mechanism, values or {})
     frame = closing.tracer.frame
     near = displaced(mechanism, frame, estimate)

@@ -18,7 +18,7 @@ from ...joints.base import unit
 from ...mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Pose
 from ..equations.cartesian import Cartesian
-from ..equations.constraints import Frames, constraints, joint_points
+from ..equations.constraints import Frames, constraints
 from ..equations.poses import jacobian, state_of
 from ..structure.redundancy import independent_rows
 
@@ -100,7 +100,7 @@ def _orientation(matrix: np.ndarray) -> float:
 
 def _triple(mechanism: Mechanism, frame: Frames, joint: Joint) -> Triple | None:
     """The triple product at a joint that is farthest from zero at design."""
-    ends = joint_points(joint)
+    ends = joint.points_on()
     if not ends:
         return None
     first, last = ends[0], ends[-1]
@@ -130,6 +130,6 @@ def _others(mechanism: Mechanism, body: str, P: Sequence[float]) -> Iterator[Vec
     for joint in mechanism.joints:
         for end, owner in enumerate(joint.bodies):
             if owner == body or (fixed and mechanism.is_fixed(owner)):
-                points = joint_points(joint)
+                points = joint.points_on()
                 if points and (away := vec(points[-1] if end else points[0]) - vec(P)) @ away > 0.0:
                     yield away

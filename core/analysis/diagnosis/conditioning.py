@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...algebra import Vec3, vec
+from ...joints import Kind
 from ...mechanism import Mechanism
 from ...motions import Path
 from ...primitives.base import GROUND_POSE, Drive, Motion
@@ -26,7 +27,7 @@ from ..equations.carried import position_of
 from ..equations.cartesian import Cartesian
 from ..equations.constraints import Frames, constraints
 from ..equations.formulation import Configuration
-from ..equations.geometry import directions, placed, places
+from ..equations.geometry import kinds, placed, places
 from ..equations.poses import displaced, jacobian, state_of
 from ..model import compile_model, standing_drives
 from ..request import Request
@@ -154,7 +155,8 @@ def conditioning(
             )
         )
     # a derivative by the components of a direction becomes one by its angle
-    lengths = {place: math.hypot(*value) for place, value in _varied(mechanism, varied).items() if place in directions(mechanism)}
+    of = kinds(mechanism)
+    lengths = {place: math.hypot(*value) for place, value in _varied(mechanism, varied).items() if of[place] is Kind.DIRECTION}
     numbers = [
         (place, k, lengths.get(place, 1.0)) for place, value in _varied(mechanism, varied).items() for k in range(len(value))
     ]

@@ -71,9 +71,9 @@ def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
         for body in joint.bodies:
             touching.setdefault(body, []).append(joint)
     for branch in spanning_tree(mechanism).branches:
-        at = joint_points(branch.joint) if branch.joint is not None else []
+        at = branch.joint.points_on() if branch.joint is not None else []
         if not at:  # a free body, or a joint without a point: the first point any joint has on it
-            at = [q for joint in touching.get(branch.child, ()) for q in joint_points(joint, branch.child)]
+            at = [q for joint in touching.get(branch.child, ()) for q in joint.points_on(branch.child)]
         position = at[0] if at else mechanism.body(branch.child).origin
         origins[branch.child] = (1.0 / length_unit) * vec(position)
     return Frames(length_unit, origins, tuple(body.name for body in mechanism.moving))
@@ -85,7 +85,7 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
     points: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     for joint in mechanism.joints:
         for body in joint.bodies:
-            points[body] += joint_points(joint, body)
+            points[body] += joint.points_on(body)
     extents = [max(max(axis) - min(axis) for axis in zip(*points[body], strict=True)) for body in whole.moving if points[body]]
     sizes = sorted(extent for extent in extents if extent > 0.0)
     unit = 2.0 ** round(math.log2(sizes[len(sizes) // 2])) if sizes else whole.unit
@@ -98,20 +98,12 @@ def _size(mechanism: Mechanism) -> float:
     A metre in its place would be the unit of a mechanism of micrometres: its residuals are too small to be seen, and its
     singular values too.
     """
-    joints = [point for joint in mechanism.joints for point in joint_points(joint)]
+    joints = [point for joint in mechanism.joints for point in joint.points_on()]
     for places in (joints, joints + [point.position for point in mechanism.points]):
         extent = max((max(axis) - min(axis) for axis in zip(*places, strict=True)), default=0.0)
         if extent > 0.0:
             return extent
     return 1.0
-
-
-def joint_points(joint: Joint, body: str | None = None) -> list[tuple[float, float, float]]:
-    """The points of a joint, global at design [m]; only those on the body if one is named."""
-    point, pair = getattr(joint, "point", None), getattr(joint, "points", ())
-    if point is not None:
-        return [point]
-    return [q for q, owner in zip(pair, joint.bodies, strict=False) if body in (None, owner)]
 
 
 class Style(StrEnum):

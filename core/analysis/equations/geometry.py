@@ -7,37 +7,27 @@ A place is named as in a case file: "joints.NAME.point", "joints.NAME.axis", "jo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 from ...algebra import Scalar
 from ...joints import Joint, Kind
 from ...mechanism import Mechanism, Point
 
-PAIRS = (Kind.POSITIONS, Kind.DIRECTIONS)
-
 
 def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
     """The value of every place [m or -]: three numbers of a point or direction, one of a length."""
     found: dict[str, tuple[float, ...]] = {}
     for joint in mechanism.joints:
-        for name, kind in _fields(joint):
-            value = getattr(joint, name)
-            if kind in PAIRS:
-                found |= {f"joints.{joint.name}.{name}.{k}": tuple(each) for k, each in enumerate(value)}
-            elif value is not None:
-                found[f"joints.{joint.name}.{name}"] = (value,) if kind is Kind.LENGTH else tuple(value)
+        for name, kind, value in joint.parts():
+            found[f"joints.{joint.name}.{name}"] = (value,) if kind is Kind.LENGTH else tuple(value)
     return found | {f"points.{point.name}.position": point.position for point in mechanism.points}
 
 
-def directions(mechanism: Mechanism) -> frozenset[str]:
-    """The places that hold directions: what varies there is an angle."""
-    found: set[str] = set()
-    for joint in mechanism.joints:
-        for name, kind in _fields(joint):
-            place = f"joints.{joint.name}.{name}"
-            found |= {Kind.DIRECTION: {place}, Kind.DIRECTIONS: {f"{place}.0", f"{place}.1"}}.get(kind, set())
-    return frozenset(found)
+def kinds(mechanism: Mechanism) -> dict[str, Kind]:
+    """What every place holds: a point, a direction or a length."""
+    found = {f"joints.{joint.name}.{name}": kind for joint in mechanism.joints for name, kind, _ in joint.parts()}
+    return found | {f"points.{point.name}.position": Kind.POSITION for point in mechanism.points}
 
 
 def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mechanism:
@@ -47,19 +37,14 @@ def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mech
     return replace(mechanism, joints=joints, points=points)
 
 
-def _fields(joint: Joint) -> list[tuple[str, Kind]]:
-    return [(each.name, each.metadata["kind"]) for each in fields(joint) if "kind" in each.metadata]
-
-
 def _changes(joint: Joint, values: Mapping[str, Sequence[Scalar]]) -> dict[str, Any]:
     changes: dict[str, Any] = {}
-    for name, kind in _fields(joint):
+    for name, kind, value in joint.geometry():
         place = f"joints.{joint.name}.{name}"
-        if kind in PAIRS:
+        if kind.pair:
             given = tuple(values.get(f"{place}.{k}") for k in range(2))
             if given != (None, None):
-                pairs = zip(given, getattr(joint, name), strict=True)
-                changes[name] = tuple(old if new is None else tuple(new) for new, old in pairs)
+                changes[name] = tuple(old if new is None else tuple(new) for new, old in zip(given, value, strict=True))
         elif place in values:
             changes[name] = values[place][0] if kind is Kind.LENGTH else tuple(values[place])
     return changes

@@ -18,10 +18,10 @@ import numpy as np
 from ...algebra import ZERO, vec
 from ...drivers import Driver, JointDriver, PointCoordinate
 from ...errors import SolveError
-from ...joints import Joint
+from ...joints import Joint, Kind
 from ...mechanism import GROUND, Body, Mechanism, Point, Vector
 from ..equations.cartesian import COLUMNS, Cartesian
-from ..equations.constraints import Frames, constraints, joint_points
+from ..equations.constraints import Frames, constraints
 from ..equations.formulation import Formulation
 from ..equations.geometry import places
 from ..equations.poses import jacobian
@@ -49,7 +49,7 @@ class Component:
     @property
     def extent(self) -> float:
         """A power of two of metres near its size; zero where all its joints are at one point."""
-        points = [point for joint in self.joints for point in joint_points(joint)]
+        points = [point for joint in self.joints for point in joint.points_on()]
         extent = max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=0.0)
         return 2.0 ** round(math.log2(extent)) if extent > 0.0 else 0.0
 
@@ -198,14 +198,8 @@ def section(
 
 def _joint_places(joints: Sequence[Joint], body: str) -> list[tuple[str, tuple[float, ...]]]:
     """Places of the points that joints have on a body."""
-    found: list[tuple[str, tuple[float, ...]]] = []
-    for joint in joints:
-        if body not in joint.bodies:
-            continue
-        pair = hasattr(joint, "points")
-        places_ = [f"joints.{joint.name}.points.{joint.bodies.index(body)}"] if pair else [f"joints.{joint.name}.point"]
-        found += zip(places_, joint_points(joint, body), strict=False)
-    return found
+    parts = [(joint.name, part) for joint in joints if body in joint.bodies for part in joint.parts(body)]
+    return [(f"joints.{owner}.{name}", value) for owner, (name, kind, value) in parts if kind is Kind.POSITION]
 
 
 def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:

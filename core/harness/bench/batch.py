@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 import msgspec
 import numpy as np
 
-from ...analysis.equations.geometry import directions, places
+from ...analysis.equations.geometry import kinds, places
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
 from ...analysis.route import Route
 from ...analysis.variants import Variants, solve_variants
+from ...joints import Kind
 from ...program.llvm.compiler import available
 from ...trajectory import Array, PointMotion, Trajectory
 from ..case import Case
@@ -70,7 +71,7 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
         case: with its truth.
     """
     values = places(case.mechanism)
-    varied = tuple(name for name in values if name not in directions(case.mechanism))
+    varied = tuple(name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION)
     path = case.sweep.path
     model = compile_model(case.mechanism, Request(tuple(path.motions), case.points, varied=varied))
     nominal = np.array([number for name in varied for number in values[name]])

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from ...analysis.equations.constraints import Style
 from ...analysis.solve import solve
 from ...errors import SolveError
-from ...joints import Joint, Kind
+from ...joints import Kind
 from ...mechanism import Mechanism, Vector
 from ...trajectory import Array, Trajectory
 from ..case import Case
@@ -93,19 +92,10 @@ def _moved(mechanism: Mechanism, by: Vector) -> Mechanism:
         x, y, z = (a + b for a, b in zip(point, by, strict=True))
         return x, y, z
 
-    def moved(joint: Joint) -> Joint:
-        changes: dict[str, Any] = {}
-        for each in fields(joint):
-            if each.metadata.get("kind") is Kind.POSITION:
-                changes[each.name] = shifted(getattr(joint, each.name))
-            elif each.metadata.get("kind") is Kind.POSITIONS:
-                changes[each.name] = tuple(shifted(point) for point in getattr(joint, each.name))
-        return replace(joint, **changes)
-
     return replace(
         mechanism,
         bodies=[replace(body, origin=shifted(body.origin)) for body in mechanism.bodies],
-        joints=[moved(joint) for joint in mechanism.joints],
+        joints=[replace(joint, **joint.mapped({Kind.POSITION: shifted})) for joint in mechanism.joints],
         points=[replace(point, position=shifted(point.position)) for point in mechanism.points],
     )
 

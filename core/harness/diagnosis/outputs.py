@@ -11,8 +11,9 @@ import numpy as np
 
 from ...algebra import Vec3, vec
 from ...analysis.diagnosis.conditioning import Conditioning, Gradient, Pose
-from ...analysis.equations.geometry import directions
+from ...analysis.equations.geometry import kinds
 from ...jet import Jet
+from ...joints import Kind
 from ...trajectory import Array
 from ..case import Case, Quantity
 
@@ -95,7 +96,7 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
 def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> list[Sensitivity]:
     """The derivatives that are not zero throughout, the largest of each output first."""
     scales = np.array([scale for _, _, scale in found.numbers])
-    names, turning = _names(found), directions(case.mechanism)
+    names, turning = _names(found), [place for place, kind in kinds(case.mechanism).items() if kind is Kind.DIRECTION]
     result: list[Sensitivity] = []
     for output in case.outputs:
         if output.orders != ORDERS:

@@ -81,8 +81,8 @@ def _value(kind: Any, rng: np.random.Generator, angle: float) -> Any:
 
 def place(joint: Joint, rng: np.random.Generator) -> Place:
     """Body origins near the joint, but at none of its points, and a unit near its size."""
-    points = np.array([*_points(joint)]).reshape(-1, 3)
-    lengths = [getattr(joint, each.name) for each in fields(joint) if each.metadata.get("kind") is Kind.LENGTH]
+    points = np.array(joint.points_on()).reshape(-1, 3)
+    lengths = [value for _, kind, value in joint.parts() if kind is Kind.LENGTH]
     size = max([float(np.ptp(points, axis=0).max()) if len(points) > 1 else 0.0, *(abs(x) for x in lengths if x)]) or SIZE
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     origins = (_snapped(centre + size * rng.uniform(-1.0, 1.0, 3)) for _ in BODIES)
@@ -92,43 +92,22 @@ def place(joint: Joint, rng: np.random.Generator) -> Place:
 
 def between(joint: Joint) -> Joint:
     """The joint between the bodies i and j, whatever it was between; its points on the grid."""
-    return changed(replace(joint, i=BODIES[0], j=BODIES[1]), position=_snapped)
+    return changed(replace(joint, i=BODIES[0], j=BODIES[1]), {Kind.POSITION: _snapped})
 
 
 def moved(joint: Joint, offset: float) -> Joint:
     """The joint shifted along all three axes [m]."""
-    return changed(joint, position=lambda point: tuple(x + offset for x in point))
+    return changed(joint, {Kind.POSITION: lambda point: tuple(x + offset for x in point)})
 
 
 def stretched(joint: Joint, factor: float) -> Joint:
     """The joint with all directions that much longer."""
-    return changed(joint, direction=lambda axis: tuple(factor * x for x in axis))
+    return changed(joint, {Kind.DIRECTION: lambda axis: tuple(factor * x for x in axis)})
 
 
-def changed(joint: Joint, **ways: Callable[[Sequence[float]], Any]) -> Joint:
-    """The joint with its positions and directions, single ones and pairs, sent through the ways of those names."""
-    kinds: Mapping[Any, tuple[str, bool]] = {
-        Kind.POSITION: ("position", False),
-        Kind.POSITIONS: ("position", True),
-        Kind.DIRECTION: ("direction", False),
-        Kind.DIRECTIONS: ("direction", True),
-    }
-    given: dict[str, Any] = {}
-    for each in fields(joint):
-        what, pair = kinds.get(each.metadata.get("kind"), ("", False))
-        value = getattr(joint, each.name)
-        if what in ways and value is not None:
-            given[each.name] = tuple(map(ways[what], value)) if pair else ways[what](value)
-    return replace(joint, **given)
-
-
-def _points(joint: Joint) -> list[Sequence[float]]:
-    found: list[Sequence[float]] = []
-    for each in fields(joint):
-        kind, value = each.metadata.get("kind"), getattr(joint, each.name)
-        if kind in (Kind.POSITION, Kind.POSITIONS) and value is not None:
-            found += [value] if kind is Kind.POSITION else list(value)
-    return found
+def changed(joint: Joint, ways: Mapping[Kind, Callable[[Any], Any]]) -> Joint:
+    """The joint with its geometry sent through the way for each kind, and checked again."""
+    return replace(joint, **joint.mapped(ways))
 
 
 def _unit(a: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -139,10 +139,9 @@ def rounded(case: Case, digits: int) -> Case | None:
     mechanism = case.mechanism
     try:
         joints = [
-            replace(joint, **{f.name: short(value) for f in fields(joint) if isinstance(f.metadata.get("kind"), Kind)
-                              and (value := getattr(joint, f.name)) is not None})
+            replace(joint, **joint.mapped(dict.fromkeys((Kind.POSITION, Kind.DIRECTION, Kind.LENGTH), short)))
             for joint in mechanism.joints
-        ]  # fmt: skip
+        ]
         points = [replace(point, position=short(point.position)) for point in mechanism.points]
         found = replace(mechanism, joints=joints, points=points)
         require_driven(found)

@@ -5,11 +5,9 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable
-from dataclasses import fields
 from enum import Enum
 
-from ...analysis.equations.geometry import places
-from ...joints import Kind as Shape
+from ...analysis.equations.geometry import kinds, places
 from ...mechanism import Mechanism
 from ..case import MARKER
 
@@ -23,15 +21,6 @@ class Kind(Enum):
     POSITION = "a position"
     DIRECTION = "a direction"
     LENGTH = "a length"
-
-
-_KINDS = {
-    Shape.POSITION: Kind.POSITION,
-    Shape.POSITIONS: Kind.POSITION,
-    Shape.DIRECTION: Kind.DIRECTION,
-    Shape.DIRECTIONS: Kind.DIRECTION,
-    Shape.LENGTH: Kind.LENGTH,
-}
 
 
 class PlaceError(ValueError):
@@ -48,13 +37,7 @@ class Geometry:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.values = places(mechanism)
-        self.kinds = {place: Kind.POSITION for place in self.values if place.startswith("points.")}
-        for joint in mechanism.joints:
-            for each in fields(joint):
-                place = f"joints.{joint.name}.{each.name}"
-                for name in (place, f"{place}.0", f"{place}.1"):
-                    if "kind" in each.metadata and name in self.values:
-                        self.kinds[name] = _KINDS[each.metadata["kind"]]
+        self.kinds = {place: Kind[kind.name] for place, kind in kinds(mechanism).items()}
 
     @property
     def named(self) -> list[str]:

@@ -1,0 +1,55 @@
+"""What couples two joints: a linear relation between their coordinates. A new one is one file, as a new joint is."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+from ..errors import MechanismError
+from .given import held
+
+
+@dataclass(frozen=True)
+class Coupler(ABC):
+    """A linear relation between one coordinate each of two axial joints, zero at design.
+
+    Attributes:
+        joints: names of the two joints.
+        freedoms: which coordinate of each: "rotation" or "translation".
+
+    Raises:
+        MechanismError: one joint twice, or a weight that is zero or not finite.
+    """
+
+    type: ClassVar[str]
+    freedoms: ClassVar[tuple[str, str]]
+    registry: ClassVar[dict[str, type[Coupler]]] = {}
+
+    name: str
+    joints: tuple[str, str]
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "type" in cls.__dict__:
+            Coupler.registry[cls.type] = cls
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", held(f"{self}: joints", self.joints, 2, "two names"))
+        if self.joints[0] == self.joints[1]:
+            raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
+        if not all(weight and math.isfinite(weight) for weight in self.coefficients):
+            given = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ("name", "joints")}
+            raise MechanismError(
+                f"{self}: {', '.join(f'{name} = {value}' for name, value in given.items())} would lock or lose a joint; "
+                "give a finite number other than zero"
+            )
+
+    def __str__(self) -> str:
+        return f"joint {self.name!r} ({self.type})"
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> tuple[float, float]:
+        """Weights of the two coordinates [m, rad]; their weighted sum stays zero."""
