@@ -182,12 +182,17 @@ def test_designs_are_solved_as_one_by_one():
         ({"joints.ball.point": np.zeros((4, 2))}, r"has shape \(4, 2\), expected \(designs, 3\)"),
         ({"joints.ball.point": np.full((4, 3), np.nan)}, "is not finite everywhere"),
         ({"joints.ball.point": np.ones((4, 3)), "joints.strut_top.point": np.ones((5, 3))}, r"found \[4, 5\] designs"),
-        ({}, r"found \[\] designs"),
+        ({}, "^solve_designs: geometry names no place to vary; known: joints.lca_pivot.point, "),
     ],
 )
 def test_designs_that_make_no_sense_are_refused(geometry, message):
     with pytest.raises(SolveError, match=message):
         solve_designs(strut()[0], "stroke", [0.0], geometry)
+
+
+def test_an_argument_that_makes_no_sense_is_told_by_who_was_asked():
+    with pytest.raises(SolveError, match="^solve_designs: order is 5, expected 0, 1 or 2"):
+        solve_designs(strut()[0], "stroke", [0.0], {"joints.ball.point": np.zeros((4, 3))}, order=5)
 
 
 def test_samples_that_are_nearly_singular_are_refused():

@@ -66,8 +66,10 @@ def solve_designs(
     Raises:
         SolveError: there is no such place, a shape is wrong, a number is not finite, or the nominal mechanism cannot be solved.
     """
-    path, request = asked(mechanism, driver, values, rate, points, (), order, tol, "native", motions)
+    path, request = asked("solve_designs", mechanism, driver, values, motions or {}, rate=rate, points=points, order=order, tol=tol)
     known = places(mechanism)
+    if not geometry:
+        raise SolveError(f"solve_designs: geometry names no place to vary; known: {', '.join(known) or 'none'}")
     for name in path.design:
         moved = f"points.{getattr(mechanism.driver(name), 'point', '')}.position"
         if moved in geometry:

@@ -57,40 +57,48 @@ def solve(
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
             argument makes no sense.
     """
-    path, request = asked(mechanism, driver, values, rate, points, bodies, order, tol, style, motions)
+    path, request = asked(
+        "solve",
+        mechanism,
+        driver,
+        values,
+        motions or {},
+        rate=rate,
+        points=points,
+        bodies=bodies,
+        order=order,
+        tol=tol,
+        style=style,
+    )
     return prepare(mechanism, request, path)(tol)
 
 
 def asked(
+    who: str,
     mechanism: Mechanism,
     driver: str,
     values: Sequence[float] | Array,
+    motions: Mapping[str, Motion],
+    *,
     rate: float,
     points: Sequence[str] | None,
-    bodies: Sequence[str],
     order: int,
     tol: float,
-    style: str,
-    motions: Mapping[str, Motion] | None,
+    bodies: Sequence[str] = (),
+    style: str = "native",
 ) -> tuple[Path, Request]:
     """The path and the request that the arguments of `solve` mean.
 
     Raises:
-        SolveError: an argument makes no sense.
+        SolveError: an argument makes no sense; the message begins with who asks.
     """
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
-    _require(order in (0, 1, 2), f"order is {order}, expected 0, 1 or 2")
-    _require(math.isfinite(rate) and rate != 0.0, f"rate is {rate}, expected driver units per second other than 0; 1 serves")
-    _require(math.isfinite(tol) and tol > 0.0, f"tol is {tol}, expected a positive number; 1e-12 serves")
-    values = _numbers(values)
-    _require(np.ndim(values) == 1, f"values have shape {np.shape(values)}, expected (n,): one driver value for each sample")
-    _require(bool(np.isfinite(values).all()), "values are not all finite; give finite driver values")
-    _require(driver not in (motions or {}), f"motions has {driver!r}, which is swept; leave it out, or sweep another driver")
-    for name, motion in (motions or {}).items():
-        right = isinstance(motion, Motion)  # pyright: ignore[reportUnnecessaryIsInstance]
-        _require(right, f"motions[{name!r}] is {motion!r}, expected a motion such as Sine or Table")
+    values = _numbers(who, values)
+    problem = _problem(driver, values, motions, rate, order, tol)
+    if problem:
+        raise SolveError(f"{who}: {problem}")
     for what, names, known in (
-        ("driver", [driver, *(motions or {})], mechanism.drivers),
+        ("driver", (driver, *motions), mechanism.drivers),
         ("point", wanted, mechanism.points),
         ("body", bodies, mechanism.bodies),
     ):
@@ -98,22 +106,38 @@ def asked(
         for name in names:
             if name not in there:
                 require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
-                raise SolveError(f"solve: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
-    design = {name: value for name in (driver, *(motions or {})) if (value := mechanism.design_value(name))}
+                raise SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
+    design = {name: value for name in (driver, *motions) if (value := mechanism.design_value(name))}
     with np.errstate(over="ignore"):
         times = (values - design.get(driver, 0.0)) / rate
-    _require(bool(np.isfinite(times).all()), f"rate is {rate}: no number is the time of the values then; give a larger one")
-    path = Path({**as_changes(motions or {}, design), driver: Ramp(rate)}, times, design)
+    if not np.isfinite(times).all():
+        raise SolveError(f"{who}: rate is {rate}: no number is the time of the values then; give a larger one")
+    path = Path({**as_changes(motions, design), driver: Ramp(rate)}, times, design)
     return path, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style))
 
 
-def _numbers(values: Sequence[float] | Array) -> Array:
+def _numbers(who: str, values: Sequence[float] | Array) -> Array:
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise SolveError(f"solve: values are {values!r}, expected numbers: one driver value for each sample") from None
+        raise SolveError(f"{who}: values are {values!r}, expected numbers: one driver value for each sample") from None
 
 
-def _require(holds: bool, otherwise: str) -> None:
-    if not holds:
-        raise SolveError(f"solve: {otherwise}")
+def _problem(driver: str, values: Array, motions: Mapping[str, Motion], rate: float, order: int, tol: float) -> str:
+    """What makes no sense about arguments, or nothing; told only where there is something, because telling takes its time."""
+    if order not in (0, 1, 2):
+        return f"order is {order}, expected 0, 1 or 2"
+    if not (math.isfinite(rate) and rate != 0.0):
+        return f"rate is {rate}, expected driver units per second other than 0; 1 serves"
+    if not (math.isfinite(tol) and tol > 0.0):
+        return f"tol is {tol}, expected a positive number; 1e-12 serves"
+    if values.ndim != 1:
+        return f"values have shape {values.shape}, expected (n,): one driver value for each sample"
+    if not np.isfinite(values).all():
+        return "values are not all finite; give finite driver values"
+    if driver in motions:
+        return f"motions has {driver!r}, which is swept; leave it out, or sweep another driver"
+    for name, motion in motions.items():
+        if not isinstance(motion, Motion):  # pyright: ignore[reportUnnecessaryIsInstance]
+            return f"motions[{name!r}] is {motion!r}, expected a motion such as Sine or Table"
+    return ""
