@@ -9,9 +9,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from ..analysis.model import compile_model
+from ..analysis.prepare import prepare
 from ..analysis.request import Request
-from ..analysis.sweep import sweep
 from ..errors import KincheckError
 from ..joints import Kind
 from ..mechanism import Vector
@@ -102,8 +101,8 @@ def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
     frames = min(FRAMES, count, POSES // max(1, len(bodies)))
     taken = np.unique(np.linspace(0, count - 1, frames).round().astype(int))
     # not compiled: for so few samples the compiler takes longer than numpy
-    model = compile_model(case.mechanism, Request(tuple(path.motions), (), bodies, order=0, compiled=False))
-    found = sweep(model, replace(path, times=path.times[taken]), TOL)
+    request = Request(tuple(path.motions), (), bodies, order=0, compiled=False)
+    found = prepare(case.mechanism, request, replace(path, times=path.times[taken]))(TOL)
     reached = {name: replace(motion, r=motion.r[found.solved], p=motion.p[found.solved]) for name, motion in found.bodies.items()}
     return taken[found.solved].tolist(), reached if found.solved.any() else {}, found.message
 

@@ -9,9 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ..analysis.model import compile_model
+from ..analysis.prepare import prepare
 from ..analysis.request import Request
-from ..analysis.sweep import sweep
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..trajectory import Array, BodyMotion
@@ -66,10 +65,10 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
     if not math.isfinite(stop):
         raise SolveError(f"case {case.name!r}: the start {stop} is not finite; give a value of {case.sweep.driver!r}")
     bodies = tuple(body.name for body in case.mechanism.moving)
-    model = compile_model(case.mechanism, Request(tuple(case.sweep.path.motions), (), bodies, order=0))
+    request = Request(tuple(case.sweep.path.motions), (), bodies, order=0)
     for samples in (1,) if stop == case.sweep.design else SAMPLES:
         values: Array = np.linspace(stop, case.sweep.design, samples)[::-1]  # its first is exact, also where it is the only one
-        found = sweep(model, replace(case.sweep, values=values).path, TOL)
+        found = prepare(case.mechanism, request, replace(case.sweep, values=values).path)(TOL)
         if not found.solved.all():
             raise SolveError(
                 f"case {case.name!r}: there is no way from the design to {case.sweep.driver} = {stop:.9g}: {found.message}"
