@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, cross, vec
+from ..core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, cross, quat, vec
 from ..core.joints import Joint
 from ..core.mechanism import GROUND, Body, Mechanism, Vector
 from ..core.trajectory import Array, BodyMotion
@@ -48,16 +48,14 @@ class Displacement:
 
 def attitude(body: Body) -> Quat:
     """The rotation of a body's frame at design, body -> global."""
-    e0, *e = body.euler_parameters
-    return Quat(e0, vec(e))
+    return quat(body.euler_parameters)
 
 
 def displacements(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> dict[str, Displacement]:
     """Of every body, fixed ones and the ground included, from the motion of the moving ones."""
     found = {body.name: Displacement() for body in mechanism.bodies} | {GROUND: Displacement()}
     for body in mechanism.moving:
-        e0, *e = way[body.name].p.T
-        turn = Quat(e0, vec(e)) * attitude(body).conjugate()
+        turn = quat(way[body.name].p.T) * attitude(body).conjugate()
         found[body.name] = Displacement(turn, vec([*way[body.name].r.T]) - rotated(turn, vec(body.origin)))
     return found
 

@@ -7,17 +7,21 @@ or branches on a value: a traced scalar has none.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
 
 Scalar: TypeAlias = Any
 """A number of any kind that knows + - * / and unary minus."""
 
 
 def root(a: Scalar) -> Scalar:
-    """The square root of a number that is known when a mechanism is described: a float, or a number that knows its own root."""
-    return a.sqrt() if hasattr(a, "sqrt") else math.sqrt(a)
+    """The square root of a number, or of lanes."""
+    if hasattr(a, "sqrt"):  # a number that knows its own
+        return a.sqrt()
+    return math.sqrt(a) if isinstance(a, int | float) else np.sqrt(a)
 
 
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
@@ -124,14 +128,20 @@ class Quat:
 IDENTITY = Quat(1.0, ZERO)
 
 
-def turned_by(q: Quat, half: Vec3, sqrt: Any) -> Quat:
+def quat(values: Iterable[Scalar]) -> Quat:
+    """Euler parameters from a sequence e0, e1, e2, e3; of an array, its rows."""
+    e0, x, y, z = values
+    return Quat(e0, Vec3(x, y, z))
+
+
+def turned_by(q: Quat, half: Vec3) -> Quat:
     """The unit quaternion (1, half) q / |(1, half) q|: q turned by about 2 half, global axes.
 
     The rotation applied is 2 atan|half|, which agrees with the exponential to second order; renormalising each time keeps
     the length at one to round-off, whatever the number of steps.
     """
     p = Quat(1.0, half) * q
-    length = sqrt(p.e0 * p.e0 + p.e @ p.e)
+    length = root(p.e0 * p.e0 + p.e @ p.e)
     k = 1.0 / length
     return Quat(k * p.e0, k * p.e)
 

@@ -102,7 +102,7 @@ def newton_from(q, primitive, rows, iterations):
         J = np.array([lanes(row) for row in rows(j)]).transpose(2, 0, 1)
         phi = lanes(primitive.phi(GROUND_POSE, j)).T
         step = (np.linalg.pinv(J) @ phi[:, :, None])[:, :, 0].T
-        q = turned_by(q, -0.5 * Vec3(*step), np.sqrt)
+        q = turned_by(q, -0.5 * Vec3(*step))
     return Pose.of(ZERO, q)
 
 

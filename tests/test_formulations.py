@@ -188,7 +188,7 @@ def newton(primitives, i, j):
         turns = [Vec3(*part) for part in (step[:3], step[3:])]
         if primitives[0].body_axes:
             turns = [pose.A @ turn for pose, turn in zip(poses, turns, strict=True)]
-        i, j = (turned_by(q, 0.5 * turn, np.sqrt) for q, turn in zip((i, j), turns, strict=True))
+        i, j = (turned_by(q, 0.5 * turn) for q, turn in zip((i, j), turns, strict=True))
     return done, 2.0 * np.arccos(np.minimum(np.abs((i * j.conjugate()).e0), 1.0))
 
 

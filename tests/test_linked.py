@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from kincheck.core.program import NumpyExecutor, Plan, Tape, cos, program, sqrt, where_larger
+from kincheck.core.algebra import root
+from kincheck.core.program import NumpyExecutor, Plan, Tape, cos, program, where_larger
 from kincheck.core.program.fixed_order import FixedOrder
 from kincheck.core.program.linked import MOST, Linker, Memory, joined, numbers
 from kincheck.core.program.llvm.compiler import available, vector_width
@@ -33,7 +34,7 @@ def test_lanes_of_a_program_read_and_write_rows_of_their_own(lanes):
     tape = Tape()
     a, b, c = (tape.input(k) for k in range(3))
     product = a * b
-    values = {3: sqrt(product * product) + c, 4: where_larger(a, c, product - 0.1, cos(b)), 5: 7.25, 6: product}
+    values = {3: root(product * product) + c, 4: where_larger(a, c, product - 0.1, cos(b)), 5: 7.25, 6: product}
     traced, memory, rng = program("f", tape, values), Memory(), np.random.default_rng(lanes)
     # the lanes share their third input, and stand in any order
     inputs, shared, outputs = memory.take(2 * lanes), memory.take(1).start, memory.take(4 * lanes)

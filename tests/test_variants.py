@@ -191,7 +191,7 @@ def test_designs_that_make_no_sense_are_refused(geometry, message):
 
 
 def test_an_argument_that_makes_no_sense_is_told_by_who_was_asked():
-    with pytest.raises(SolveError, match="^solve_designs: order is 5, expected 0, 1 or 2"):
+    with pytest.raises(SolveError, match=r"^solve_designs: order is 5, expected 0, 1 or 2"):
         solve_designs(strut()[0], "stroke", [0.0], {"joints.ball.point": np.zeros((4, 3))}, order=5)
 
 

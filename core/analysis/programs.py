@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, reduce
 from typing import Any
 
-from ..algebra import Quat, Scalar, Vec3, vec
+from ..algebra import Scalar, Vec3, quat, vec
 from ..mechanism import Mechanism, Vector
 from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose
 from ..program import (
@@ -81,8 +81,8 @@ class Tracer:
 
     def _moved(self, name: str) -> Given:
         """A given body, its motion read from slots."""
-        u, (e0, *e), v, w, v_t, w_t = (self.vector(f"given {label} {name}", count) for label, count in GIVEN.items())
-        return Given(Pose.of(vec(u), Quat(e0, vec(e))), Motion(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t)))
+        u, q, v, w, v_t, w_t = (self.vector(f"given {label} {name}", count) for label, count in GIVEN.items())
+        return Given(Pose.of(vec(u), quat(q)), Motion(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t)))
 
     def read(self, name: str) -> Scalar:
         """A scalar of the lanes."""
@@ -179,9 +179,8 @@ class Tracer:
             self._store_motion(out, ("position", "velocity", "acceleration"), name, of_point(point.body, point.position))
         for name in self.request.bodies:
             body = self.mechanism.body(name)
-            e0, *e = body.euler_parameters
             self._store_motion(out, ("r", "rdot", "rddot"), name, of_point(name, body.origin))
-            self._store_motion(out, ("p", "omega", "omega_t"), name, motion_of_frame(Quat(e0, vec(e)), *moving(name)))
+            self._store_motion(out, ("p", "omega", "omega_t"), name, motion_of_frame(quat(body.euler_parameters), *moving(name)))
         return program("outputs", self.tape, out, self.prepared)
 
     def _store_motion(self, out: dict[int, Scalar], labels: Sequence[str], name: str, found: Iterable[Iterable[Scalar]]) -> None:

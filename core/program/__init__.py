@@ -18,7 +18,6 @@ from .trace import (
     minimum,
     place_of,
     sin,
-    sqrt,
     where_larger,
 )
 
@@ -50,6 +49,5 @@ __all__ = [
     "place_of",
     "program",
     "sin",
-    "sqrt",
     "where_larger",
 ]

@@ -94,7 +94,7 @@ class Traced:
 
     def sqrt(self) -> Scalar:
         """The square root."""
-        return sqrt(self)
+        return self.tape.node("sqrt", self.number)
 
     @staticmethod
     def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
@@ -173,11 +173,6 @@ def _scale(op: str, a: Scalar, b: Scalar) -> Scalar:
 
 def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
     return a.tape.node(op, a.number) if isinstance(a, Traced) else value(a)
-
-
-def sqrt(a: Scalar) -> Scalar:
-    """Square root of a float or traced scalar."""
-    return _unary("sqrt", a, math.sqrt)
 
 
 def sin(a: Scalar) -> Scalar:

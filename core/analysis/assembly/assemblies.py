@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Quat, vec
+from ...algebra import Quat, quat, vec
 from ...mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Pose
 from ...topology import spanning_tree
@@ -136,7 +136,7 @@ def _numbers(poses: Mapping[str, Pose]) -> tuple[Array, Array]:
 
 def _lane(pose: Pose, k: int) -> Pose:
     u, q = (values[k, 0].tolist() for values in _numbers({"": pose}))
-    return Pose.of(vec(u), Quat(q[0], vec(q[1:])))
+    return Pose.of(vec(u), quat(q))
 
 
 def _groups(poses: Mapping[str, Pose], n: int) -> list[NDArray[np.intp]]:
@@ -184,8 +184,7 @@ def _starts(
 def _any_rotation(n: int, rng: np.random.Generator) -> Quat:
     """Rotations of which none is likelier than another."""
     e = rng.normal(size=(4, n))
-    e0, *rest = e / np.linalg.norm(e, axis=0)
-    return Quat(e0, vec(rest))
+    return quat(e / np.linalg.norm(e, axis=0))
 
 
 def _shaken(pose: Pose, angle: Array, shift: float, n: int, rng: np.random.Generator) -> Pose:
@@ -200,4 +199,4 @@ def _where(these: NDArray[np.bool_], one: Pose, other: Pose) -> Pose:
     """One pose in these lanes, the other elsewhere."""
     pairs = zip((*one.u, one.q.e0, *one.q.e), (*other.u, other.q.e0, *other.q.e), strict=True)
     numbers: list[Any] = [np.where(these, a, b) for a, b in pairs]
-    return Pose.of(vec(numbers[:3]), Quat(numbers[3], vec(numbers[4:])))
+    return Pose.of(vec(numbers[:3]), quat(numbers[3:]))

@@ -18,7 +18,7 @@ from ...joints.base import unit
 from ...mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Pose
 from ..equations.cartesian import Cartesian
-from ..equations.constraints import Frames, constraints
+from ..equations.constraints import Frames
 from ..equations.poses import jacobian, state_of
 from ..structure.redundancy import independent_rows
 
@@ -77,7 +77,7 @@ class Branches:
     @staticmethod
     def of(mechanism: Mechanism, frame: Frames, values: Mapping[str, float]) -> Branches:
         """The branches of a mechanism whose drivers have these values, from design."""
-        formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+        formulation = Cartesian.of(mechanism, frame)
         matrix = jacobian(formulation)
         kept = independent_rows(matrix, len(mechanism.drivers), formulation.conditions)
         triples = {joint.name: triple for joint in mechanism.joints if (triple := _triple(mechanism, frame, joint)) is not None}

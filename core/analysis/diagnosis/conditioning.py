@@ -25,7 +25,7 @@ from ...primitives.base import GROUND_POSE, Drive, Motion
 from ...trajectory import Array, Trajectory
 from ..equations.carried import position_of
 from ..equations.cartesian import Cartesian
-from ..equations.constraints import Frames, constraints
+from ..equations.constraints import Frames
 from ..equations.formulation import Configuration
 from ..equations.geometry import kinds, placed, places
 from ..equations.poses import displaced, jacobian, state_of
@@ -127,7 +127,7 @@ def conditioning(
     for k in seen:
         change = dict(zip(drivers, drive[:, k].tolist(), strict=True))
         drives = standing_drives(mechanism, frame.unit, change)
-        formulation = Cartesian(constraints(mechanism, frame, drives), frame.moving)
+        formulation = Cartesian.of(mechanism, frame, drives)
         pose = displaced(mechanism, frame, {name: (found.bodies[name].r[k], found.bodies[name].p[k]) for name in bodies})
         configuration = formulation.configuration(_floats(state_of(formulation, mechanism, frame, pose, change)))
         matrix = jacobian(formulation, configuration)
@@ -138,7 +138,7 @@ def conditioning(
         U, sizes, V = np.linalg.svd(solved)
         inverse = (V.T / sizes) @ U.T
         metres = inverse / np.where(_is_length(formulation, solved), frame.unit, 1.0)
-        changed = Cartesian(constraints(elsewhere, frame, _held(mechanism, elsewhere, drives, frame)), frame.moving)
+        changed = Cartesian.of(elsewhere, frame, _held(mechanism, elsewhere, drives, frame))
         phi = changed.phi(configuration)
         by_geometry = np.array([np.broadcast_to(derivatives(x), (_count(mechanism, varied),)) for x in phi])
         shift = -inverse @ by_geometry[kept]
@@ -160,7 +160,7 @@ def conditioning(
     numbers = [
         (place, k, lengths.get(place, 1.0)) for place, value in _varied(mechanism, varied).items() for k in range(len(value))
     ]
-    still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    still = Cartesian.of(mechanism, frame)
     nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
     turned = _orientations(matrices, jacobian(still), nearest)
     return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], numbers)

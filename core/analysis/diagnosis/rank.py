@@ -16,7 +16,7 @@ import numpy as np
 from ...mechanism import Mechanism
 from ...trajectory import Array
 from ..equations.cartesian import COLUMNS, Cartesian
-from ..equations.constraints import Constraint, Style, constraints, frames
+from ..equations.constraints import Constraint, Style, frames
 from ..equations.poses import jacobian
 from ..request import CONSISTENT
 from ..structure.freedom import FreedomAccount, account
@@ -94,7 +94,7 @@ class Ranks:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.frame = mechanism, frames(mechanism)
-        self.formulation = Cartesian(constraints(mechanism, self.frame, {}), self.frame.moving)
+        self.formulation = Cartesian.of(mechanism, self.frame)
         self.at = self.formulation.configuration(self.formulation.design)
         self.matrix = jacobian(self.formulation, self.at)
         self.joint_rows = len(self.matrix) - len(mechanism.drivers)
@@ -207,7 +207,7 @@ class Ranks:
     @cached_property
     def contradictions(self) -> list[Violation]:
         """The rows that do not hold in the pose nearest to an assembly, with the drivers at design; empty where it closes."""
-        exact = Cartesian(constraints(self.mechanism, self.frame, {}, Style.CONVENTIONAL), self.frame.moving)
+        exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
         state = exact.design
         for _ in range(200):
             at = exact.configuration(state)

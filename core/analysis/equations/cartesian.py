@@ -12,10 +12,11 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any
 
-from ...algebra import Quat, Scalar, Vec3, turned_by, vec
+from ...algebra import Scalar, Vec3, quat, turned_by, vec
+from ...mechanism import Mechanism
 from ...primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose, Primitive, Row
-from ...program import cos, sin, sqrt
-from .constraints import Constraint, Relation
+from ...program import cos, sin
+from .constraints import Constraint, Frames, Relation, Style, constraints
 from .formulation import GROUND_ACCELERATION, Acceleration, Condition, Configuration, Rows, State
 
 COLUMNS = 6
@@ -44,6 +45,13 @@ class Cartesian:
     bodies: Sequence[str]
     named: Sequence[str] = ()
     given: Mapping[str, Given] = field(default_factory=dict[str, Given])
+
+    @classmethod
+    def of(
+        cls, mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive] | None = None, style: Style = Style.NATIVE
+    ) -> Cartesian:
+        """All constraints of a mechanism over its moving bodies; drivers that are not named hold their design value."""
+        return cls(constraints(mechanism, frame, drives or {}, style), frame.moving)
 
     @cached_property
     def columns(self) -> Mapping[str, int]:
@@ -98,8 +106,7 @@ class Cartesian:
     def configuration(self, state: State) -> Configuration:
         poses = {name: each.pose for name, each in self.given.items()}
         for name in self.bodies:
-            e0, *e = state[f"q {name}"]
-            poses[name] = Pose.of(vec(state[f"u {name}"]), Quat(e0, vec(e)))
+            poses[name] = Pose.of(vec(state[f"u {name}"]), quat(state[f"q {name}"]))
         return Configuration(state, poses)
 
     def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
@@ -107,7 +114,7 @@ class Cartesian:
         for name, k in self.columns.items():
             dr, dpi = vec(step[k : k + 3]), self._global(at.poses[name], vec(step[k + 3 : k + COLUMNS]))
             state[f"u {name}"] = tuple(at.poses[name].u + dr)
-            state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi, sqrt))
+            state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi))
         for name, k in self.coordinates.items():
             state[f"x {name}"] = (at.state[f"x {name}"][0] + step[k],)
         return state

@@ -107,3 +107,8 @@ class Formulation(Protocol):
     def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:
         """How the bodies accelerate at unknown rates v and accelerations a."""
         ...
+
+
+def row_names(formulation: Formulation) -> list[str]:
+    """Of every row the joint or driver, and the primitive, to read."""
+    return [f"{owner}: {primitive}" for owner, primitive in formulation.owners]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import ZERO, Quat, vec
+from ...algebra import ZERO, quat, vec
 from ...drivers import JointAngle
 from ...joints import AxialJoint
 from ...joints.base import unit
@@ -23,9 +23,7 @@ def displaced(mechanism: Mechanism, frame: Frames, placed: Mapping[str, tuple[Ar
     found: dict[str, Pose] = {}
     for name, (r, p) in placed.items():
         body = mechanism.body(name)
-        e0, *e = np.moveaxis(np.asarray(p), -1, 0)
-        d0, *d = body.euler_parameters
-        q = Quat(e0, vec(e)) * Quat(d0, vec(d)).conjugate()
+        q = quat(np.moveaxis(np.asarray(p), -1, 0)) * quat(body.euler_parameters).conjugate()
         shift = np.moveaxis(np.asarray(r) - np.array(body.origin), -1, 0) / frame.unit
         swung = Pose.of(ZERO, q).swing(frame.arm(name, body.origin))
         found[name] = Pose.of(vec([*shift]) - swung, q)

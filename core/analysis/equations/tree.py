@@ -14,12 +14,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ...algebra import ZERO, Quat, Scalar, Vec3, X, Y, Z, cross, turned_by, vec
+from ...algebra import ZERO, Quat, Scalar, Vec3, X, Y, Z, cross, quat, turned_by, vec
 from ...joints import Cylindrical, Fixed, Joint, Revolute, Screw, Spherical, Translational, Universal
 from ...joints.base import unit
 from ...mechanism import GROUND, Mechanism
 from ...primitives.base import GROUND_MOTION, GROUND_POSE, Motion, Pose
-from ...program import cos, sin, sqrt
+from ...program import cos, sin
 from ...topology import Branch, spanning_tree
 from .constraints import Frames
 from .formulation import Acceleration, State
@@ -142,8 +142,7 @@ def posed(tree: Sequence[Chain], state: State) -> Posed:
             carried = Pose.of(ZERO, q)
             if step.axis is None:
                 columns += [Column(carried.turn(e), False, p, chain.P) for e in (X, Y, Z)]
-                e0, *e = state[step.name]
-                q = q * Quat(e0, vec(e))
+                q = q * quat(state[step.name])
                 continue
             h = step.sign * carried.turn(step.axis)
             (x,) = state[step.name]
@@ -164,8 +163,7 @@ def retracted(tree: Sequence[Chain], state: State, step_of: Sequence[Scalar]) ->
     k = 0
     for step in (step for chain in tree for step in chain.steps):
         if step.axis is None:
-            e0, *e = state[step.name]
-            after[step.name] = tuple(turned_by(Quat(e0, vec(e)), 0.5 * vec(step_of[k : k + BALL]), sqrt))
+            after[step.name] = tuple(turned_by(quat(state[step.name]), 0.5 * vec(step_of[k : k + BALL])))
         else:
             after[step.name] = (state[step.name][0] + step_of[k],)
         k += step.unknowns

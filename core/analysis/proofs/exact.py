@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from ...algebra import Quat, Scalar, Vec3, vec
+from ...algebra import Scalar, Vec3, quat
 from ...mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Drive
 from ...program import Program, Tape, Traced, program
@@ -223,14 +223,14 @@ def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str
         kept: the rows that are solved; the others are tested.
     """
     frame, inputs = frames(mechanism), _Inputs()
-    design = Cartesian(constraints(mechanism, frame, {}), frame.moving).design
+    design = Cartesian.of(mechanism, frame).design
     parts = {name: inputs.vector(len(value)) for name, value in design.items()}
     state = [x for part in parts.values() for x in part]
     drives = {name: _drive(inputs) for name in drivers}
     formulation = Cartesian([inputs.lift(c) for c in constraints(mechanism, frame, drives)], frame.moving)
     at = formulation.configuration(parts)
     phi = formulation.phi(at)
-    lengths = [0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0) for q in (Quat(p[0], vec(p[1:])) for n, p in parts.items() if n[0] == "q")]
+    lengths = [0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0) for q in (quat(p) for n, p in parts.items() if n[0] == "q")]
     residuals = [*(phi[k] for k in kept), *lengths]
     left_out = [phi[k] for k in range(len(phi)) if k not in set(kept)]
     moved: list[Scalar] = []

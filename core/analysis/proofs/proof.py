@@ -17,6 +17,7 @@ from ...program.ball_executor import Ball, flint, precision
 from ...trajectory import Array, Trajectory
 from ..equations.cartesian import Cartesian
 from ..equations.constraints import Constraint, constraints, frames
+from ..equations.formulation import row_names
 from ..equations.poses import displaced
 from ..model import compile_model
 from ..request import Request
@@ -73,7 +74,7 @@ def prove(
     samples: list[Enclosure | UnprovedError] = []
     seconds: list[float] = []
     others: dict[int, Sequence[str]] = {}
-    names = [f"{owner}: {primitive}" for owner, primitive in Cartesian(constraints(mechanism, model.frame, {}), ()).owners]
+    names = row_names(Cartesian.of(mechanism, model.frame))
     with precision(bits):
         exact, kept = exact_mechanism(mechanism, reading), model.selection.kept
         traced = {kept: equations(exact, tuple(drives), points, kept)}

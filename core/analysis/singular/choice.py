@@ -15,7 +15,7 @@ import numpy as np
 from ...mechanism import Mechanism
 from ...trajectory import Array
 from ..equations.cartesian import Cartesian
-from ..equations.constraints import constraints, frames
+from ..equations.constraints import frames
 from ..equations.formulation import Condition
 from ..equations.poses import jacobian
 from ..model import Model, recent_model, standing_drives
@@ -100,7 +100,7 @@ def chosen_at(mechanism: Mechanism, change: Mapping[str, float], state: Array, k
         state: the scalars of the pose, in the order of `Cartesian.design`.
     """
     frame = frames(mechanism)
-    formulation = Cartesian(constraints(mechanism, frame, standing_drives(mechanism, frame.unit, change)), frame.moving)
+    formulation = Cartesian.of(mechanism, frame, standing_drives(mechanism, frame.unit, change))
     numbers = iter(state.tolist())
     at = formulation.configuration({name: [next(numbers) for _ in value] for name, value in formulation.design.items()})
     return chosen(jacobian(formulation, at), [known], len(mechanism.drivers), formulation.conditions)

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Quat, Vec3, vec
+from ...algebra import Quat, Vec3, quat, vec
 from ...mechanism import Mechanism
 from ...motions import Path, outwards
 from ...primitives.base import Motion, Pose
@@ -20,7 +20,6 @@ from ..equations.formulation import Acceleration
 from ..march import HALVINGS, Headway
 from .model import FailedError, SparseModel, Stand
 from .together import REMEMBERED
-from .turning import euler_parameters
 
 
 def solve_sparse(
@@ -82,13 +81,13 @@ class _Wanted:
         """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape (stands, components, names)."""
         poses, rates, accelerations = self._taken(at)
         moving = (
-            Pose.of(vec([*poses[:3]]), euler_parameters(poses[3:])),
+            Pose.of(vec([*poses[:3]]), quat(poses[3:])),
             Motion(vec([*rates[:3]]), vec([*rates[3:]])),
             Acceleration(vec([*accelerations[:3]]), vec([*accelerations[3:]])),
         )
         found: list[Vec3 | Quat] = [*motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)]
         if self._frame is not None:
-            found += motion_of_frame(euler_parameters(self._frame), *moving)
+            found += motion_of_frame(quat(self._frame), *moving)
         shape = len(at), len(self.names)
         return np.stack([np.broadcast_to(component, shape) for each in found for component in each], axis=1)
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
-
 import numpy as np
 
-from ...algebra import Quat, Vec3, turned_by
-from ...program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, Tape, program, sqrt
+from ...algebra import quat, turned_by, vec
+from ...program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, Tape, program
 from ...program.llvm.compiler import available
 from ...trajectory import Array
 
@@ -19,8 +16,8 @@ BY, TO = range(7), range(7, 11)
 def turned() -> Program:
     """Euler parameters after a small global rotation, of length one."""
     tape = Tape()
-    q, (x, y, z) = euler_parameters([tape.input(k) for k in BY[:4]]), (tape.input(k) for k in BY[4:])
-    return program("turned", tape, dict(zip(TO, turned_by(q, 0.5 * Vec3(x, y, z), sqrt), strict=True)))
+    q, rotation = quat([tape.input(k) for k in BY[:4]]), vec([tape.input(k) for k in BY[4:]])
+    return program("turned", tape, dict(zip(TO, turned_by(q, 0.5 * rotation), strict=True)))
 
 
 class Turn:
@@ -36,9 +33,3 @@ class Turn:
         self._executor.put(BY, np.concatenate([q, rotation]).reshape(len(BY), -1))
         self._executor.run("turned")
         return self._executor.get(TO).ravel()
-
-
-def euler_parameters(components: Iterable[Any]) -> Quat:
-    """Four scalars, which may be rows of an array, as Euler parameters."""
-    e0, x, y, z = components
-    return Quat(e0, Vec3(x, y, z))

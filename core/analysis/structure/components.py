@@ -21,8 +21,8 @@ from ...errors import SolveError
 from ...joints import Joint, Kind
 from ...mechanism import GROUND, Body, Mechanism, Point, Vector
 from ..equations.cartesian import COLUMNS, Cartesian
-from ..equations.constraints import Frames, constraints
-from ..equations.formulation import Formulation
+from ..equations.constraints import Frames
+from ..equations.formulation import Formulation, row_names
 from ..equations.geometry import places
 from ..equations.poses import jacobian
 from .freedom import COORDINATES, FreedomAccount, Selection
@@ -103,7 +103,7 @@ def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
     """
     if mechanism.couplers:
         raise SolveError(f"mechanism {mechanism.name!r}: couplers tie its components together; solve it as one")
-    formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    formulation = Cartesian.of(mechanism, frame)
     order = _order(mechanism, formulation)
     level = {name: k for k, bodies in enumerate(order) for name in bodies}
     joints: list[list[Joint]] = [[] for _ in order]
@@ -210,7 +210,7 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
     """
     matrix, drivers = jacobian(formulation), len(mechanism.drivers)
     kept = independent_rows(matrix, drivers, formulation.conditions)
-    names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
+    names = row_names(formulation)
     if len(kept) < formulation.unknowns:
         raise SolveError(
             f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can still move at the design "

@@ -23,7 +23,7 @@ from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...trajectory import Array
 from ..equations.cartesian import COLUMNS, Cartesian
-from ..equations.constraints import constraints, frames, measured
+from ..equations.constraints import frames, measured
 from .factors import NARROW
 from .freedom import account, driven_account, mismatch
 from .redundancy import RANK_TOLERANCE
@@ -107,7 +107,7 @@ def _largest(sizes: Array, names: Sequence[str]) -> str:
 
 def _balance(mechanism: Mechanism) -> _Balance:
     frame = measured(mechanism)[1]
-    formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    formulation = Cartesian.of(mechanism, frame)
     rows = formulation.rows(formulation.configuration(formulation.design))
     null = _NullSpaces(rows, formulation.unknowns)
     drivers = len(mechanism.drivers)

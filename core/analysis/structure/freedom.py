@@ -15,8 +15,8 @@ from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...trajectory import Array
 from ..equations.cartesian import COLUMNS, Cartesian
-from ..equations.constraints import Frames, constraints
-from ..equations.formulation import Formulation
+from ..equations.constraints import Frames
+from ..equations.formulation import Formulation, row_names
 from ..equations.poses import jacobian
 from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independent_rows
 
@@ -72,7 +72,7 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     joint_rows = len(matrix) - len(mechanism.drivers)
     kept = set(independent_joint_rows(formulation, matrix[:joint_rows]))
     fixed = len(mechanism.bodies) - len(mechanism.moving)
-    names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners[:joint_rows]]
+    names = row_names(formulation)
     return FreedomAccount(
         bodies=len(mechanism.bodies),
         coordinates=COORDINATES * len(mechanism.bodies),
@@ -110,7 +110,7 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation, w
     if len(kept) < formulation.unknowns:
         raise SolveError(_locked(mechanism, formulation, matrix))
     dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))
-    names = [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
+    names = row_names(formulation)
     # taken with the drivers first, and in this formulation, the rows that are left out may be others
     found = replace(found, redundant_rows=tuple(names[k] for k in dropped))
     return Selection(found, tuple(kept), dropped)
@@ -138,7 +138,7 @@ def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> st
 
 
 def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
-    formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    formulation = Cartesian.of(mechanism, frame)
     return formulation, jacobian(formulation)
 
 

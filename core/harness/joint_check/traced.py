@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import Quat, vec
+from ...algebra import Quat, quat, vec
 from ...analysis.equations.cartesian import COLUMNS, Cartesian
 from ...analysis.equations.constraints import Frames, Relation, Style, constraints
 from ...errors import MechanismError
@@ -155,7 +155,7 @@ class TracedJoint:
         for k in range(2):
             u, q = state[7 * k : 7 * k + 3], state[7 * k + 3 : 7 * k + 7]
             dr, half = step[COLUMNS * k : COLUMNS * k + 3], 0.5 * step[COLUMNS * k + 3 : COLUMNS * (k + 1)]
-            turned = Quat(1.0, vec(tuple(half))) * Quat(q[0], vec(tuple(q[1:])))
+            turned = Quat(1.0, vec(tuple(half))) * quat(q)
             parts += [u + dr, ended(np.stack([*turned]))]
         return np.concatenate([*parts, state[POSES:] + step[2 * COLUMNS :]])
 
@@ -163,7 +163,7 @@ class TracedJoint:
         """phi along a motion: value, first and second derivative by time, shape (3, rows, lanes)."""
         jets: list[Array] = []
         for k in range(2):
-            u, q = state[7 * k : 7 * k + 3], Quat(state[7 * k + 3], vec(tuple(state[7 * k + 4 : 7 * k + 7])))
+            u, q = state[7 * k : 7 * k + 3], quat(state[7 * k + 3 : 7 * k + 7])
             v, w = rate[COLUMNS * k : COLUMNS * k + 3], vec(tuple(rate[COLUMNS * k + 3 : COLUMNS * (k + 1)]))
             a, w_t = acceleration[COLUMNS * k : COLUMNS * k + 3], vec(tuple(acceleration[COLUMNS * k + 3 : COLUMNS * (k + 1)]))
             # q' = w q / 2, q'' = w' q / 2 - |w|^2 q / 4

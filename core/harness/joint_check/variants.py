@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import Quat, rotation_less_identity, vec
+from ...algebra import quat, rotation_less_identity
 from ...analysis.equations.constraints import Style
 from ...joints import AxialJoint
 from ...trajectory import Array
@@ -46,8 +46,7 @@ def exchange(s: Specimen) -> Iterator[Finding]:
 def rigid_motion(s: Specimen) -> Iterator[Finding]:
     """The same motion seen from elsewhere: both bodies turned and shifted; and residuals off the manifold."""
     q = s.rng.normal(size=4)
-    e0, *e = (q / np.linalg.norm(q)).tolist()
-    turn = Quat(e0, vec(e))
+    turn = quat((q / np.linalg.norm(q)).tolist())
     change = rotation_less_identity(turn)
     rotation = np.eye(3) + np.array([[*change.x], [*change.y], [*change.z]])
     shift = s.rng.normal(size=(3, 1))
@@ -56,7 +55,7 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
         parts: list[Array] = []
         for k, origin in enumerate(s.traced.origins[:, :, None]):
             u, e = state[7 * k : 7 * k + 3], state[7 * k + 3 : 7 * k + 7]
-            turned = turn * Quat(e[0], vec(tuple(e[1:])))
+            turned = turn * quat(e)
             parts += [rotation @ (origin + u) + shift - origin, np.stack([*turned])]
         return np.concatenate([*parts, state[POSES:]])
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
-from ...algebra import Quat, Vec3, rotation_less_identity, vec
+from ...algebra import Vec3, quat, rotation_less_identity, vec
 from ...joints.base import unit
 from ...mechanism import GROUND
 from ..record import Scene, SceneBody, SceneJoint
@@ -169,6 +169,5 @@ def _middle(points: Sequence[Vec3]) -> tuple[float, float, float]:
 
 def _in_body(body: SceneBody, a: Vec3) -> tuple[float, float, float]:
     """A vector given globally at the design, in the body's frame."""
-    e0, *e = body.euler_parameters
-    x, y, z = a + rotation_less_identity(Quat(e0, vec(e)).conjugate()) @ a
+    x, y, z = a + rotation_less_identity(quat(body.euler_parameters).conjugate()) @ a
     return x, y, z

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...algebra import Vec3
 from ...analysis.equations.cartesian import Cartesian
-from ...analysis.equations.constraints import constraints, frames
+from ...analysis.equations.constraints import frames
 from ...analysis.proofs.enclosure import enclose
 from ...analysis.proofs.exact import as_double, equations, exact_mechanism
 from ...analysis.singular.choice import chosen_at
@@ -37,7 +37,7 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
     path = system.path
     drives = system.sampled(np.array([sample]))[:, :, 0]
     frame = frames(mechanism)
-    still = Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    still = Cartesian.of(mechanism, frame)
     pose = _state(truth, at, [*still.design], frame.unit, frame.origins)
     change = {name: float(drives[0, system.names.index(name)]) for name in path.motions}
     kept = chosen_at(mechanism, change, pose, select_rows(mechanism, frame, still).kept)

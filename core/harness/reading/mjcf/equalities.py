@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ....algebra import Quat, Vec3, vec
+from ....algebra import Vec3, quat, vec
 from ..document import remedy, shown
 from .attributes import KNOWN, WRITE_OUT
 from .classes import MAIN
@@ -107,10 +107,7 @@ def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
         i, j = tree.carriers[first], tree.carriers[second]
         relpose = element.numbers("relpose", (7,), (0.0,) * 7)
         # zeros for the quaternion mean: as in qpos0
-        if any(relpose[3:]):
-            wanted = Place(vec(relpose[:3]), unit_quaternion(Quat(relpose[3], vec(relpose[4:]))))
-        else:
-            wanted = there.seen_from(here)
+        wanted = Place(vec(relpose[:3]), unit_quaternion(quat(relpose[3:]))) if any(relpose[3:]) else there.seen_from(here)
     found = there.seen_from(here)
     gap, turn = found.at - wanted.at, (wanted.turn.conjugate() * found.turn).e
     _require_closed(element, math.sqrt(gap @ gap), "m apart")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, rotation_less_identity, vec
+from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, quat, rotation_less_identity, vec
 from ....mechanism import Vector
 from ..document import shown
 from .attributes import KNOWN, ORIENTATION
@@ -115,7 +115,7 @@ def _orientation(element: Element, name: str, compiler: Compiler) -> Quat:
         return found
     if name == "quat":
         _nonzero(element, name, numbers)
-        return unit_quaternion(Quat(numbers[0], vec(numbers[1:])))
+        return unit_quaternion(quat(numbers))
     if name == "axisangle":
         return _about(_nonzero(element, name, numbers[:3]), compiler.angle(numbers[3]))
     if name == "zaxis":
@@ -158,7 +158,7 @@ def _of_axes(x: Vec3, y: Vec3, z: Vec3) -> Quat:
         (z.x - x.z, x.y + y.x, squares[2], y.z + z.y),
         (x.y - y.x, z.x + x.z, y.z + z.y, squares[3]),
     )[k]
-    return unit_quaternion(Quat(scaled[0], vec(scaled[1:])))
+    return unit_quaternion(quat(scaled))
 
 
 def joint_axis(element: Element) -> Vec3:
