@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from ..trajectory import Trajectory
 from .case import Case
@@ -73,6 +73,7 @@ class Floor:
     parts: Mapping[str, float]
 
 
+@runtime_checkable
 class Measurable(Engine, Protocol):
     """An engine that a diagram of work against precision can be drawn of.
 

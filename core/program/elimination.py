@@ -64,10 +64,8 @@ class Elimination:
         entries = [dict(row) for row in rows]
         self._sparse = self._eliminate_sparse(entries)
         done_rows = {pivot.row for pivot in self._sparse}
-        done_columns = {pivot.column for pivot in self._sparse}
         left_rows = [i for i in range(self.n) if i not in done_rows]
-        left_columns = [j for j in range(self.n) if j not in done_columns]
-        self._cores = [_Core(entries, *block) for block in _blocks(entries, left_rows, left_columns)]
+        self._cores = [_Core(entries, *block) for block in _blocks(entries, left_rows)]
         for core in self._cores:
             self.pivots += core.pivots
 
@@ -107,7 +105,7 @@ class Elimination:
     def _eliminate_sparse(self, entries: list[dict[int, Scalar]]) -> list[_Pivot]:
         rows, steps = set(range(self.n)), list[_Pivot]()
         block_of_row, block_of_column = dict[int, int](), dict[int, int]()
-        for k, (block_rows, block_columns) in enumerate(_blocks(entries, range(self.n), range(self.n))):
+        for k, (block_rows, block_columns) in enumerate(_blocks(entries, range(self.n))):
             block_of_row |= dict.fromkeys(block_rows, k)
             block_of_column |= dict.fromkeys(block_columns, k)
         columns: dict[int, set[int]] = {j: set() for j in range(self.n)}
@@ -236,9 +234,7 @@ class _Core:
             x[j] = value
 
 
-def _blocks(
-    entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]
-) -> list[tuple[list[int], list[int]]]:
+def _blocks(entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int]) -> list[tuple[list[int], list[int]]]:
     """Rows and columns of the blocks, in an order in which each needs only those before it."""
     # by hand: scipy.sparse.csgraph would do, but takes longer to import than all else here together
     row_of = _matched({i: list(entries[i]) for i in rows})

@@ -55,7 +55,7 @@ def onward(route: Route, lane: Array, times: Array) -> Route:
     return Route(route.model, Path(route.path.motions, times, route.path.design), arrived(route.model, lane), since)
 
 
-def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | None = None) -> Bridge | None:
+def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | None) -> Bridge | None:
     """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not known well enough.
 
     Args:

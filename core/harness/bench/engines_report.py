@@ -93,7 +93,7 @@ def _needed(found: Bench, case: str, mode: str) -> Section:
         rows.append((engine, here[0].loop, *(_time_needed(each) for each in here)))
     notes = ("µs a sample of the fastest effort whose largest position error is not above, all samples reached, and that effort.",)
     headings = ("engine", "loop", *(f"{required:g} m" for required in REQUIRED))
-    said = _faster(found, mine) if mode == "projection" else []
+    said = _faster(mine) if mode == "projection" else []
     return Section(f"{case}, {mode}: time at a required error", said, notes, headings, 2, rows)
 
 
@@ -101,7 +101,7 @@ def _time_needed(each: Needed) -> str:
     return "none" if each.us_per_sample is None else f"{number(each.us_per_sample)} · {each.setting}"
 
 
-def _faster(found: Bench, mine: Sequence[Needed]) -> list[str]:
+def _faster(mine: Sequence[Needed]) -> list[str]:
     """The native engine against the fastest other at each error."""
     said: list[str] = []
     for required in REQUIRED:

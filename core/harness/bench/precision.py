@@ -11,7 +11,7 @@ import msgspec
 
 from ...trajectory import Trajectory
 from ..case import Case, Truth
-from ..engine import Engine, Floor
+from ..engine import Engine, Measurable
 from ..proving import prove_case
 from ..record import Outcome, Record
 from ..references import series
@@ -120,8 +120,7 @@ def with_truth(case: Case, tol: float) -> Case:
 
 def efforts_of(engine: Engine) -> Mapping[str, Engine]:
     """The engine at all its efforts; one that has none to choose is taken as it comes."""
-    efforts: Callable[[], Mapping[str, Engine]] = getattr(engine, "efforts", lambda: {"as it comes": engine})
-    return efforts()
+    return engine.efforts() if isinstance(engine, Measurable) else {"as it comes": engine}
 
 
 def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[Contestant]:
@@ -204,8 +203,9 @@ def floors(case: Case, engines: Iterable[Engine]) -> list[FloorOf]:
     """The floors of those engines that have one on the case."""
     found: list[FloorOf] = []
     for engine in engines:
-        measure: Callable[[Case], Floor | None] = getattr(engine, "floor", lambda case: None)  # pyright: ignore
-        if engine.version() is None or engine.unsupported(case) or (floor := measure(case)) is None:
+        if not isinstance(engine, Measurable) or engine.version() is None or engine.unsupported(case):
+            continue
+        if (floor := engine.floor(case)) is None:
             continue
         found.append(
             FloorOf(
