@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kincheck.core.analysis.following import weights_of_groups, weights_of_samples
+from kincheck.core.analysis.interpolation import weights_of_groups, weights_of_samples
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import ACCEPT, EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, Request
 from kincheck.core.analysis.sweep import sweep

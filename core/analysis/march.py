@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..program import MARGIN, Side
 from ..trajectory import Array
+from .acceptance import why_refused
 from .model import Model
-from .refusal import why_refused
 from .request import FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, TIME, accept_by
 from .route import AS_THEY_ARE, Route
 

@@ -16,7 +16,7 @@ from ..primitives.base import Drive
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
 from ..program.llvm.compiler import available
 from ..trajectory import Array
-from . import following
+from . import acceptance, prediction
 from .bound import Bound
 from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
 from .structure.components import Section
@@ -119,13 +119,13 @@ class Model:
             self.programs,
             self.slots,
             after=("outputs",),
-            alone=following.ALONE,
-            joined=() if self.request.state else following.JOINED,
+            alone=acceptance.ALONE,
+            joined=() if self.request.state else acceptance.JOINED,
             onward=(self._tangent,),
-            sampled=[*self.sampled, *self.vectors.get(following.WEIGHT, ())],
+            sampled=[*self.sampled, *self.vectors.get(prediction.WEIGHT, ())],
             behind=tracing.behind,
-            remembered=[slot for name in self.state for slot in self.vectors[name]] if following.PAST in self.vectors else (),
-            past=self.vectors.get(following.PAST, (0,))[0],
+            remembered=[slot for name in self.state for slot in self.vectors[name]] if prediction.PAST in self.vectors else (),
+            past=self.vectors.get(prediction.PAST, (0,))[0],
             carried=tracing.carried,
             continued=tracing.continued,
             kept=[*kept, *(self.slots[name] for name in self._tests)],

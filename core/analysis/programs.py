@@ -6,8 +6,8 @@
                                                     converged pose, solved for nu and gamma
     tangent   state, drives' rates               -> v, a         where a march begins, if not all of it is put out
 
-Those that follow a motion are in `following`. Each is traced for what is asked: no acceleration, no gamma; no velocity, no
-factorisation after the last iteration.
+Those that follow a motion are in `prediction` and `acceptance`. Each is traced for what is asked: no acceleration, no gamma; no
+velocity, no factorisation after the last iteration.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from ..motions import Path
 from ..program import Side
 from ..trajectory import Array
 from .bound import Bound
-from .following import weights_of_groups, weights_of_samples
+from .interpolation import weights_of_groups, weights_of_samples
 from .model import RECENT, Model, recent_model
 from .request import Request
 from .tracing import ours

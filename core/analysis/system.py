@@ -15,12 +15,10 @@ from ..algebra import Scalar
 from ..primitives.base import Motion
 from ..program import NumpyExecutor, Plan, program
 from ..trajectory import Array
+from .equations.formulation import EULER_PARAMETERS
 from .model import Model
 from .programs import Tracer
 from .request import FROM, RATE, RATE_T, TIME
-
-EULER = 4
-"""Numbers of a vector of a state that is Euler parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +139,7 @@ class System:
             x, y = (each[first : first + len(slots)] for each in (a, b))
             first += len(slots)
             same = float(np.abs(x - y).max())
-            found = max(found, min(same, float(np.abs(x + y).max())) if len(slots) == EULER else same)
+            found = max(found, min(same, float(np.abs(x + y).max())) if len(slots) == EULER_PARAMETERS else same)
         return found
 
     def motions(self, state: Array, rate: Array) -> Mapping[str, Motion]:

@@ -17,7 +17,7 @@ from ..mechanism import Mechanism
 from ..program import ITERATIONS, NODES, Program, groups_behind
 from ..program.llvm import compiler
 from ..program.shelf import kept
-from . import following
+from . import acceptance, prediction
 from .equations.constraints import Frames
 from .request import Request
 from .structure.components import Section
@@ -91,20 +91,20 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None, lane
     from .programs import Tracer  # with all that tracing takes: who finds it done does without
 
     tracer = Tracer(mechanism, request, section)
-    programs = [tracer.newton(), following.predict(tracer)]
+    programs = [tracer.newton(), prediction.predict(tracer)]
     if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
         programs.append(tracer.tangent())
     if not request.state:
-        programs.append(following.extrapolate(tracer, lanes))
+        programs.append(prediction.extrapolate(tracer, lanes))
     programs.append(tracer.outputs())
-    programs += following.tests(tracer, neighbours=False)
+    programs += acceptance.tests(tracer, neighbours=False)
     if not request.state:  # parts of a mechanism are attempted lane by lane
-        programs += following.tests(tracer, neighbours=True)
+        programs += acceptance.tests(tracer, neighbours=True)
     if request.varied:
         programs.append(tracer.prepared.program())
         if not request.state:
-            programs.append(following.extend(tracer))
-    carried, continued = following.carried(tracer), following.continued(tracer)
+            programs.append(prediction.extend(tracer))
+    carried, continued = prediction.carried(tracer), prediction.continued(tracer)
     tracer.layout.scalar(ITERATIONS)
     return Tracing(
         programs,

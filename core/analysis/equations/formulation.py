@@ -16,6 +16,9 @@ from ...primitives.base import Motion, Pose
 State: TypeAlias = Mapping[str, Sequence[Scalar]]
 """Named vectors that fix the configuration (for Cartesian coordinates: displacement and Euler parameters of every body)."""
 
+EULER_PARAMETERS = 4
+"""Numbers of a vector of a state that is Euler parameters."""
+
 Rows: TypeAlias = list[dict[int, Scalar]]
 """A matrix by rows; each row maps a column to its entry, literal zeros left out."""
 

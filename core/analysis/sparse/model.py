@@ -23,8 +23,8 @@ from ...motions import Path
 from ...trajectory import Array
 from ..continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
 from ..equations.constraints import constraints, measured
-from ..following import ABOUT
 from ..model import CLOSED, MAX_ITERATIONS, given_by
+from ..prediction import ABOUT
 from ..request import CONSISTENT
 from ..structure.driven import locked_drivers
 from ..structure.factors import Factors, Indices, SingularError

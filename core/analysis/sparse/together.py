@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...trajectory import Array
 from ..continuity import EPSILON, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
+from ..interpolation import lagrange
 from ..request import CONSISTENT
 from ..structure.factors import PIVOT_THRESHOLD
 from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
@@ -107,9 +108,9 @@ class Together:
         """By the polynomial through the samples before, or by a Taylor step and what the last such step lacked."""
         here = before[-1]
         if len(before) == REMEMBERED:
-            known, others = np.array([each.time for each in before]), ~np.eye(REMEMBERED, dtype=bool)
-            parts = [(times[:, None] - known[other]) / (t - known[other]) for t, other in zip(known, others, strict=True)]
-            state = np.column_stack([each.state for each in before]) @ np.prod(parts, axis=2)
+            known = np.array([each.time for each in before])
+            weights = lagrange(times, np.repeat(known[:, None], len(times), axis=1))
+            state = np.column_stack([each.state for each in before]) @ weights
         else:
             h, last = times - here.time, here.time - here.earlier
             state = self._taylor(here.state[:, None], here.rates[:, None], here.accelerations[:, None], h)

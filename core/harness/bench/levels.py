@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...analysis import following
+from ...analysis import acceptance
 from ...analysis.march import marcher
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
@@ -84,7 +84,7 @@ LEVELS: Mapping[str, Level] = {
 """What is timed as a whole call, by what is asked."""
 
 
-SAMPLES, MOTIONS = ("extrapolate", *following.JOINED), ("extend", *following.ALONE)
+SAMPLES, MOTIONS = ("extrapolate", *acceptance.JOINED), ("extend", *acceptance.ALONE)
 """Names of the programs that predict and test lanes, by what lanes are."""
 
 

@@ -1,53 +1,36 @@
-"""Programs that follow a motion: what lanes are predicted from, how, and which of them are accepted (see `programs`).
+"""Programs that predict lanes from those before them on a motion, and what is carried for that (see `programs`).
 
 predict   from state, v, a and time; time    -> state        Taylor step of second order
 extrapolate   states of the groups of lanes before, weights   -> state       through `NODES` of them, without v and a; and what is
                                                                 carried of the last of them
 extend    states of the samples before, weights   -> state        likewise, for lanes that are motions of their own
-gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
-alone, joined   all that is tested, and the tolerance   -> margin    positive where a lane may be accepted
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import reduce
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ..algebra import Scalar
 from ..program import (
-    DONE,
-    MARGIN,
     NODES,
     Program,
-    absolute,
-    before,
     groups_behind,
-    maximum,
-    minimum,
     place_of,
     program,
     where_larger,
 )
 from ..program.executor import shifted
-from ..trajectory import Array
-from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
-from .request import ACCEPT, BLOCKS, EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME
+from .equations.formulation import EULER_PARAMETERS
+from .request import ACCEPT, EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME
 
 if TYPE_CHECKING:
     from .programs import Tracer
 
 WEIGHT, PAST = "weight", "past"
 """The vectors of the samples that a state is continued through: their weights, and where they are remembered their states."""
-EULER_PARAMETERS = 4
 ABOUT = 1.5
 """A step may be this much longer than the one it learns from."""
-ALONE, JOINED = ("alone_gaps", "alone"), ("joined_gaps", "joined")
-"""The programs of the two tests: of lanes that know nothing of each other, and of neighbours on one way."""
-GAPS = GAP, MOVED, REACH = "gap", "moved", "reach"
-"""Slots of the largest change of a correction, of a component of the state, and of its distance from the start."""
 
 
 def carried(tracer: Tracer) -> list[tuple[int, int]]:
@@ -145,96 +128,6 @@ def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], furt
         found = [sum((w * at(k, slot) for k, w in enumerate(weights)), 0.0) for slot in slots]
         for label in (part, PREDICTED + part):
             tracer.store(out, label, _of_length_one(found))
-    return program(name, tracer.tape, out, tracer.prepared)
-
-
-def weights_of_groups(times: Array, lanes: int) -> Array:
-    """Weights of `NODES` lanes of the group before, or several, for samples in groups of so many lanes.
-
-    Args:
-        times: of samples in the order in which they are gone through, shape (n,).
-
-    Returns:
-        Shape (NODES, n): zero for the first groups, not finite where two nodes share a time.
-    """
-    behind = groups_behind(lanes) * lanes
-    found, wanted = np.zeros((NODES, len(times))), np.arange(behind, len(times))
-    nodes = [[group * lanes + lane] for group, lane in (place_of(k, lanes) for k in range(NODES))]
-    found[:, wanted] = _lagrange(times[wanted], times[wanted // lanes * lanes - behind + nodes])
-    return found
-
-
-def weights_of_samples(times: Array) -> Array:
-    """Weights of the `NODES` samples before each, by the places at which they are kept (`Plan.past`); otherwise as above."""
-    found, wanted = np.zeros((NODES, len(times))), np.arange(NODES, len(times))
-    nodes = wanted - 1 - (wanted - 1 - np.arange(NODES)[:, None]) % NODES  # the last sample that was kept at each place
-    found[:, wanted] = _lagrange(times[wanted], times[nodes])
-    return found
-
-
-def _lagrange(times: Array, nodes: Array) -> Array:
-    """Lagrange's weights of nodes for the times, shape (n,), of both shape (NODES, n)."""
-    found, ahead = np.empty_like(nodes), times - nodes
-    with np.errstate(all="ignore"):
-        for k, node in enumerate(nodes):  # one after the other: there may be millions of samples
-            factors = ahead / (node - nodes)
-            factors[k] = 1.0
-            found[k] = factors.prod(axis=0)
-    return found
-
-
-def tests(tracer: Tracer, *, neighbours: bool) -> list[Program]:
-    """The programs of a test."""
-    gaps, margin = JOINED if neighbours else ALONE
-    return [_gaps(tracer, gaps, neighbours=neighbours), _margin(tracer, margin, neighbours=neighbours)]
-
-
-def _gaps(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
-    """How far a lane is from where it should be by the lane before it, or where lanes are no neighbours by the start: the largest
-    of all components of the state.
-
-    The correction that Newton made of the prediction changes from the lane before, or from nothing at the start, by much less
-    than the pose does, where it is the same motion.
-    """
-    design = tracer.formulation.design
-    blocks = [[slot for each in design for slot in tracer.layout.vectors[label + each]] for label in BLOCKS]
-    times = len(blocks[0])
-    assert all(block == list(range(block[0], block[0] + times)) for block in blocks)
-    x, predicted, start = (tracer.tape.input(block[0]) for block in blocks)
-    x_before, predicted_before = (before(x, start), before(predicted, start)) if neighbours else (start, start)
-    sizes = (x - predicted) - (x_before - predicted_before), x - x_before, x - start
-    out = {tracer.layout.scalar(label): absolute(size) for label, size in zip(GAPS, sizes, strict=True)}
-    return program(name, tracer.tape, out, times=times)
-
-
-def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
-    """By how much a lane passes all tests of a solution: it has converged, closes, is on its branch, agrees with the
-    redundant rows, and continues the motion it is predicted from.
-
-    The last is seen from its gaps, and from sigma. No lane is taken that is far from there, nor one beyond a singular pose: whether
-    the motion passes it, or turns round a corner before it, is not seen from afar.
-    """
-    read = tracer.read
-    tol, consistent, crossing = (read(label) for label in ACCEPT)
-    closure, sigma, turned = (read(name) for name in ("closure", SIGMA, ORIENTATION))
-    sigma_before, turned_before, largest = (read(FROM + name) for name in (SIGMA, ORIENTATION, LARGEST_SIGMA))
-    largest = maximum(sigma, largest)
-    if neighbours:
-        sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
-    uncertain = (WORSE * largest) * maximum(closure, EPSILON)
-    margins = (
-        read(DONE) - 0.5,
-        tol - closure,
-        consistent - read("leftover"),
-        read("branch"),
-        LARGEST_CORRECTION * read(MOVED) + NEGLIGIBLE - read(GAP),
-        LONGEST_STEP - read(REACH),
-        (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
-        0.5 - absolute(turned - turned_before) + crossing,
-        FOLLOWED * sigma * sigma - uncertain,
-        maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
-    )
-    out = {tracer.layout.scalar(MARGIN): reduce(minimum, margins), tracer.layout.scalar(LARGEST_SIGMA): largest}
     return program(name, tracer.tape, out, tracer.prepared)
 
 
