@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.analysis.continuity import continuous
 from ..core.drivers import Driver
@@ -115,6 +114,9 @@ def solve_by_projection(
         corrections: exactly so many Newton steps after the predictor, whatever residual they leave; None: until it meets tol.
     """
     return Walk(model, case, tol, corrections).trajectory(details or {})
+
+
+LOST = "Newton does not converge or jumps to another assembly"
 
 
 class Walk:
@@ -245,11 +247,13 @@ class Walk:
             step = float(np.abs(np.diff(times)).max()) if n > 1 else abs(float(times[0])) or 1.0
             for side in outwards(times, origin.t):
                 at = origin
+                last: float | None = None
                 for k in side:
                     at, reached = self.advance(path, at, float(times[k]), step)
                     if not reached:
-                        messages.append(_stopped(path, side[solved[side]], at.t, int(k)))
+                        messages.append(path.ended(at.t, float(times[k]), last, LOST))
                         break
+                    last = float(times[k])
                     motion[:, k] = at.rows
                     iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
         moves = {name: PointMotion(motion[0, :, k], motion[1, :, k], motion[2, :, k]) for k, name in enumerate(points)}
@@ -260,15 +264,3 @@ class Walk:
 def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
     # a millionth: far above round-off, far below a row that is not met
     return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))
-
-
-def _stopped(path: Path, reached: NDArray[np.intp], t: float, wanted: int) -> str:
-    last = (
-        f"last reachable sample at {path.where(float(path.times[reached[-1]]))}"
-        if len(reached)
-        else "no sample reached on this side"
-    )
-    return (
-        f"cannot be followed beyond {path.where(t)} (wanted {path.where(path.times[wanted])}): Newton does not converge or jumps "
-        f"to another assembly; {last}; shorten the sweep or drive another coordinate"
-    )

@@ -191,6 +191,14 @@ class Path:
         named = zip(self.motions, values, strict=True)
         return ", ".join(f"{name} = {self.design.get(name, 0.0) + value:.9g}" for name, value in named)
 
+    def ended(self, here: float, wanted: float, last: float | None, reason: str) -> str:
+        """Says that the motion cannot be followed to a wanted time, how far it can, and the last sample reached if there is one."""
+        reached = "no sample reached on this side" if last is None else f"last reachable sample at {self.where(last)}"
+        return (
+            f"cannot be followed beyond {self.where(here)} (wanted {self.where(wanted)}): {reason}; {reached}; "
+            "shorten the sweep or drive another coordinate"
+        )
+
     @property
     def from_design(self) -> bool:
         """Whether the mechanism is at its design position at time zero, and so can be followed from there both ways."""

@@ -127,6 +127,7 @@ def test_an_end_of_the_travel_is_told_with_the_component():
     assert np.isnan(found.points["wheel"].position[~found.solved]).all()
     assert "cannot be followed beyond stroke = 0.293" in found.message
     assert "knuckle" in found.message
+    assert "; last reachable sample at stroke = 0.29; shorten the sweep" in found.message
     assert np.array_equal(sweep.solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True)
 
 

@@ -241,11 +241,6 @@ class Marcher:
         return self.model.moving(lanes[:, part], lanes[self.model.sampled, part]), reason
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
-        where = self.route.path.where
-        here, wanted = self._stands(anchor), float(side.samples[0, at])
-        last = f"last reachable sample at {where(float(side.samples[0, at - 1]))}" if at else "no sample reached on this side"
-        return (
-            f"cannot be followed beyond {where(here)} (wanted {where(wanted)}): {reason}; smallest singular value there about "
-            f"{anchor[self.slots[FROM + SIGMA]]:.3g} (zero at a lock-up or dead centre); {last}; shorten the sweep or drive "
-            "another coordinate"
-        )
+        sigma, last = float(anchor[self.slots[FROM + SIGMA]]), float(side.samples[0, at - 1]) if at else None
+        reason += f"; smallest singular value there about {sigma:.3g} (zero at a lock-up or dead centre)"
+        return self.route.path.ended(self._stands(anchor), float(side.samples[0, at]), last, reason)

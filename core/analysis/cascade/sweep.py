@@ -130,14 +130,15 @@ class CascadeSweep:
                 continue
             if lanes.sound:
                 sound, start = lanes.anchor, here
+            last = float(times[at - 1]) if at else None
             if stopped := headway.stopped(here, float(times[at])):
-                return f"cannot be followed beyond {path.where(here)} (wanted {path.where(float(times[at]))}): {stopped}"
+                return path.ended(here, float(times[at]), last, stopped)
             reached = self._divide(here, float(times[at]), path)
             if reached is not None:
                 lane, here = reached
                 lanes.carry(lane)
                 continue
-            message = self._end(here, float(times[at]), path)
+            message = path.ended(here, float(times[at]), last, self._why_ended())
             beyond = cross(lanes, path, sound, start, here, float(times[at]), tol)
             if beyond is None:
                 return message
@@ -163,17 +164,15 @@ class CascadeSweep:
                 return part, float(parts[part])
         return None
 
-    def _end(self, here: float, wanted: float, path: Path) -> str:
-        lane = self._lanes.last  # the shortest part of the step
+    def _why_ended(self) -> str:
+        """Which component could not be solved at the shortest part of a step, and how singular it is."""
+        lane = self._lanes.last
         closure, sigma = (self._lanes.each(name)[:, lane] for name in ("closure", SIGMA))
         worst = int(np.nan_to_num(closure, nan=np.inf).argmax())
         order = [part for kind in self.cascade.kinds for part in kind.members]
         bodies = ", ".join(self.cascade.parts[order[worst]].bodies)
-        return (
-            f"cannot be followed beyond {path.where(here)} (wanted {path.where(wanted)}): the component of {bodies} is left with "
-            f"residual {closure[worst]:.3g} of its size, smallest singular value about {np.nanmin(sigma):.3g} (zero at a lock-up "
-            "or dead centre); shorten the sweep or drive another coordinate"
-        )
+        left = f"the component of {bodies} is left with residual {closure[worst]:.3g} of its size"
+        return f"{left}; smallest singular value there about {np.nanmin(sigma):.3g} (zero at a lock-up or dead centre)"
 
     def _trajectory(self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]) -> Trajectory:
         request, solved = self.cascade.request, ~np.isnan(tests["closure"])

@@ -210,14 +210,9 @@ class _Sweep:
         raise last
 
     def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
-        where = path.where
         self.smallest_pivot = min(self.smallest_pivot, here.pivot)
-        last = f"last reachable sample at {where(float(times[k - 1]))}" if k else "no sample reached on this side"
-        self.messages.append(
-            f"cannot be followed beyond {where(here.time)} (wanted {where(float(times[k]))}): {reason}; smallest pivot there "
-            f"{here.pivot:.3g} (zero at a lock-up or dead centre); {last}; "
-            "shorten the sweep or drive another coordinate"
-        )
+        reason += f"; smallest pivot there {here.pivot:.3g} (zero at a lock-up or dead centre)"
+        self.messages.append(path.ended(here.time, float(times[k]), float(times[k - 1]) if k else None, reason))
 
     def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array], order: int) -> Trajectory:
         (points, bodies), unit = found, self.model.frame.unit
