@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kincheck.core import Revolute, solve, solve_designs
+from kincheck.core.algebra import root
 from kincheck.core.analysis import tracing
 from kincheck.core.analysis.equations.constraints import Style
 from kincheck.core.analysis.model import compile_model
@@ -30,7 +31,6 @@ from kincheck.core.program import (
     place_of,
     program,
     sin,
-    sqrt,
     where_larger,
 )
 from kincheck.core.program.llvm import compiler, machine_code
@@ -56,7 +56,7 @@ OPERATIONS = {
     "times": lambda a, b: a * b,
     "over": lambda a, b: a / b,
     "negative": lambda a, b: -a,
-    "root": lambda a, b: sqrt(a * a),
+    "root": lambda a, b: root(a * a),
     "size": lambda a, b: absolute(a),
     "smaller": minimum,
     "larger": maximum,
