@@ -8,7 +8,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 import numpy as np
 from kincheck.core import primitives as p
 from kincheck.core.algebra import IDENTITY, ZERO, Quat, Vec3, cross
-from kincheck.core.primitives.base import Drive, Motion, Pose, Primitive
+from kincheck.core.primitives.base import Drive, Pose, Primitive, Twist
 
 from .jet import Jet, cos_sin
 
@@ -89,7 +89,7 @@ class Body:
 
     @property
     def motion(self):
-        return Motion(self.v, self.w)
+        return Twist(self.v, self.w)
 
     @property
     def jets(self):

@@ -14,7 +14,7 @@ from kincheck.core import Cylindrical, Distance, Revolute, RevoluteSpherical, Sp
 from kincheck.core.algebra import ZERO, Quat, Vec3
 from kincheck.core.joints import Attachment
 from kincheck.core.primitives import conventional, paper
-from kincheck.core.primitives.base import GROUND_MOTION, GROUND_POSE, Motion, Pose
+from kincheck.core.primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
 
 from . import naive
 
@@ -81,9 +81,9 @@ class Replay:
         for primitive in self.primitives(joint):
             here = pose.A.T if primitive.body_axes else None
             turning, rising = (w, w_t) if here is None else (here @ w, here @ w_t)
-            moving = Motion(v, turning)
+            moving = Twist(v, turning)
             rows = [(row.ri, row.pi) if first else (row.rj, row.pj) for row in primitive.rows(*poses)]
-            gamma = primitive.gamma(*poses, *((moving, GROUND_MOTION) if first else (GROUND_MOTION, moving)))
+            gamma = primitive.gamma(*poses, *((moving, GROUND_TWIST) if first else (GROUND_TWIST, moving)))
             phi += primitive.phi(*poses)
             phi_t += [r @ v + pi @ turning - nu for (r, pi), nu in zip(rows, primitive.nu(*poses), strict=True)]
             phi_tt += [r @ v_t + pi @ rising - each for (r, pi), each in zip(rows, gamma, strict=True)]

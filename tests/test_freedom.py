@@ -24,7 +24,7 @@ from kincheck.core.analysis.equations.constraints import constraints, frames
 from kincheck.core.analysis.solve import solve
 from kincheck.core.analysis.structure.freedom import account
 from kincheck.core.analysis.structure.redundancy import independent_rows
-from kincheck.core.primitives import Drive, Motion
+from kincheck.core.primitives import Drive, Twist
 
 from .mechanisms import CRANK, D0, ROD, four_bar, mcpherson, placed, slider_crank
 
@@ -244,13 +244,13 @@ def test_ground_rows_leave_the_solution():
     v = np.linalg.solve(jacobian(formulation, at), formulation.nu(at))
     a = np.linalg.solve(jacobian(formulation, at), formulation.gamma(at, list(v)))
     arm = frames(mechanism).arm("knuckle", mechanism.point("wheel").position)
-    pose, motion = at.poses["knuckle"], formulation.motions(at, list(v))["knuckle"]
+    pose, motion = at.poses["knuckle"], formulation.twists(at, list(v))["knuckle"]
     rest = formulation.accelerations(at, list(v), list(a))["knuckle"]
     S = pose.turn(arm)
     expected = (
         np.add([*(unit * (pose.u + pose.swing(arm)))], mechanism.point("wheel").position),
         [*(unit * motion.of(S))],
-        [*(unit * (Motion(rest.v_t, rest.w_t).of(S) + motion.centripetal(S)))],
+        [*(unit * (Twist(rest.v_t, rest.w_t).of(S) + motion.centripetal(S)))],
     )
     wheel = solve(mechanism, "stroke", [stroke]).points["wheel"]
     for found, wanted in zip((wheel.position[0], wheel.velocity[0], wheel.acceleration[0]), expected, strict=True):

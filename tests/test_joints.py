@@ -9,7 +9,7 @@ import pytest
 from kincheck.core import joints as library
 from kincheck.core.algebra import Quat, Vec3
 from kincheck.core.joints import Attachment, Joint
-from kincheck.core.primitives.base import Motion, Pose
+from kincheck.core.primitives.base import Pose, Twist
 
 from . import naive
 
@@ -106,7 +106,7 @@ class Example:
 
     def gamma(self, v):
         """Native right-hand sides at the paper's velocities."""
-        motions = [Motion(Vec3(*v[k : k + 3]), Vec3(*(b.A @ v[k + 3 : k + 6]))) for k, b in ((0, self.i), (6, self.j))]
+        motions = [Twist(Vec3(*v[k : k + 3]), Vec3(*(b.A @ v[k + 3 : k + 6]))) for k, b in ((0, self.i), (6, self.j))]
         return np.array(self.each("gamma", *motions))
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from ..algebra import Scalar, Vec3, quat, vec
 from ..mechanism import Mechanism, Vector
-from ..primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose
+from ..primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
 from ..program import (
     Elimination,
     Prepared,
@@ -82,7 +82,7 @@ class Tracer:
     def _moved(self, name: str) -> Given:
         """A given body, its motion read from slots."""
         u, q, v, w, v_t, w_t = (self.vector(f"given {label} {name}", count) for label, count in GIVEN.items())
-        return Given(Pose.of(vec(u), quat(q)), Motion(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t)))
+        return Given(Pose.of(vec(u), quat(q)), Twist(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t)))
 
     def read(self, name: str) -> Scalar:
         """A scalar of the lanes."""
@@ -164,12 +164,12 @@ class Tracer:
             self.layout.scalar("leftover"): largest([phi[k] for k in self.selection.dropped]),
             self.layout.scalar("branch"): reduce(minimum, self.formulation.branch(self.at), 1.0),
         }
-        motions = self.formulation.motions(self.at, v)
+        twists = self.formulation.twists(self.at, v)
         accelerations = self.formulation.accelerations(self.at, v, a)
 
-        def moving(body: str) -> tuple[Pose, Motion, Acceleration]:
-            pose, motion = self.at.poses.get(body, GROUND_POSE), motions.get(body, GROUND_MOTION)
-            return pose, motion, accelerations.get(body, GROUND_ACCELERATION)
+        def moving(body: str) -> tuple[Pose, Twist, Acceleration]:
+            pose, twist = self.at.poses.get(body, GROUND_POSE), twists.get(body, GROUND_TWIST)
+            return pose, twist, accelerations.get(body, GROUND_ACCELERATION)
 
         def of_point(body: str, position: Vector) -> tuple[Vec3, Vec3, Vec3]:
             return motion_of_point(position, self.frame.arm(body, position), self.frame.unit, *moving(body))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import Scalar
-from ..primitives.base import Motion
+from ..primitives.base import Twist
 from ..program import NumpyExecutor, Plan, program
 from ..trajectory import Array
 from .equations.formulation import EULER_PARAMETERS
@@ -142,12 +142,12 @@ class System:
             found = max(found, min(same, float(np.abs(x + y).max())) if len(slots) == EULER_PARAMETERS else same)
         return found
 
-    def motions(self, state: Array, rate: Array) -> Mapping[str, Motion]:
+    def twists(self, state: Array, rate: Array) -> Mapping[str, Twist]:
         """How the bodies move in one state, shape (numbers,), at rates of the unknowns, shape (n,)."""
         formulation = self._tracer.formulation
         numbers = iter(state.tolist())
         named = {name: [next(numbers) for _ in slots] for name, slots in self._names.items()}
-        return formulation.motions(formulation.configuration(named), rate.tolist())
+        return formulation.twists(formulation.configuration(named), rate.tolist())
 
     def _executor(self, lanes: int) -> NumpyExecutor:
         if lanes not in self._executors:  # kept: binding costs more than running

@@ -1,6 +1,6 @@
 """Primitive constraints: one geometric condition a file, its derivation on top."""
 
-from .base import Drive, Motion, Pose, Primitive, Row
+from .base import Drive, Pose, Primitive, Row, Twist
 from .constant_velocity import ConstantVelocity
 from .distance import Distance
 from .dot10 import Dot10
@@ -26,11 +26,11 @@ __all__ = [
     "DrivenCoordinate",
     "Ground",
     "LockedDisplacement",
-    "Motion",
     "NamedSlide",
     "NamedTurn",
     "Pose",
     "Primitive",
     "Row",
     "Spherical",
+    "Twist",
 ]

@@ -47,7 +47,7 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class Twist:
     """How a body moves: velocity v of its origin and angular velocity w, global axes."""
 
     v: Vec3
@@ -63,7 +63,7 @@ class Motion:
 
 
 GROUND_POSE = Pose.of(ZERO, IDENTITY)
-GROUND_MOTION = Motion(ZERO, ZERO)
+GROUND_TWIST = Twist(ZERO, ZERO)
 
 
 class Row(NamedTuple):
@@ -74,9 +74,9 @@ class Row(NamedTuple):
     rj: Vec3
     pj: Vec3
 
-    def along(self, body: str, motion: Motion) -> Scalar:
+    def along(self, body: str, twist: Twist) -> Scalar:
         """The part of row . velocity that belongs to one body, "i" or "j"."""
-        return self.ri @ motion.v + self.pi @ motion.w if body == "i" else self.rj @ motion.v + self.pj @ motion.w
+        return self.ri @ twist.v + self.pi @ twist.w if body == "i" else self.rj @ twist.v + self.pj @ twist.w
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Primitive(ABC):
     steady: ClassVar[bool] = False
     """Whether the rows keep their directions as body i turns."""
     body_axes: ClassVar[bool] = False
-    """Whether dpi, w and wdot of rows, gamma and motions are in body axes (the paper's) rather than global ones."""
+    """Whether dpi, w and wdot of rows, gamma and twists are in body axes (the paper's) rather than global ones."""
 
     @abstractmethod
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
@@ -113,7 +113,7 @@ class Primitive(ABC):
         """Rows of the Jacobian."""
 
     @abstractmethod
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Right-hand sides of the acceleration equations: what rows . acceleration must be."""
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

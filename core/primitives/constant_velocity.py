@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 from .dot10 import Dot10
 
 
@@ -42,7 +42,7 @@ class ConstantVelocity(Primitive):
         (plus,), (minus,) = (dot.rows(i, j) for dot in self.pair)
         return (Row(ZERO, plus.pi - minus.pi, ZERO, plus.pj - minus.pj),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         (plus,), (minus,) = (dot.gamma(i, j, vi, vj) for dot in self.pair)
         return (plus - minus,)
 

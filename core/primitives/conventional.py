@@ -20,7 +20,7 @@ from typing import Any
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross
 from . import paper
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 from .constant_velocity import ConstantVelocity
 from .dot10 import Dot10
 from .dot11 import Dot11
@@ -44,7 +44,7 @@ class ConventionalDot10(Dot10):
         # x^T skew(y) = x x y
         return (Row(ZERO, -cross(A_ij @ self.b, self.a), ZERO, -cross(A_ij.T @ self.a, self.b)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         A_ji = relative(i, j).T
         a, b = self.a, self.b
         turning = A_ji @ vi.centripetal(a) + vj.centripetal(A_ji @ a)
@@ -88,7 +88,7 @@ class ConventionalDot20(Dot20):
         p_i = cross(self.a, self.s_i) - cross(i.A.T @ self._d(i, j), self.a)
         return (Row(-a_G, p_i, a_G, -cross(relative(i, j).T @ self.a, self.s_j)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         a, A_ji = self.a, relative(i, j).T
         bent = vi.centripetal(a)
         # s^T W = -(w x s)

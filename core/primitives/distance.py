@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import Scalar, Vec3, cross
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Distance(Primitive):
         u = (1.0 / self.length) * (self.d0 + self.change(i, j))
         return (Row(-u, cross(u, i.turn(self.s_i)), u, cross(j.turn(self.s_j), u)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         d, S_i, S_j = self.d0 + self.change(i, j), i.turn(self.s_i), j.turn(self.s_j)
         d_dot = vj.of(S_j) - vi.of(S_i)
         return (-((d_dot @ d_dot + d @ (vj.centripetal(S_j) - vi.centripetal(S_i))) * (1.0 / self.length)),)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3, cross
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Dot10(Primitive):
         n = cross(i.turn(self.a), j.turn(self.b))
         return (Row(ZERO, n, ZERO, -n),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         a, b = i.turn(self.a), j.turn(self.b)
         n_dot = cross(cross(vi.w, a), b) + cross(a, cross(vj.w, b))
         return (n_dot @ (vj.w - vi.w),)

@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Dot11(Primitive):
         f, g = i.turn(self.f), i.turn(self.g)
         return Row(ZERO, f, ZERO, -f), Row(ZERO, -g, ZERO, g)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         s = j.turn(self.h) @ (vj.w - vi.w)
         return -(s * (i.turn(self.g) @ vi.w)), -(s * (i.turn(self.f) @ vi.w))
 

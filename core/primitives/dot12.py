@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, X, Y, Z
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -34,5 +34,5 @@ class Dot12(Primitive):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return tuple(Row(ZERO, e, ZERO, -e) for e in (X, Y, Z))
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return 0.0, 0.0, 0.0

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..algebra import Scalar, Vec3, cross
-from .base import Drive, Motion, Pose, Primitive, Row
+from .base import Drive, Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Dot20(Primitive):
         a, d = i.turn(self.a), self.d0 + self.change(i, j)
         return (Row(-a, cross(a, d + i.turn(self.s_i)), a, cross(j.turn(self.s_j), a)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         a, d, S_i, S_j = i.turn(self.a), self.d0 + self.change(i, j), i.turn(self.s_i), j.turn(self.s_j)
         a_dot, d_dot = cross(vi.w, a), vj.of(S_j) - vi.of(S_i)
         turning = cross(vi.w, a_dot) @ d + 2.0 * (a_dot @ d_dot)

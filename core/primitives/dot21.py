@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..algebra import ZERO, Scalar, Vec3, cross
-from .base import Drive, Motion, Pose, Primitive, Row
+from .base import Drive, Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Dot21(Primitive):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return tuple(along_row(a, self.e0, i, j) for a in (self.f, self.g))
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return tuple(along_gamma(a, self.e0, i, j, vi, vj) for a in (self.f, self.g))
 
 
@@ -54,7 +54,7 @@ class LockedDisplacement(Primitive):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return (along_row(self.h, self.e0, i, j),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (self.drive.c_tt + along_gamma(self.h, self.e0, i, j, vi, vj),)
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
@@ -73,7 +73,7 @@ def along_row(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Row:
     return Row(-a_now, cross(a_now, e0 + (j.u - i.u)), a_now, ZERO)
 
 
-def along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Motion, vj: Motion) -> Scalar:
+def along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> Scalar:
     """Its right-hand side in the acceleration equation."""
     a_dot = cross(vi.w, i.turn(a))
     return -(cross(vi.w, a_dot) @ (e0 + (j.u - i.u)) + 2.0 * (a_dot @ (vj.v - vi.v)))

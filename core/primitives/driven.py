@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..algebra import ZERO, Scalar, Vec3, cross
-from .base import Drive, Motion, Pose, Primitive, Row
+from .base import Drive, Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class DrivenCoordinate(Primitive):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return (Row(ZERO, ZERO, self.k, cross(j.turn(self.s), self.k)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (self.drive.c_tt - self.k @ vj.centripetal(j.turn(self.s)),)
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
@@ -60,7 +60,7 @@ class DrivenAngle(Primitive):
         h = i.turn(self.h)
         return (Row(ZERO, -h, ZERO, h),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (self.drive.c_tt,)
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, X, Y, Z
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -29,5 +29,5 @@ class Ground(Primitive):
         rotation = (Row(ZERO, ZERO, ZERO, e) for e in (X, Y, Z))
         return *translation, *rotation
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (0.0,) * 6

@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..algebra import Quat, Scalar, Vec3, X, Y, Z, cross, vec
-from .base import Drive, Motion, Pose, Row
+from .base import Drive, Pose, Row, Twist
 from .dot12 import Dot12
 from .spherical import Spherical
 
@@ -39,7 +39,7 @@ class NamedTurn(Dot12):
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return tuple(-(self.drive.c_t * i.turn(self.h)))
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         h = i.turn(self.h)
         return tuple(-(self.drive.c_t * cross(vi.w, h) + self.drive.c_tt * h))
 
@@ -61,7 +61,7 @@ class NamedSlide(Spherical):
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return tuple(self.drive.c_t * i.turn(self.h))
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         h = i.turn(self.h)
         slid = vi.centripetal(self.drive.c * h) + 2.0 * (self.drive.c_t * cross(vi.w, h)) + self.drive.c_tt * h
         return tuple(a + b for a, b in zip(super().gamma(i, j, vi, vj), slid, strict=True))

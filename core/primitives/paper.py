@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ..algebra import ZERO, Mat3, Scalar, Vec3, X, Y, Z, cross
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 from .constant_velocity import ConstantVelocity
 from .distance import Distance
 from .dot10 import Dot10
@@ -46,7 +46,7 @@ class PaperSpherical(Spherical):
         blocks = zip((X, Y, Z), arm_rows(i.A, self.s_i), arm_rows(j.A, self.s_j), strict=True)
         return tuple(Row(-e, b_i, e, -b_j) for e, b_i, b_j in blocks)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return tuple(i.A @ vi.centripetal(self.s_i) - j.A @ vj.centripetal(self.s_j))
 
 
@@ -64,7 +64,7 @@ class PaperDot10(Dot10):
         n = cross(self.a, A_ij @ self.b)
         return (Row(ZERO, n, ZERO, -(A_ij.T @ n)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         A_ij = relative(i, j)
         b, Om = A_ij @ self.b, A_ij @ vj.w - vi.w
         return (self.a @ (cross(cross(vi.w, Om), b) - cross(Om, cross(Om, b))),)
@@ -84,7 +84,7 @@ class PaperDot11(Dot11):
         A_ji = relative(i, j).T
         return Row(ZERO, self.f, ZERO, -(A_ji @ self.f)), Row(ZERO, -self.g, ZERO, A_ji @ self.g)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         s = self.h @ (relative(i, j) @ vj.w - vi.w)
         return -(s * (self.g @ vi.w)), -(s * (self.f @ vi.w))
 
@@ -127,7 +127,7 @@ class PaperDot20(Dot20):
         a_G = i.A @ self.a
         return (Row(-a_G, cross(self.a, self._y(i, j)), a_G, cross(self.s_j, relative(i, j).T @ self.a)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         A_ij, y = relative(i, j), self._y(i, j)
         y_t = i.A.T @ (vj.v - vi.v) + A_ij @ cross(vj.w, self.s_j)
         turning = 2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y)) - A_ij @ vj.centripetal(self.s_j)
@@ -146,7 +146,7 @@ class PaperDot21(Dot21):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return tuple(_along_row(a, self.e0, i, j) for a in (self.f, self.g))
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return tuple(_along_gamma(a, self.e0, i, j, vi, vj) for a in (self.f, self.g))
 
 
@@ -162,7 +162,7 @@ class PaperLockedDisplacement(LockedDisplacement):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return (_along_row(self.h, self.e0, i, j),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (self.drive.c_tt + _along_gamma(self.h, self.e0, i, j, vi, vj),)
 
 
@@ -176,7 +176,7 @@ class PaperDistance(Distance):
         u = (1.0 / self.length) * (self.d0 + self.change(i, j))
         return (Row(-u, cross(i.A.T @ u, self.s_i), u, cross(self.s_j, j.A.T @ u)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         d = self.d0 + self.change(i, j)
         d_t = (vj.v + j.A @ cross(vj.w, self.s_j)) - (vi.v + i.A @ cross(vi.w, self.s_i))
         bent = j.A @ vj.centripetal(self.s_j) - i.A @ vi.centripetal(self.s_i)
@@ -192,7 +192,7 @@ class PaperDrivenCoordinate(DrivenCoordinate):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return (Row(ZERO, ZERO, self.k, cross(self.s, j.A.T @ self.k)),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (self.drive.c_tt - self.k @ (j.A @ vj.centripetal(self.s)),)
 
 
@@ -234,7 +234,7 @@ def _along_row(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Row:
     return Row(-a_G, cross(a, i.A.T @ (e0 + (j.u - i.u))), a_G, ZERO)
 
 
-def _along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Motion, vj: Motion) -> Scalar:
+def _along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> Scalar:
     y, y_t = i.A.T @ (e0 + (j.u - i.u)), i.A.T @ (vj.v - vi.v)
     return a @ (2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y)))
 

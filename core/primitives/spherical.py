@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross
-from .base import Motion, Pose, Primitive, Row
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -33,5 +33,5 @@ class Spherical(Primitive):
         # e . (dpi x S) = dpi . (S x e)
         return tuple(Row(-e, -cross(S_i, e), e, cross(S_j, e)) for e in (X, Y, Z))
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return tuple(vi.centripetal(i.turn(self.s_i)) - vj.centripetal(j.turn(self.s_j)))

@@ -21,7 +21,7 @@ from ...algebra import Vec3, vec
 from ...joints import Kind
 from ...mechanism import Mechanism
 from ...motions import Path
-from ...primitives.base import GROUND_POSE, Drive, Motion
+from ...primitives.base import GROUND_POSE, Drive, Twist
 from ...trajectory import Array, Trajectory
 from ..equations.carried import position_of
 from ..equations.cartesian import Cartesian
@@ -232,7 +232,7 @@ def _gradient(
         first = formulation.columns[point.body]
         for k in range(6):
             rates = [float(k == column) for column in range(6)]
-            by_unknowns[:, first + k] = [*Motion(vec(rates[:3]), vec(rates[3:])).of(turned)]
+            by_unknowns[:, first + k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
     by_unknowns *= frame.unit
     own = geometry.get(f"points.{name}.position")
     moved: Vec3 = vec(own) if own else vec(point.position)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...algebra import Vec3, cross
 from ...mechanism import Vector
-from ...primitives.base import Motion
+from ...primitives.base import Twist
 from ...trajectory import Array
 from ..equations.constraints import Frames
 from ..equations.formulation import Configuration, Formulation
@@ -50,15 +50,15 @@ def screws(formulation: Formulation, at: Configuration, frame: Frames, rates: Ar
 
     Rates may be taken either way: the fastest body's axis points along x, y or z rather than against it.
     """
-    motions = formulation.motions(at, rates.tolist())
-    speeds = {name: max(_size(motion.v), _size(motion.w)) for name, motion in motions.items()}
+    twists = formulation.twists(at, rates.tolist())
+    speeds = {name: max(_size(twist.v), _size(twist.w)) for name, twist in twists.items()}
     fastest = max(speeds.values(), default=0.0)
     moving = sorted((name for name, speed in speeds.items() if speed > STILL * fastest), key=lambda name: -speeds[name])
     if moving:
-        first = motions[moving[0]]
+        first = twists[moving[0]]
         leading = max([*(first.w if _size(first.w) > STILL * fastest else first.v)], key=abs)
         fastest = math.copysign(fastest, leading)
-    return [_screw(name, motions[name], at, frame, fastest) for name in moving]
+    return [_screw(name, twists[name], at, frame, fastest) for name in moving]
 
 
 def free_motions(matrix: Array) -> Array:
@@ -88,8 +88,8 @@ def described(found: Sequence[Screw], most: int = 4) -> str:
     return ", ".join(map(str, found[:most])) + more
 
 
-def _screw(name: str, motion: Motion, at: Configuration, frame: Frames, fastest: float) -> Screw:
-    v, w = (1.0 / fastest) * motion.v, (1.0 / fastest) * motion.w
+def _screw(name: str, twist: Twist, at: Configuration, frame: Frames, fastest: float) -> Screw:
+    v, w = (1.0 / fastest) * twist.v, (1.0 / fastest) * twist.w
     origin = frame.origins[name] + at.poses[name].u
     turn = _size(w)
     if turn <= STILL:

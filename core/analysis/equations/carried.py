@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import Quat, Scalar, Vec3, cross, rotation_less_identity, vec
-from ...primitives.base import Motion, Pose
+from ...algebra import Quat, Scalar, Vec3, rotation_less_identity, vec
+from ...primitives.base import Pose, Twist
 from .formulation import Acceleration
 
 
@@ -21,19 +21,19 @@ def position_of(position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pos
 
 
 def motion_of_point(
-    position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose, motion: Motion, acceleration: Acceleration
+    position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose, twist: Twist, acceleration: Acceleration
 ) -> tuple[Vec3, Vec3, Vec3]:
     """Position [m], velocity and acceleration of a point; see `position_of`."""
     turned = pose.turn(arm)
     return (
         position_of(position, arm, metres, pose),
-        metres * motion.of(turned),
-        metres * (acceleration.v_t + cross(acceleration.w_t, turned) + motion.centripetal(turned)),
+        metres * twist.of(turned),
+        metres * acceleration.of(turned, twist),
     )
 
 
-def motion_of_frame(design: Quat, pose: Pose, motion: Motion, acceleration: Acceleration) -> tuple[Quat, Vec3, Vec3]:
+def motion_of_frame(design: Quat, pose: Pose, twist: Twist, acceleration: Acceleration) -> tuple[Quat, Vec3, Vec3]:
     """p, omega' and omega'dot of a body's own frame, the paper's variables, from its Euler parameters at design."""
     p = pose.q * design
     to_body = rotation_less_identity(p).T
-    return p, motion.w + to_body @ motion.w, acceleration.w_t + to_body @ acceleration.w_t
+    return p, twist.w + to_body @ twist.w, acceleration.w_t + to_body @ acceleration.w_t

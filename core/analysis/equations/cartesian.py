@@ -14,7 +14,7 @@ from typing import Any
 
 from ...algebra import Scalar, Vec3, quat, turned_by, vec
 from ...mechanism import Mechanism
-from ...primitives.base import GROUND_MOTION, GROUND_POSE, Drive, Motion, Pose, Primitive, Row
+from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Primitive, Row, Twist
 from ...program import cos, sin
 from .constraints import Constraint, Frames, Relation, Style, constraints
 from .formulation import GROUND_ACCELERATION, Acceleration, Condition, Configuration, Rows, State
@@ -28,7 +28,7 @@ class Given:
     """How a body moves that is solved for elsewhere."""
 
     pose: Pose = GROUND_POSE
-    motion: Motion = GROUND_MOTION
+    twist: Twist = GROUND_TWIST
     acceleration: Acceleration = GROUND_ACCELERATION
 
 
@@ -148,7 +148,7 @@ class Cartesian:
         return found
 
     def nu(self, at: Configuration) -> list[Scalar]:
-        carried = {name: each.motion for name, each in self.given.items()}
+        carried = {name: each.twist for name, each in self.given.items()}
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
@@ -158,19 +158,19 @@ class Cartesian:
         return found
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        motions = self._own(v) | {name: each.motion for name, each in self.given.items()}
-        carried = {name: Motion(each.acceleration.v_t, each.acceleration.w_t) for name, each in self.given.items()}
+        twists = self._own(v) | {name: each.twist for name, each in self.given.items()}
+        carried = {name: Twist(each.acceleration.v_t, each.acceleration.w_t) for name, each in self.given.items()}
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
                 found.append(c.drive.c_tt)
                 continue
             rate = v[self.coordinates[c.coordinate]] if c.coordinate else 0.0
-            vi, vj = motions.get(c.i, GROUND_MOTION), motions.get(c.j, GROUND_MOTION)
+            vi, vj = twists.get(c.i, GROUND_TWIST), twists.get(c.j, GROUND_TWIST)
             found += self._less(self._bound(c, at, rate).gamma(*_pair(c, at), vi, vj), c, at, carried)
         return found
 
-    def _less(self, values: Sequence[Scalar], c: Constraint, at: Configuration, carried: Mapping[str, Motion]) -> list[Scalar]:
+    def _less(self, values: Sequence[Scalar], c: Constraint, at: Configuration, carried: Mapping[str, Twist]) -> list[Scalar]:
         """Right-hand sides less what given bodies contribute to the left."""
         found: list[Scalar] = [*values]
         for body, place in ((c.i, "i"), (c.j, "j")):
@@ -188,16 +188,16 @@ class Cartesian:
         driven: Any = c.primitive
         return replace(driven, drive=drive)
 
-    def motions(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Motion]:
-        return {name: Motion(motion.v, self._global(at.poses[name], motion.w)) for name, motion in self._own(v).items()}
+    def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
+        return {name: Twist(twist.v, self._global(at.poses[name], twist.w)) for name, twist in self._own(v).items()}
 
     def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:
         # A w' differentiated is A w'dot + w x w, and the last is zero
-        return {name: Acceleration(motion.v, self._global(at.poses[name], motion.w)) for name, motion in self._own(a).items()}
+        return {name: Acceleration(twist.v, self._global(at.poses[name], twist.w)) for name, twist in self._own(a).items()}
 
-    def _own(self, v: Sequence[Scalar]) -> dict[str, Motion]:
+    def _own(self, v: Sequence[Scalar]) -> dict[str, Twist]:
         """The unknowns by body, in the axes of the rows."""
-        return {name: Motion(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS])) for name, k in self.columns.items()}
+        return {name: Twist(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS])) for name, k in self.columns.items()}
 
     def _global(self, pose: Pose, w: Vec3) -> Vec3:
         return pose.turn(w) if self._body_axes else w

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
-from ...algebra import ZERO, Scalar, Vec3
-from ...primitives.base import Motion, Pose
+from ...algebra import ZERO, Scalar, Vec3, cross
+from ...primitives.base import Pose, Twist
 
 State: TypeAlias = Mapping[str, Sequence[Scalar]]
 """Named vectors that fix the configuration (for Cartesian coordinates: displacement and Euler parameters of every body)."""
@@ -51,6 +51,10 @@ class Acceleration:
 
     v_t: Vec3
     w_t: Vec3
+
+    def of(self, arm: Vec3, twist: Twist) -> Vec3:
+        """Acceleration of the point at the end of the (turned) arm, while the body moves so."""
+        return self.v_t + cross(self.w_t, arm) + twist.centripetal(arm)
 
 
 GROUND_ACCELERATION = Acceleration(ZERO, ZERO)
@@ -103,7 +107,7 @@ class Formulation(Protocol):
         """Right-hand sides of the acceleration equations at unknown rates v."""
         ...
 
-    def motions(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Motion]:
+    def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
         """How the bodies move at unknown rates v."""
         ...
 

@@ -19,7 +19,7 @@ from functools import cached_property
 
 from ...algebra import Scalar, Vec3, cross
 from ...mechanism import Mechanism
-from ...primitives.base import Motion
+from ...primitives.base import Twist
 from . import tree
 from .cartesian import COLUMNS, Cartesian
 from .constraints import Constraint, Frames, Relation
@@ -108,8 +108,8 @@ class Relative:
         moved = tree.accelerating(self.chains, _posed(at).tree, at.state, v, [0.0] * len(v))
         rates, bias = [0.0] * self.closed.unknowns, [0.0] * self.closed.unknowns
         for name, k in self.closed.columns.items():
-            motion, acceleration = moved[name]
-            rates[k : k + COLUMNS] = [*motion.v, *motion.w]
+            twist, acceleration = moved[name]
+            rates[k : k + COLUMNS] = [*twist.v, *twist.w]
             bias[k : k + COLUMNS] = [*acceleration.v_t, *acceleration.w_t]
         for name, k in self.closed.coordinates.items():
             rates[k] = v[self._column(name)]
@@ -119,7 +119,7 @@ class Relative:
             for value, row in zip(self.closed.gamma(at, rates), rows, strict=True)
         ]
 
-    def motions(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Motion]:
+    def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
         return tree.moving(self.chains, _posed(at).tree, at.state, v)
 
     def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:

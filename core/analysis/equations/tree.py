@@ -18,11 +18,11 @@ from ...algebra import ZERO, Quat, Scalar, Vec3, X, Y, Z, cross, quat, turned_by
 from ...joints import Cylindrical, Fixed, Joint, Revolute, Screw, Spherical, Translational, Universal
 from ...joints.base import unit
 from ...mechanism import GROUND, Mechanism
-from ...primitives.base import GROUND_MOTION, GROUND_POSE, Motion, Pose
+from ...primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
 from ...program import cos, sin
 from ...topology import Branch, spanning_tree
 from .constraints import Frames
-from .formulation import Acceleration, State
+from .formulation import GROUND_ACCELERATION, Acceleration, State
 
 BALL = 3
 """Unknowns of a ball."""
@@ -170,23 +170,23 @@ def retracted(tree: Sequence[Chain], state: State, step_of: Sequence[Scalar]) ->
     return after
 
 
-def moving(tree: Sequence[Chain], at: Posed, state: State, v: Sequence[Scalar]) -> dict[str, Motion]:
+def moving(tree: Sequence[Chain], at: Posed, state: State, v: Sequence[Scalar]) -> dict[str, Twist]:
     """Velocities of all bodies at rates v."""
-    return {name: motion for name, (motion, _) in accelerating(tree, at, state, v, [0.0] * len(v)).items()}
+    return {name: twist for name, (twist, _) in accelerating(tree, at, state, v, [0.0] * len(v)).items()}
 
 
 def accelerating(
     tree: Sequence[Chain], at: Posed, state: State, v: Sequence[Scalar], a: Sequence[Scalar]
-) -> dict[str, tuple[Motion, Acceleration]]:
+) -> dict[str, tuple[Twist, Acceleration]]:
     """Velocities and accelerations of all bodies at rates v and accelerations a of the unknowns."""
-    found: dict[str, tuple[Motion, Acceleration]] = {}
+    found: dict[str, tuple[Twist, Acceleration]] = {}
     k = 0
     for chain in tree:
         pose = at.poses.get(chain.parent, GROUND_POSE)
-        motion, acceleration = found.get(chain.parent, (GROUND_MOTION, Acceleration(ZERO, ZERO)))
+        twist, acceleration = found.get(chain.parent, (GROUND_TWIST, GROUND_ACCELERATION))
         arm = pose.turn(chain.arm_parent)
-        w, w_t = motion.w, acceleration.w_t
-        v_P, v_P_t = motion.of(arm), acceleration.v_t + cross(w_t, arm) + motion.centripetal(arm)
+        w, w_t = twist.w, acceleration.w_t
+        v_P, v_P_t = twist.of(arm), acceleration.of(arm, twist)
         for step in chain.steps:
             axes = [column.axis for column in at.columns[k : k + step.unknowns]]
             rate = _weighted(v[k : k + step.unknowns], axes)
@@ -199,9 +199,9 @@ def accelerating(
                 w, w_t = w + rate, w_t + rate_t + cross(w, rate)
             k += step.unknowns
         arm = at.poses[chain.child].turn(chain.arm_child)
-        own = Motion(ZERO, w)
+        own = Twist(ZERO, w)
         found[chain.child] = (
-            Motion(v_P - cross(w, arm), w),
+            Twist(v_P - cross(w, arm), w),
             Acceleration(v_P_t - cross(w_t, arm) - own.centripetal(arm), w_t),
         )
     return found

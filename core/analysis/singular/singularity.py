@@ -116,7 +116,7 @@ def _shares(weights: Mapping[str, float]) -> list[str]:
 def _moves(system: System, state: Array, z: Array) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
     """Bodies by name, those that move most first; shares that are not worth a name are zero."""
     unit = system.model.frame.unit
-    rates = {name: (np.array([*motion.v]), np.array([*motion.w])) for name, motion in system.motions(state, z).items()}
+    rates = {name: (np.array([*twist.v]), np.array([*twist.w])) for name, twist in system.twists(state, z).items()}
     sizes = {name: float(max(np.abs(v).max(), np.abs(w).max())) for name, (v, w) in rates.items()}
     largest = max(sizes.values())
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...algebra import Quat, Vec3, quat, vec
 from ...mechanism import Mechanism
 from ...motions import Path, outwards
-from ...primitives.base import Motion, Pose
+from ...primitives.base import Pose, Twist
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
 from ..equations.carried import motion_of_frame, motion_of_point
 from ..equations.formulation import Acceleration
@@ -82,7 +82,7 @@ class _Wanted:
         poses, rates, accelerations = self._taken(at)
         moving = (
             Pose.of(vec([*poses[:3]]), quat(poses[3:])),
-            Motion(vec([*rates[:3]]), vec([*rates[3:]])),
+            Twist(vec([*rates[:3]]), vec([*rates[3:]])),
             Acceleration(vec([*accelerations[:3]]), vec([*accelerations[3:]])),
         )
         found: list[Vec3 | Quat] = [*motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)]

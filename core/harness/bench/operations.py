@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 
 from ...algebra import IDENTITY, Mat3, Scalar, Vec3, X, Y, Z
-from ...primitives import Motion, Pose, Row
+from ...primitives import Pose, Row, Twist
 from ...program import Tape, program
 from .textbook import Equations, Given, PrintedDot11, PrintedDot12, PrintedDot21, conditions
 
@@ -106,10 +106,10 @@ class Pair:
 
     i: Pose
     j: Pose
-    vi: Motion
-    vj: Motion
-    ai: Motion
-    aj: Motion
+    vi: Twist
+    vj: Twist
+    ai: Twist
+    aj: Twist
 
     @staticmethod
     def of(number: Callable[[], Scalar]) -> Pair:
@@ -119,7 +119,7 @@ class Pair:
             return Vec3(number(), number(), number())
 
         i, j = (Given(vector(), IDENTITY, Mat3(vector(), vector(), vector())) for _ in range(2))
-        return Pair(i, j, *(Motion(vector(), vector()) for _ in range(4)))
+        return Pair(i, j, *(Twist(vector(), vector()) for _ in range(4)))
 
 
 def executed(equations: Sequence[Equations], pair: Pair, tally: list[int]) -> Operations:
@@ -152,7 +152,7 @@ def traced(equations: Sequence[Equations]) -> Operations:
     return Operations(cost(entries), cost([*entries, *velocity]), cost([*entries, *acceleration]), cost(gamma))
 
 
-def _times(rows: Sequence[Row], i: Motion, j: Motion) -> list[Scalar]:
+def _times(rows: Sequence[Row], i: Twist, j: Twist) -> list[Scalar]:
     """The rows times the velocities or accelerations of both bodies; blocks of zeros are left out."""
     found: list[Scalar] = []
     for row in rows:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...algebra import Quat, Vec3, cross
 from ...errors import KincheckError
-from ...primitives import Motion, Pose
+from ...primitives import Pose, Twist
 from ...trajectory import Array
 from .operations import AXES, DOTS, SIMPLIFIED
 from .textbook import Condition, conditions
@@ -66,9 +66,9 @@ class Moving:
     v: Vec3
     w: Vec3
 
-    def motion(self, body_axes: bool) -> Motion:
+    def motion(self, body_axes: bool) -> Twist:
         """The velocities as rows take them."""
-        return Motion(self.v, Pose.of(self.u, self.q).A.T @ self.w) if body_axes else Motion(self.v, self.w)
+        return Twist(self.v, Pose.of(self.u, self.q).A.T @ self.w) if body_axes else Twist(self.v, self.w)
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def _errors(equations: Sequence[Any], i: Moving, j: Moving, exact: Callable[[Any
     return found
 
 
-def _values(equations: Sequence[Any], bodies: Sequence[Moving], motions: Sequence[Motion]) -> tuple[list[Any], ...]:
+def _values(equations: Sequence[Any], bodies: Sequence[Moving], motions: Sequence[Twist]) -> tuple[list[Any], ...]:
     """Residuals, entries of the Jacobian and right-hand sides."""
     pair = [Pose.of(body.u, body.q) for body in bodies]
     return (

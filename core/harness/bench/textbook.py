@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from ...algebra import ZERO, Mat3, Scalar, Vec3, X, Y, Z
-from ...primitives import Dot10, Dot11, Dot12, Dot20, Dot21, Motion, Pose, Primitive, Row, conventional, paper
+from ...primitives import Dot10, Dot11, Dot12, Dot20, Dot21, Pose, Primitive, Row, Twist, conventional, paper
 
 
 class Equations(Protocol):
@@ -34,7 +34,7 @@ class Equations(Protocol):
         """Rows of the Jacobian."""
         ...
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Right-hand sides of the acceleration equations."""
         ...
 
@@ -79,7 +79,7 @@ class PrintedDot10(AsPrinted):
         p_i = chain(self.b, *self.relative(j, i), skew(self.a))
         return (Row(ZERO, -p_i, ZERO, -chain(self.a, *self.relative(i, j), skew(self.b))),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """(12)."""
         a, b, W_i, W_j = self.a, self.b, skew(vi.w), skew(vj.w)
         turning = chain(b, *self.relative(j, i), W_i, W_i) @ a + chain(b, W_j, W_j, *self.relative(j, i)) @ a
@@ -108,7 +108,7 @@ class PrintedDot20(AsPrinted):
         p_i = chain(self.a, skew(self.s_i)) - chain(self.d(i, j), i.A, skew(self.a))
         return (Row(-along, p_i, along, -chain(self.a, *self.relative(i, j), skew(self.s_j))),)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Table 2."""
         a, W_i, W_j = self.a, skew(vi.w), skew(vj.w)
         sliding = chain(vi.w, skew(a), i.A.T) @ (vi.v - vj.v) + chain(self.s_j, W_j, *self.relative(j, i), W_i) @ a
@@ -128,7 +128,7 @@ class PrintedDot11(AsPrinted):
         first, second = (chain(a, *self.relative(i, j)) for a in (self.f, self.g))
         return Row(ZERO, self.f, ZERO, -first), Row(ZERO, -self.g, ZERO, second)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """(16)."""
         first, second = (chain(skew(vi.w) @ a, *self.relative(i, j)) @ vj.w for a in (self.f, self.g))
         return first, -second
@@ -144,7 +144,7 @@ class PrintedDot12:
         """(21)."""
         return tuple(Row(ZERO, e, ZERO, -c) for e, c in zip((X, Y, Z), (self.C.x, self.C.y, self.C.z), strict=True))
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Zero."""
         return 0.0, 0.0, 0.0
 
@@ -164,7 +164,7 @@ class PrintedDot21:
             found.append(Row(-along, -chain(e, i.A, skew(a)), along, ZERO))
         return tuple(found)
 
-    def gamma(self, i: Pose, j: Pose, vi: Motion, vj: Motion) -> tuple[Scalar, ...]:
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Table 2."""
         e, e_t, W_i = j.u - i.u, vj.v - vi.v, skew(vi.w)
         return tuple(2.0 * (chain(e_t, i.A, skew(a)) @ vi.w) + chain(e, i.A, W_i, skew(a)) @ vi.w for a in (self.f, self.g))
