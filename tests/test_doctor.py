@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from kincheck.core.harness import doctor
 from kincheck.core.harness.cli import main
-from kincheck.core.program import shelf
+from kincheck.core.program import disk_cache
 
 
 @pytest.fixture
@@ -93,9 +93,9 @@ def test_a_user_without_a_home_solves_and_keeps_nothing(without_imports, monkeyp
     out = capsys.readouterr().out
     assert "nowhere" in out
     assert "the user has no home directory; every process compiles anew" in out
-    assert shelf.kept(b"said", lambda: b"made") == b"made"
-    assert shelf.find(b"said") is None
-    assert not shelf.known(b"said")
+    assert disk_cache.kept(b"said", lambda: b"made") == b"made"
+    assert disk_cache.find(b"said") is None
+    assert not disk_cache.known(b"said")
 
 
 def nobody():

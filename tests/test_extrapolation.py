@@ -67,14 +67,14 @@ def test_lanes_are_extrapolated_to_one_iteration(order):
     assert np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max() <= 4e-16
 
 
-@pytest.mark.parametrize("walked", [False, True])
+@pytest.mark.parametrize("interpreted", [False, True])
 @pytest.mark.parametrize("order", [0, 2])
 @pytest.mark.parametrize("lanes", [2, 4, 8])
-def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, walked, monkeypatch):
+def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, interpreted, monkeypatch):
     """Whatever the processor's: it runs such vectors too. On from where the grid changes it takes as many again."""
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
     monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
-    monkeypatch.setattr("kincheck.core.program.llvm.machine_code.OFTEN", 10**9 if walked else 0)
+    monkeypatch.setattr("kincheck.core.program.llvm.machine_code.OFTEN", 10**9 if interpreted else 0)
     grid = np.concatenate([np.linspace(-0.08, 0.0, 80), 0.001 * np.arange(1.0, 41.0), 0.06 + 0.001 * np.arange(1.0, 20.0)])
     found, first = positions(grid, order, compiled=True), groups_behind(lanes) * lanes
     expected = positions(grid, order).points["wheel"]

@@ -141,23 +141,23 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
         mechanism = four_bar()
         driver, point = mechanism.drivers[0].name, mechanism.points[0].name
         model = compile_model(mechanism, Request((driver,), (point,)))
-        if often and model._code.walked:
+        if often and model._code.interpreted:
             model._code.count(10**9)
         return sweep(model, Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
 
     fresh = positions()
-    walked = {*(tmp_path / "kincheck").iterdir()}
-    assert len(walked) == 4  # what was traced, its tables, what goes through them and the loops
+    interpreted = {*(tmp_path / "kincheck").iterdir()}
+    assert len(interpreted) == 4  # what was traced, its tables, what goes through them and the loops
     np.testing.assert_array_equal(positions(often=True), fresh)
     entries = [*(tmp_path / "kincheck").iterdir()]
     assert len(entries) == 5  # and its machine code
-    for name in ("_trace", "walk", "_text"):
-        owner = {"_trace": tracing, "walk": machine_code.walk, "_text": LlvmCode}[name]
+    for name in ("_trace", "bytecode", "_text"):
+        owner = {"_trace": tracing, "bytecode": machine_code.bytecode, "_text": LlvmCode}[name]
         monkeypatch.setattr(owner, name, None)
     np.testing.assert_array_equal(positions(), fresh)
     monkeypatch.undo()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    (code,) = {*entries} - walked
+    (code,) = {*entries} - interpreted
     for entry, other in zip(entries, [*entries[1:], entries[0]], strict=True):
         kept = entry.read_bytes()
         for damage in (b"", kept[:100], kept[:-1] + bytes([kept[-1] ^ 1]), b"\0" * len(kept), other.read_bytes()):

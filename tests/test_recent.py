@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.analysis import march, model, route
-from kincheck.core.analysis.bound import Bound
 from kincheck.core.analysis.cascade import cascade
 from kincheck.core.analysis.cascade import sweep as cascade_sweep
 from kincheck.core.analysis.prepare import prepare
 from kincheck.core.analysis.sparse import model as sparse
+from kincheck.core.analysis.thread_cache import ThreadCache
 from kincheck.core.harness.bench.size import circle
 from kincheck.core.motions import Absolute, Motion, Path, Ramp, Sine, Table
 
@@ -209,7 +209,7 @@ def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
 
 
 def test_what_was_made_for_a_thread_goes_with_it():
-    bound = Bound()
+    bound = ThreadCache()
     made = WeakSet()
 
     class Made:

@@ -9,6 +9,7 @@ from kincheck.adapters import engine
 from kincheck.core import solve
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.harness.attempt import Answer, Failure, Pair
+from kincheck.core.harness.case_writer import case_text
 from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.stress.families import Family, Specimen
@@ -20,7 +21,6 @@ from kincheck.core.harness.stress.run import specimen, stress
 from kincheck.core.harness.stress.saving import judge as judge_file
 from kincheck.core.harness.stress.solving import Interpreted, once
 from kincheck.core.harness.stress.truth import Reach, followed
-from kincheck.core.harness.writing import case_text
 from kincheck.core.trajectory import PointMotion
 
 NATIVE = engine("native")

@@ -11,11 +11,11 @@ from kincheck.adapters.native import Native
 from kincheck.core import solve
 from kincheck.core.errors import CaseError
 from kincheck.core.harness import cli
+from kincheck.core.harness.case_writer import case_text
 from kincheck.core.harness.probe import probes
 from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.harness.stress.report import markdown, report
 from kincheck.core.harness.stress.results import Cell, Finding, Stress
-from kincheck.core.harness.writing import case_text
 
 
 class Shifted(Native):

@@ -229,7 +229,7 @@ def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, mon
     group = executor.margin if compiled else 8
     values = np.random.default_rng(5).uniform(0.2, 0.4, size=(9, 8))
     heads = np.arange(8) // group * group
-    for _ in range(2):  # walked, and compiled
+    for _ in range(2):  # interpreted, and compiled
         executor.put(range(9), values)
         executor.run("f")
         lasts, firsts = values[:, heads + group - 1], values[:, heads]

@@ -27,8 +27,8 @@ from kincheck.core import (
 )
 from kincheck.core.harness import cli
 from kincheck.core.harness.case import Case, Sweep, Truth
+from kincheck.core.harness.model_writer import way_to
 from kincheck.core.harness.probe import probes
-from kincheck.core.harness.writer import way_to
 from kincheck.core.topology import Branch, SpanningTree, spanning_tree
 
 from . import naive

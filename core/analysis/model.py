@@ -17,9 +17,9 @@ from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, Nump
 from ..program.llvm.compiler import available
 from ..trajectory import Array
 from . import acceptance, prediction
-from .bound import Bound
 from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
 from .structure.components import Section
+from .thread_cache import ThreadCache
 from .tracing import Tracing, ours, traced
 
 MAX_ITERATIONS = 12
@@ -138,7 +138,7 @@ class Model:
         )
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self.plan) if compiled else None
-        self.bound = Bound()
+        self.bound = ThreadCache()
         self.design = np.full(len(self.slots), np.nan) if request.rows else self._solve_design()
 
     def _wanted(self) -> list[str]:

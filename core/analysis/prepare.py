@@ -1,12 +1,12 @@
 """How a mechanism is solved is chosen by its size: as one program, component by component, or as one sparse system.
 
-The answers are the same to round-off. One program costs least for each sample, and more to trace: it grows faster than what it
-ties together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large
-for one program is a sparse system. Measured on chains of four-bars, one program against components, both walked: 17 bodies 3 and
-13 us a sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and 0.2 s. Compiled, 33 bodies
-take 3 and 8 us, after 6 s and 0.1. On rings of loops, one program against a sparse system: 31 bodies 21 and 180 us, made ready in
-1.3 and 0.04 s; 39 bodies 42 and 275 us, 2.2 and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and
-refuses more of what could be solved.
+The answers are the same to round-off. One program costs least for each sample, and more to trace: it grows faster than what it ties
+together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large for
+one program is a sparse system. Measured on chains of four-bars, one program against components, both interpreted: 17 bodies 3 and
+13 us a sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and 0.2 s. Compiled, 33 bodies take
+3 and 8 us, after 6 s and 0.1. On rings of loops, one program against a sparse system: 31 bodies 21 and 180 us, made ready in 1.3
+and 0.04 s; 39 bodies 42 and 275 us, 2.2 and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and refuses
+more of what could be solved.
 """
 
 from __future__ import annotations

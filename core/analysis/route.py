@@ -12,10 +12,10 @@ from ..mechanism import Mechanism
 from ..motions import Path
 from ..program import Side
 from ..trajectory import Array
-from .bound import Bound
 from .interpolation import weights_of_groups, weights_of_samples
 from .model import RECENT, Model, recent_model
 from .request import Request
+from .thread_cache import ThreadCache
 from .tracing import ours
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
@@ -104,9 +104,9 @@ class Route:
         return min(LANES, max(1, len(self.path.times)))
 
     @cached_property
-    def bound(self) -> Bound:
+    def bound(self) -> ThreadCache:
         """What is made of it."""
-        return Bound()
+        return ThreadCache()
 
     @cached_property
     def settled(self) -> set[float]:

@@ -15,8 +15,8 @@ from pathlib import Path
 
 from ..mechanism import Mechanism
 from ..program import ITERATIONS, NODES, Program, groups_behind
+from ..program.disk_cache import kept
 from ..program.llvm import compiler
-from ..program.shelf import kept
 from . import acceptance, prediction
 from .equations.constraints import Frames
 from .request import Request

@@ -14,7 +14,7 @@ from ..errors import KincheckError, SolveError
 from ..joints import AxialJoint
 from ..trajectory import BodyMotion
 from .case import Case
-from .writer import LARGEST_TURN, TOL, Writer, way_to
+from .model_writer import LARGEST_TURN, TOL, Writer, way_to
 
 SCHEMA = "kincheck-assemblies/1"
 # Farther from the intended assembly than this [rad, mechanism sizes] is another one.

@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from ..program import shelf
+from ..program import disk_cache
 from ..program.llvm import compiler
 from .case import Case
 from .circumstances import circumstances
@@ -110,7 +110,7 @@ def examine(case: Case, native: Engine, tol: float) -> Examination:
         os.cpu_count() or 1,
         "machine code" if compiler.available() else "numpy: pip install llvmlite makes it some fifty times faster",
         compiler.vector_width() if compiler.available() else None,
-        str(shelf.folder() or "nowhere"),
+        str(disk_cache.folder() or "nowhere"),
         _cache_problem(),
     )
     return Examination(SCHEMA, about["kincheck"], parts(), machine, _check(case, native, tol))
@@ -175,7 +175,7 @@ def _ended(importing: subprocess.Popen[str]) -> str:
 
 def _cache_problem() -> str:
     """Why compiled code cannot be kept; empty where it can."""
-    folder, remedy = shelf.folder(), "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is"
+    folder, remedy = disk_cache.folder(), "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is"
     if folder is None:
         return f"the user has no home directory; {remedy}"
     try:

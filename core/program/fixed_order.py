@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .linked import Linker, Rows, Words, numbers
+from .linker import Linker, Rows, Words, numbers
 
 
 class FixedOrder:

@@ -1,6 +1,6 @@
 """Programs in the operations of a processor: a product and a sum are one, and rounded once.
 
-It is decided here, and not by the compiler: a program gives the same numbers, to the last bit, whether it is compiled or walked.
+It is decided here, and not by the compiler: compiled or interpreted, a program gives the same numbers, to the last bit.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ from ..model import compile_model
 from ..request import Request
 from ..structure.driven import require_driven
 from ..system import System
+from .arclength import NODE, ArclengthWalk, Beside, Spot
 from .singularity import Singularity, examine
-from .walk import NODE, Beside, Spot, Walk
 
 # A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be cheap, near enough to be drawn.
 LONGEST = 0.05
@@ -123,7 +123,7 @@ def trace(
     request = Request((driver,), wanted, order=0, style=Style(style), compiled=False)
     model = compile_model(mechanism, request)
     system = System(model)
-    walk = Walk(system, Path({driver: Ramp(1.0)}, np.zeros(1)), tol)
+    walk = ArclengthWalk(system, Path({driver: Ramp(1.0)}, np.zeros(1)), tol)
     trail = _walked(walk, walk.begin(system.state(model.design[:, None], ahead=""), 0.0, direction), length, longest)
     spots, reached = trail.spots, trail.spots[-1].arc
     message = (
@@ -148,7 +148,7 @@ def trace(
 
 def limit_ahead(system: System, path: Path, state: Array, time: float, direction: int, tol: float) -> Event | None:
     """The limit point that a pose of a path is close to, going on in a direction of time; None where there is none nearby."""
-    walk = Walk(system, path, tol)
+    walk = ArclengthWalk(system, path, tol)
     try:
         spot = walk.begin(state, time, direction)
     except np.linalg.LinAlgError:
@@ -171,7 +171,7 @@ def _from(first: Spot, others: Iterator[Spot]) -> Iterator[Spot]:
     yield from others
 
 
-def _walked(walk: Walk, first: Spot, length: float, longest: float) -> _Trail:
+def _walked(walk: ArclengthWalk, first: Spot, length: float, longest: float) -> _Trail:
     trail = _Trail([first])
     for spot in walk.along(first, length, longest):
         trail.spots.append(spot)
@@ -183,7 +183,7 @@ def _walked(walk: Walk, first: Spot, length: float, longest: float) -> _Trail:
     return trail
 
 
-def _note(walk: Walk, trail: _Trail) -> None:
+def _note(walk: ArclengthWalk, trail: _Trail) -> None:
     """Add what lies between the last spots."""
     before, after = trail.spots[-2:]
     if before.dt * after.dt < 0.0:
@@ -200,16 +200,16 @@ def _note(walk: Walk, trail: _Trail) -> None:
                 trail.events.append(event)
 
 
-def _event(walk: Walk, found: Beside) -> Event:
+def _event(walk: ArclengthWalk, found: Beside) -> Event:
     spot = found.spot
     return Event(found.arc, found.time, examine(walk.system, spot.state, walk.sample(spot.time)), _at(walk, spot))
 
 
-def _at(walk: Walk, spot: Spot) -> dict[str, Array]:
+def _at(walk: ArclengthWalk, spot: Spot) -> dict[str, Array]:
     return {name: found[0] for name, found in _points(walk, [spot]).items()}
 
 
-def _points(walk: Walk, spots: Sequence[Spot]) -> dict[str, Array]:
+def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
     state = np.concatenate([spot.state for spot in spots], axis=1)
     sample = np.concatenate([walk.sample(spot.time) for spot in spots], axis=1)
     zero = np.zeros((len(spots), walk.system.unknowns))

@@ -16,7 +16,7 @@ from ...program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor
 from ...program.llvm.compiler import available
 from ...trajectory import Array
 from ..equations.constraints import Constraint, Relation
-from .kinds import HOW, QUANTITIES, WHERE, Kind, Member, Numbering
+from .element_types import HOW, QUANTITIES, WHERE, ElementType, Member, Numbering
 
 
 class Elements:
@@ -31,7 +31,7 @@ class Elements:
         rows, columns: where the entries belong, shape (entries,).
         results, parts: all of these, one after the other, and where each of them is.
         drivers: how many there are.
-        kinds, starts: see `Kind`, and where the quantities of each start among the results.
+        kinds, starts: see `ElementType`, and where the quantities of each start among the results.
         compiled: whether they are evaluated by machine code.
     """
 
@@ -49,7 +49,7 @@ class Elements:
         kinds: dict[Any, list[Member]] = {}
         for member in members:
             kinds.setdefault(member.kind(self.numbering.bodies), []).append(member)
-        self.kinds, self.compiled = [Kind(each, self.numbering) for each in kinds.values()], compiled and available()
+        self.kinds, self.compiled = [ElementType(each, self.numbering) for each in kinds.values()], compiled and available()
         self.rows, self.columns = (
             np.concatenate([getattr(kind, name).ravel() for kind in self.kinds]) for name in ("rows", "columns")
         )
@@ -95,7 +95,7 @@ class Elements:
 class _Bound:
     """The constraints of a kind as lanes."""
 
-    def __init__(self, kind: Kind, results: Array, starts: Mapping[str, int], *, compiled: bool) -> None:
+    def __init__(self, kind: ElementType, results: Array, starts: Mapping[str, int], *, compiled: bool) -> None:
         """Write what is constant, and prepare to write the rest, into an array where every quantity has its start."""
         self._results, lanes = results, kind.lanes
         self._executor: Executor = LlvmExecutor(LlvmCode(kind.plan), lanes) if compiled else NumpyExecutor(kind.plan, lanes)

@@ -29,11 +29,11 @@ from ..request import CONSISTENT
 from ..structure.driven import locked_drivers
 from ..structure.factors import Factors, Indices, SingularError
 from ..structure.redundancy import RANK_TOLERANCE
+from .batch import Batch
 from .elements import Elements
 from .orientation import Blocks
-from .rows import Jacobian
+from .row_selection import Jacobian
 from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
-from .together import Together
 from .turning import Turn
 
 MOVES = 1e-6
@@ -201,9 +201,9 @@ class SparseModel:
         }
 
     @cached_property
-    def together(self) -> Together | None:
+    def together(self) -> Batch | None:
         """Several samples at once, by machine code; None where there is none."""
-        return Together(self) if self.elements.compiled else None
+        return Batch(self) if self.elements.compiled else None
 
     def _predicted(self, here: Stand, time: float) -> tuple[Array, Array]:
         """A Taylor step of second order, and that with what the last such step lacked, which grows by the cube of the step."""

@@ -18,8 +18,8 @@ from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_fo
 from ..equations.carried import motion_of_frame, motion_of_point
 from ..equations.formulation import Acceleration
 from ..march import HALVINGS, Headway
+from .batch import REMEMBERED
 from .model import FailedError, SparseModel, Stand
-from .together import REMEMBERED
 
 
 def solve_sparse(

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ...program.fixed_order import FixedOrder
-from ...program.linked import Linker, Memory, Words, joined, numbers
+from ...program.linker import Linker, Memory, Words, joined, numbers
 from ...program.llvm.compiler import vector_width
-from ...program.llvm.machine_code import walker
+from ...program.llvm.machine_code import interpreter
 from ...program.memory import address, aligned
 from ...trajectory import Array
 from ..structure.factors import Indices, Ordered
+from .element_types import HOW, WHERE, ElementType
 from .elements import Elements
-from .kinds import HOW, WHERE, Kind
 from .turning import BY, TO, turned
 
 
@@ -28,7 +28,7 @@ class SparseTables:
 
     def __init__(self, elements: Elements, bodies: int) -> None:
         self.width = vector_width()
-        self._link, self._walk = Linker(self.width), walker(self.width)
+        self._link, self._interpret = Linker(self.width), interpreter(self.width)
         numbering, given = elements.numbering, Memory()
         self._zero, self._one = (given.take(1).start for _ in range(2))
         sizes = {"state": numbering.state, "drives": 5 * elements.drivers, "results": len(elements.results)}
@@ -53,7 +53,7 @@ class SparseTables:
         for rows, found in geometry:
             self._memory[rows] = found[:, None]
 
-    def _slots(self, kind: Kind, outputs: dict[str, Indices], geometry: slice) -> Indices:
+    def _slots(self, kind: ElementType, outputs: dict[str, Indices], geometry: slice) -> Indices:
         """Rows of the slots of each constraint of a kind."""
         found = np.zeros((len(kind.plan.slots), kind.lanes), np.intp)
         found[kind.inputs[WHERE]] = self._rows["state"].start + kind.read[WHERE]  # the drives come next
@@ -144,4 +144,4 @@ class SparseTables:
             self._go(table)
 
     def _go(self, table: Words) -> None:
-        self._walk(address(self._memory), address(table))
+        self._interpret(address(self._memory), address(table))

@@ -112,8 +112,8 @@ def processes(found: Bench) -> Section:
     ]
     notes = (
         "Seconds of fresh processes, files warm; stages are medians, beyond numpy: those after it, to the first solution. In "
-        "the course of ten more solves programs are compiled that are not in the cache; until then they are walked. Memory: the "
-        "most a process held; runs are of the first case, and in one process with their engine (--jobs 0).",
+        "the course of ten more solves programs are compiled that are not in the cache; until then they are interpreted. Memory: "
+        "the most a process held; runs are of the first case, and in one process with their engine (--jobs 0).",
     )
     headings = (
         "process",

@@ -35,7 +35,7 @@ def _export(options: argparse.Namespace, house: House) -> int:
 
     What the format has no place for goes into a second file beside the first: the constraints of a URDF.
     """
-    from ..writer import written
+    from ..model_writer import written
 
     if options.to not in house.writers:
         raise KincheckError(unknown("format", options.to, house.writers))

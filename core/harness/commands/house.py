@@ -17,7 +17,7 @@ from ..reading.supplied import NOTHING, Supplied
 if TYPE_CHECKING:
     from ..case import Case
     from ..engine import Engine
-    from ..writer import Writer
+    from ..model_writer import Writer
 
 
 class Status(IntEnum):

@@ -10,9 +10,9 @@ from msgspec.structs import replace
 from ...errors import KincheckError
 from ..attempt import Pair
 from ..case import Case
+from ..case_writer import case_text
 from ..engine import Engine
 from ..reading.coordinates import with_all_coordinates
-from ..writing import case_text
 from .families import Specimen
 from .outcomes import Judgement, Verdict, judged
 from .reduce import fewer_samples, reduced

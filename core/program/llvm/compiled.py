@@ -8,7 +8,7 @@ import pickle
 from collections.abc import Callable, Mapping
 from functools import cache
 
-from .. import shelf
+from .. import disk_cache
 from . import compiler, image
 
 
@@ -33,12 +33,12 @@ class Code:
 
 def load(content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None) -> Code:
     """Compile the text, or fetch what the content meant before."""
-    return Code(shelf.kept(told(content), lambda: _made(text())), signatures or {})
+    return Code(disk_cache.kept(told(content), lambda: _made(text())), signatures or {})
 
 
 def find(content: str) -> Code | None:
     """What the content meant before, if it was kept."""
-    code = shelf.find(told(content))
+    code = disk_cache.find(told(content))
     return None if code is None else Code(code, {})
 
 

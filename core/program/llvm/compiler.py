@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..shelf import kept
+from ..disk_cache import kept
 from . import image
 
 TRAITS = b"vendor_id", b"cpu family", b"model", b"stepping", b"flags"

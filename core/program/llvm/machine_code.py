@@ -1,4 +1,4 @@
-"""A plan that this processor can run: loops that are the same for all plans, and programs, walked or compiled."""
+"""A plan that this processor can run: loops that are the same for all plans, and programs, interpreted or compiled."""
 
 from __future__ import annotations
 
@@ -9,41 +9,41 @@ from functools import cache, partial
 from pathlib import Path
 from threading import Lock, Thread
 
-from .. import executor, lowering, shelf, trace, walk
+from .. import bytecode, disk_cache, executor, lowering, trace
 from ..executor import Plan
 from . import compiled, compiler
 from .code import declarations
 from .fan import fan
 from .follow import follow
+from .interpreter import interpret
 from .loops import parts, run, settle
 from .plan import PlanInMemory, rows
 from .programs import function
-from .walker import goes_through_tables
 
 _NEEDED = rows, settle
 LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {
-    "walk": ([goes_through_tables], {"walk": 2}),
+    "interpret": ([interpret], {"interpret": 2}),
     "follow": ([*_NEEDED, run, follow], {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3}),
     "fan": ([*_NEEDED, fan], {"fan": 11}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
 OFTEN, AGAIN, OPERATIONS = 150, 20, 3000
-"""Programs of so many operations are walked for so many groups of lanes; longer ones, which take longer to compile, for more.
-Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups of eight, and six sweeps of `kincheck run` are
-walked to the end. For those whose tables are in the cache somebody did come back: they are compiled after the second number, in the
-first sweep."""
+"""Programs of so many operations are interpreted for so many groups of lanes; longer ones, which take longer to compile, for more.
+Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups of eight, and six sweeps of `kincheck run`
+are interpreted to the end. For those whose tables are in the cache somebody did come back: they are compiled after the second
+number, in the first sweep."""
 
 
 class LlvmCode:
-    """A plan that this processor can run: its programs are walked at first, and compiled where they are run often.
+    """A plan that this processor can run: its programs are interpreted at first, and compiled where they are run often.
 
     Raises ImportError where llvmlite is missing.
 
     Attributes:
         stride: slots of a lane, with those after `Plan.slots` that programs keep their values in.
         memory: the plan, as loops read it.
-        walked: whether programs are not compiled yet.
+        interpreted: whether programs are not compiled yet.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -51,14 +51,17 @@ class LlvmCode:
         # what determines the code; writing its text takes longer than loading it
         self._content = repr([plan.programs, self.width, _sources()])
         code = compiled.find(self._content)
-        again = code is None and shelf.known(self._of_tables)
-        self.walked, tables = code is None, {} if code else self._tables()
+        again = code is None and disk_cache.known(self._of_tables)
+        self.interpreted, tables = code is None, {} if code else self._tables()
         self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
         self.memory = PlanInMemory(plan, self.width, self.stride)
         if code:
             self._take(code)
         for name, table in tables.items():
-            self.memory.entries[self.memory.calls[name]] = _loop("walk", self.width).address("walk"), table.words.ctypes.data
+            self.memory.entries[self.memory.calls[name]] = (
+                _loop("interpret", self.width).address("interpret"),
+                table.words.ctypes.data,
+            )
         operations = sum(len(each.nodes) for each in plan.programs.values())
         self._alive, self._left = tables, (AGAIN if again else OFTEN) * max(OPERATIONS, operations) // OPERATIONS
 
@@ -68,27 +71,27 @@ class LlvmCode:
 
     def count(self, groups: int) -> None:
         """Said by whoever has run programs for so many groups of lanes."""
-        if not self.walked:
+        if not self.interpreted:
             return
         self._left -= groups  # what is lost where two threads do so at once only delays compiling
         if self._left <= 0:
             with self._lock:  # what one thread compiled is not taken away from others that run it
-                if self.walked:
+                if self.interpreted:
                     self._take(compiled.load(self._content, self._text))
-                    self.walked = False
+                    self.interpreted = False
 
     def _take(self, code: compiled.Code) -> None:
         self._code = code
         for name, at in self.memory.calls.items():
             self.memory.entries[at, 0] = code.address(name)  # a function that is compiled needs no table
 
-    def _tables(self) -> dict[str, walk.Walk]:
+    def _tables(self) -> dict[str, bytecode.Bytecode]:
         slots = len(self.plan.slots)
 
         def made() -> bytes:
-            return pickle.dumps({name: walk.walk(each, slots, self.width) for name, each in self.plan.programs.items()})
+            return pickle.dumps({name: bytecode.bytecode(each, slots, self.width) for name, each in self.plan.programs.items()})
 
-        return pickle.loads(shelf.kept(self._of_tables, made))
+        return pickle.loads(disk_cache.kept(self._of_tables, made))
 
     @property
     def _of_tables(self) -> bytes:
@@ -106,15 +109,15 @@ def make_loops_ready() -> None:
     To import and to read files does: in a thread, beside whatever else Python does, that would take three times as long.
     """
     width = compiler.vector_width()
-    missing = [name for name in ("walk", "follow") if not shelf.known(compiled.told(_content(name, width)))]
+    missing = [name for name in ("interpret", "follow") if not disk_cache.known(compiled.told(_content(name, width)))]
     if missing:
         compiler.llvm()
         Thread(target=lambda: [_loop(name, width) for name in missing]).start()
 
 
-def walker(width: int) -> Callable[..., int]:
+def interpreter(width: int) -> Callable[..., int]:
     """A function that goes through a table: of the addresses of lanes and table."""
-    return _loop("walk", width).calls["walk"]
+    return _loop("interpret", width).calls["interpret"]
 
 
 def _loop(name: str, width: int) -> compiled.Code:
@@ -140,5 +143,8 @@ def _content(name: str, width: int) -> str:
 @cache
 def _sources() -> str:
     """A digest of all that writes text or tables: this room, and what it takes from others."""
-    files = *sorted(Path(__file__).parent.glob("*.py")), *(Path(str(each.__file__)) for each in (executor, lowering, trace, walk))
+    files = (
+        *sorted(Path(__file__).parent.glob("*.py")),
+        *(Path(str(each.__file__)) for each in (executor, lowering, trace, bytecode)),
+    )
     return hashlib.sha256(b"".join(each.read_bytes() for each in files)).hexdigest()

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.analysis.sparse import together as module
+from kincheck.core.analysis.sparse import batch as module
+from kincheck.core.analysis.sparse.batch import Batch
 from kincheck.core.analysis.sparse.model import SparseModel
 from kincheck.core.analysis.sparse.stand import Stand
 from kincheck.core.analysis.sparse.sweep import solve_sparse
 from kincheck.core.analysis.sparse.tables import SparseTables
-from kincheck.core.analysis.sparse.together import Together
 from kincheck.core.analysis.structure import factors
 from kincheck.core.harness.bench.ring import ring
 
@@ -76,8 +76,8 @@ def test_few_samples_are_not_worth_making_it_ready():
 
 def test_an_order_that_serves_no_longer_is_renewed(monkeypatch, alone):
     monkeypatch.setattr(factors, "PIVOT_THRESHOLD", 1.0)  # rows are exchanged, and not kept for as long as they may
-    ordered, order = list[float](), Together.order
-    monkeypatch.setattr(Together, "order", lambda self, model: order(self, model) or ordered.append(self._sign[0]))
+    ordered, order = list[float](), Batch.order
+    monkeypatch.setattr(Batch, "order", lambda self, model: order(self, model) or ordered.append(self._sign[0]))
     monkeypatch.setattr(module, "GROWTH", 1.5)
     path = turning(*np.linspace(0.0, 1.5, 100))
     found = solve_sparse(SparseModel(ring(12)), path, POINTS)

@@ -1,4 +1,4 @@
-"""Programs linked into one table (see `walk`): many lanes of them, and what is done in between, gone through in one call.
+"""Programs linked into one table (see `bytecode`): many lanes of them, and what is done in between, gone through in one call.
 
 All numbers stand in one memory of rows, a vector each. What a program reads and writes are rows of it, for every lane its own:
 nothing is gathered before and scattered after. A vector holds the same number of several cases.
@@ -11,8 +11,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from .bytecode import ARITY, KINDS, bytecode
 from .straight_line import Program
-from .walk import ARITY, KINDS, walk
 
 Rows = NDArray[np.intp]
 Words = NDArray[np.uint32]
@@ -75,7 +75,7 @@ class Linker:
             memory: gives the rows in between.
         """
         count, lanes = len(slots), len(slots.T)
-        table = walk(program, count, 1)  # bytes of a vector of one are as good as any
+        table = bytecode(program, count, 1)  # bytes of a vector of one are as good as any
         abreast = min(ABREAST, lanes)
         # the last group is filled up with the last lane, which gives the same once more
         groups = np.minimum(np.arange(-(-lanes // abreast) * abreast), lanes - 1).reshape(-1, abreast)

@@ -1,19 +1,19 @@
-"""LLVM code that goes through the table of a program: see `walk`."""
+"""LLVM code that goes through the table of a program: see `bytecode`."""
 
 from __future__ import annotations
 
-from ..walk import ARITY, KINDS
+from ..bytecode import ARITY, KINDS
 from .code import Lines
 
 MASK = "larger"
 """The operation whose values are true or false: all bits of a number, or none."""
 
 
-def goes_through_tables(width: int) -> str:
+def interpret(width: int) -> str:
     """A function of W lanes and a table."""
     kinds = "\n    ".join(f"i32 {kind}, label %kind{kind}" for kind in KINDS.values())
     ends = ", ".join(f"[%end, %kind{kind}_run]" for kind in KINDS.values())
-    return f"""define void @walk(ptr %lane, ptr %table) {{
+    return f"""define void @interpret(ptr %lane, ptr %table) {{
 entry:
   br label %next
 next:

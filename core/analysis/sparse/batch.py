@@ -32,7 +32,7 @@ GROWTH = 10.0 / PIVOT_THRESHOLD
 """The largest entry of L that is believed. SuperLU allows a tenth of it: a digit of the rates may be lost."""
 
 
-class Together:
+class Batch:
     """Samples of a model, as many as a vector has lanes.
 
     Attributes:

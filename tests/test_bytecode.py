@@ -1,4 +1,4 @@
-"""Programs that are walked as tables: the same numbers as compiled, to the last bit, and compiled only where they are run often."""
+"""Programs that are interpreted: the same numbers as compiled, to the last bit, and compiled only where they are run often."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from kincheck.core.analysis.sweep import follow
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, program
+from kincheck.core.program.bytecode import bytecode
 from kincheck.core.program.llvm import compiled, compiler
 from kincheck.core.program.llvm import machine_code as llvm
 from kincheck.core.program.lowering import lowered, unrolled
-from kincheck.core.program.walk import walk
 
 from .mechanisms import four_bar, mcpherson
 from .running import forget_recent
@@ -44,13 +44,13 @@ def cache(tmp_path, monkeypatch):
 
 
 def both(run: Callable[[LlvmCode], np.ndarray], plan: Plan) -> None:
-    """What is walked is what is compiled."""
+    """What is interpreted is what is compiled."""
     made = LlvmCode(plan)
-    assert made.walked
-    walked = run(made)
+    assert made.interpreted
+    interpreted = run(made)
     made.count(10**9)
-    assert not made.walked
-    np.testing.assert_array_equal(run(made), walked)
+    assert not made.interpreted
+    np.testing.assert_array_equal(run(made), interpreted)
 
 
 def every_slot(made: LlvmCode, name: str, lanes: int = 19) -> np.ndarray:
@@ -139,7 +139,7 @@ def test_cells_are_used_again():
     x = tape.input(0)
     for k in range(200):
         x = x * x + float(k % 3 + 2)
-    found = walk(program("f", tape, {1: x}), 2, 8)
+    found = bytecode(program("f", tape, {1: x}), 2, 8)
     assert found.cells <= 5
 
 
@@ -157,7 +157,7 @@ def sweeps(mechanism, driver: str, values: np.ndarray, **asked) -> tuple[Model, 
 def test_sweeps_are_the_same_before_and_after(order):
     model, found = sweeps(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), order=order)
     assert model._code is not None
-    assert not model._code.walked
+    assert not model._code.interpreted
     for each in found[1:]:
         np.testing.assert_array_equal(each, found[0])
 
@@ -167,7 +167,7 @@ def test_one_sweep_compiles_nothing():
     solve(mechanism, "stroke", np.linspace(-0.08, 0.08, 161))
     model = models.recent_model(mechanism, request_of(mechanism))
     assert model._code is not None
-    assert model._code.walked
+    assert model._code.interpreted
 
 
 def request_of(mechanism) -> Request:
@@ -188,9 +188,9 @@ def test_designs_and_components_are_the_same_before_and_after(way, monkeypatch):
         return [each.acceleration for each in found.values()]
 
     monkeypatch.setattr(llvm, "OFTEN", 10**9)
-    walked = run()
+    interpreted = run()
     monkeypatch.setattr(llvm, "OFTEN", 0)
-    for a, b in zip(walked, run(), strict=True):
+    for a, b in zip(interpreted, run(), strict=True):
         np.testing.assert_array_equal(a, b)
 
 
@@ -199,10 +199,10 @@ def test_many_designs_compile_their_programs():
     request = Request(("stroke",), ("wheel",), varied=(place,))
     route = Route(compile_model(mechanism, request), Path({"stroke": Ramp(1.0)}, np.linspace(-0.05, 0.05, 41)))
     rod = np.array([[1.115], [0.665], [0.118]]) + np.linspace(0.0, 0.01, 17)
-    assert route.model._code.walked
+    assert route.model._code.interpreted
     for _ in range(2):
         solve_variants(route, rod, 1e-12)
-    assert not route.model._code.walked
+    assert not route.model._code.interpreted
 
 
 def test_many_components_compile_their_programs():
@@ -210,9 +210,9 @@ def test_many_components_compile_their_programs():
     parts = components(mechanism, frames(mechanism))
     cascade = Cascade(mechanism, Request(("turn",), ()), parts)
     solver = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 65)))
-    assert all(kind.model._code.walked for kind in cascade.kinds)
+    assert all(kind.model._code.interpreted for kind in cascade.kinds)
     solver.solve(1e-12)
-    assert not any(kind.model._code.walked for kind in cascade.kinds if len(kind.members) > 1)
+    assert not any(kind.model._code.interpreted for kind in cascade.kinds if len(kind.members) > 1)
 
 
 def test_long_programs_are_walked_for_longer():
@@ -223,25 +223,25 @@ def test_long_programs_are_walked_for_longer():
     long = Program("f", program("f", tape, {2: x}).nodes, {2: llvm.OPERATIONS + 1})
     made = LlvmCode(Plan({"f": long, "g": replace(long, name="g")}, {"a": 0, "b": 1, "c": 2}))
     made.count(llvm.OFTEN)
-    assert made.walked
+    assert made.interpreted
     made.count(llvm.OFTEN + 1)
-    assert not made.walked
+    assert not made.interpreted
 
 
 def test_programs_that_another_process_walked_are_compiled_in_the_first_sweep():
     plan = compile_model(mcpherson(), Request(("stroke",), ())).plan  # its tables are in the cache now
     made = LlvmCode(plan)
     made.count(llvm.AGAIN - 1)
-    assert made.walked
+    assert made.interpreted
     made.count(1)
-    assert not made.walked
+    assert not made.interpreted
 
 
 def test_what_was_compiled_is_found_by_the_next_process():
     plan = compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan
-    assert LlvmCode(plan).walked
+    assert LlvmCode(plan).interpreted
     LlvmCode(plan).count(10**9)
-    assert not LlvmCode(plan).walked
+    assert not LlvmCode(plan).interpreted
 
 
 def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
@@ -255,10 +255,10 @@ def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
         patch.setattr(compiled, "load", interrupted)
         with pytest.raises(KeyboardInterrupt):
             made.count(10**9)
-    assert made.walked
+    assert made.interpreted
     np.testing.assert_array_equal(every_slot(made, "newton"), wanted)
     made.count(10**9)
-    assert not made.walked
+    assert not made.interpreted
     np.testing.assert_array_equal(every_slot(made, "newton"), wanted)
 
 

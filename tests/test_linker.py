@@ -7,14 +7,14 @@ import pytest
 from kincheck.core.algebra import root
 from kincheck.core.program import NumpyExecutor, Plan, Tape, cos, program, where_larger
 from kincheck.core.program.fixed_order import FixedOrder
-from kincheck.core.program.linked import MOST, Linker, Memory, joined, numbers
+from kincheck.core.program.linker import MOST, Linker, Memory, joined, numbers
 from kincheck.core.program.llvm.compiler import available, vector_width
 from kincheck.core.program.memory import address, aligned
 
 if not available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
-from kincheck.core.program.llvm.machine_code import walker
+from kincheck.core.program.llvm.machine_code import interpreter
 
 WIDTH = vector_width()
 
@@ -25,7 +25,7 @@ def gone_through(parts, memory: Memory, given: dict[int, np.ndarray]) -> np.ndar
     rows[:] = np.nan  # nothing is read that was not written
     for row, values in given.items():
         rows[row] = values
-    walker(WIDTH)(address(rows), address(words))
+    interpreter(WIDTH)(address(rows), address(words))
     return rows
 
 

@@ -71,7 +71,7 @@ class Beside:
     time: float
 
 
-class Walk:
+class ArclengthWalk:
     """Steps along the curve of poses of a system on a path."""
 
     def __init__(self, system: System, path: Path, tol: float) -> None:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 Made = TypeVar("Made")
 
 
-class Bound(local):
+class ThreadCache(local):
     """What is made of something, by key: made once for each thread, and kept as long as that lives."""
 
     def __init__(self) -> None:

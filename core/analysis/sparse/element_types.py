@@ -88,7 +88,7 @@ class Member:
         return (Relation if isinstance(c, Relation) else type(c.primitive), tuple(self.bodies(moving)), *named, zero)
 
 
-class Kind:
+class ElementType:
     """The constraints of one kind: what their programs read, and what they give, as traced.
 
     Slots of a lane: the numbers of its state and drive, those of its rates, its geometry, its outputs.

@@ -1,4 +1,4 @@
-"""Programs as tables of whole numbers, which `llvm.walker` goes through: nothing has to be compiled before they can be run.
+"""Programs as tables of whole numbers, which `llvm.interpreter` goes through: nothing has to be compiled before they can be run.
 
 A table is a list of stretches: the kind of an operation, how many bytes its rows take, and the rows: where the result goes and
 where the operands stand, in bytes from the lanes. Stretches are long: of what can be done next, all of one kind comes first.
@@ -28,7 +28,7 @@ KINDS = {op: kind for kind, op in enumerate(ARITY, 1)}
 
 
 @dataclass(frozen=True)
-class Walk:
+class Bytecode:
     """A program as a table.
 
     Attributes:
@@ -40,7 +40,7 @@ class Walk:
     cells: int
 
 
-def walk(program: Program, slots: int, width: int) -> Walk:
+def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     """A program as a table, for lanes of so many slots and of that width.
 
     Every value has a place: the slot it goes to, where nobody reads that, or a cell, which is free again after its last reader.
@@ -84,7 +84,7 @@ def walk(program: Program, slots: int, width: int) -> Walk:
         words += (KINDS["copy"], _bytes("copy", left))
         for at, k in left:
             words += (at, place[k])
-    return Walk(np.array([*words, 0, 0], np.uint32), cells - slots)
+    return Bytecode(np.array([*words, 0, 0], np.uint32), cells - slots)
 
 
 _NUMBER, _HALVES = struct.Struct("<d"), struct.Struct("<II")
