@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drivers import Driver
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..primitives.base import Drive
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
 from ..program.llvm.compiler import available
 from ..trajectory import Array
 from . import acceptance, prediction
+from .equations.drives import drive_numbers
 from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
 from .structure.components import Section
 from .thread_cache import ThreadCache
@@ -62,26 +61,6 @@ def recent_model(mechanism: Mechanism, request: Request) -> Model:
     Threads that ask for it at the same time may each make one.
     """
     return _recent(mechanism, request) if ours(mechanism) else compile_model(mechanism, request)
-
-
-def given_by(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
-    """The numbers of a `Drive` for each driver, in the mechanism's unit of length, shape (5 * drivers, n).
-
-    Args:
-        drive: value from the design, velocity and acceleration [SI], shape (3, drivers, n).
-    """
-    found = np.empty((len(drivers), 5, drive.shape[-1]))
-    for numbers, driver, motion in zip(found, drivers, drive.swapaxes(0, 1), strict=True):
-        numbers[:3] = motion * (1.0 if driver.turns else 1.0 / unit)
-        numbers[3], numbers[4] = np.cos(0.5 * motion[0]), np.sin(0.5 * motion[0])
-    return found.reshape(5 * len(drivers), drive.shape[-1])
-
-
-def standing_drives(mechanism: Mechanism, unit: float, change: Mapping[str, float]) -> dict[str, Drive]:
-    """Drivers by name that stand at values from the design [SI]."""
-    values = np.array([[*change.values()], *np.zeros((2, len(change)))])[..., None]
-    numbers = given_by([mechanism.driver(name) for name in change], values, unit).reshape(-1, 5).tolist()
-    return {name: Drive(*each) for name, each in zip(change, numbers, strict=True)}
 
 
 class Model:
@@ -223,7 +202,7 @@ class Model:
             drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, n).
         """
         drivers = [self.mechanism.driver(name) for name in self.request.drivers]
-        return np.concatenate([times[None], given_by(drivers, drive, self.frame.unit)])
+        return np.concatenate([times[None], drive_numbers(drivers, drive, self.frame.unit)])
 
     def moving(self, lane: Array, sample: Array) -> Array:
         """A lane that goes on from where a solved lane stands, with the rates that a sample of the drives gives it there."""

@@ -13,7 +13,7 @@ A cap on the turn of a step (0.15 to 1.2 rad) was tried besides: it changes thes
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from ...primitives.base import Pose
 from ...program import NumpyExecutor, Plan, Program, program
 from ...trajectory import Array, BodyMotion
 from ..equations.constraints import Style
+from ..equations.drives import standing_drives
 from ..equations.poses import displaced, state_of
 from ..programs import Tracer
 from ..request import CONSISTENT, Request
@@ -130,9 +131,8 @@ class Closing:
         mechanism = self.tracer.mechanism
         for name, value in state_of(self.tracer.formulation, mechanism, frame, poses, self.values).items():
             executor.put(vectors[name], np.array([np.broadcast_to(x, (n,)) for x in value]))
-        for name, value in self.values.items():
-            c = value if mechanism.driver(name).turns else value / frame.unit
-            executor.put(vectors[f"drive {name}"], np.array([[c], [0.0], [0.0], [np.cos(0.5 * value)], [np.sin(0.5 * value)]]))
+        for name, drive in standing_drives(mechanism, frame.unit, self.values).items():
+            executor.put(vectors[f"drive {name}"], np.array([astuple(drive)]).T)
         iterations, done = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
         for _ in range(MAX_ITERATIONS):
             executor.run("rows")

@@ -26,10 +26,11 @@ from ...trajectory import Array, Trajectory
 from ..equations.carried import position_of
 from ..equations.cartesian import Cartesian
 from ..equations.constraints import Frames
+from ..equations.drives import standing_drives
 from ..equations.formulation import Configuration
 from ..equations.geometry import kinds, placed, places
 from ..equations.poses import displaced, jacobian, state_of
-from ..model import compile_model, standing_drives
+from ..model import compile_model
 from ..request import Request
 from ..singular.choice import chosen
 from ..sweep import sweep

@@ -16,9 +16,10 @@ from ...mechanism import Mechanism
 from ...trajectory import Array
 from ..equations.cartesian import Cartesian
 from ..equations.constraints import frames
+from ..equations.drives import standing_drives
 from ..equations.formulation import Condition
 from ..equations.poses import jacobian
-from ..model import Model, recent_model, standing_drives
+from ..model import Model, recent_model
 from ..request import CONSISTENT, FROM, LARGEST_SIGMA, TIME
 from ..route import Route
 from ..structure.redundancy import independent_rows

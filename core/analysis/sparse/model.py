@@ -23,7 +23,8 @@ from ...motions import Path
 from ...trajectory import Array
 from ..continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
 from ..equations.constraints import constraints, measured
-from ..model import CLOSED, MAX_ITERATIONS, given_by
+from ..equations.drives import drive_numbers
+from ..model import CLOSED, MAX_ITERATIONS
 from ..prediction import ABOUT
 from ..request import CONSISTENT
 from ..structure.driven import locked_drivers
@@ -128,7 +129,7 @@ class SparseModel:
         """What `Elements.evaluate` wants of all drivers at the times, shape (5 * drivers, n)."""
         drivers = self.mechanism.drivers
         drive = path.drive([driver.name for driver in drivers], times) if drivers else np.empty((3, 0, len(times)))
-        return given_by(drivers, drive, self.frame.unit)
+        return drive_numbers(drivers, drive, self.frame.unit)
 
     def moved(self, state: Array, step: Array) -> Array:
         """The state after a step of the unknowns; the Euler parameters have length one again."""
