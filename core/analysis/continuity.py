@@ -13,7 +13,8 @@ LARGEST_DEVIATION = 0.25
 # Newton corrects a predicted pose by what its prediction lacks, of third order: on a sinusoid by a tenth of the way in steps of 45
 # degrees. At a quarter a loop of four bodies was found beyond the limit of its travel, in another assembly.
 LARGEST_CORRECTION = 0.1
-# Changes below this part of the mechanism's size are not another assembly: as well is a pose known where it is followed (FOLLOWED).
+# Changes below this part of the mechanism's size are not another assembly: where a motion is followed poses are known no better
+# (FOLLOWED).
 NEGLIGIBLE = 1e-8
 # A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or
 # parts of the mechanism's size, says nothing of what is between: a whole turn ends where it began, on whatever assembly.

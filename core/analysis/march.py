@@ -143,7 +143,7 @@ class Headway:
         # of the whole step, not of what is left: parts that become ever smaller would be gone by the hundred thousand
         if gone >= HEADWAY * abs(wanted - self.start):
             return ""
-        return f"{self.rounds} parts of the step were gone, and the next sample is as good as no nearer; give samples in between"
+        return f"{self.rounds} parts of the step were taken, and the next sample is hardly nearer; give samples in between"
 
 
 class Marcher:

@@ -30,9 +30,9 @@ NONE_VARIED = np.empty((0, 1))
 TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
 TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
-"""Of variants these: where there is a solution, how sure, and what it took; there are very many to be written."""
+"""Those kept of variants: where there is a solution, how sure, and what it took. Few, because variants are many."""
 TESTS_OF_PARTS = ("closure", SIGMA, ORIENTATION, LARGEST_SIGMA)
-"""Of parts of a large mechanism these: what the next sample is accepted by, and whose fault it is if it is not."""
+"""Those kept of parts of a large mechanism: what the next sample is accepted by, and whose fault it is if it is not."""
 LARGEST, SMALLEST = ("closure", "leftover"), (SIGMA,)
 """Tests of which the worst is found over all samples."""
 LARGEST_OF_PARTS, SMALLEST_OF_PARTS = (*LARGEST, ITERATIONS), (*SMALLEST, MARGIN)

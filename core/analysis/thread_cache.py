@@ -1,4 +1,4 @@
-"""What is made of something once, and kept with it."""
+"""A cache with a store for each thread: what is made of something is kept with it, and solved in place by one thread only."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Made = TypeVar("Made")
 
 
 class ThreadCache(local):
-    """What is made of something, by key: made once for each thread, and kept as long as that lives."""
+    """What is made of something, by key: once for each thread. It lives as long as the thread and the cache do."""
 
     def __init__(self) -> None:
         self._found: dict[Hashable, Any] = {}

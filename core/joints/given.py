@@ -41,7 +41,7 @@ def require_direction(who: str, numbers: Sequence[float]) -> None:
 
 
 def held(who: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
-    """So many things as a tuple, likewise."""
+    """A value as a tuple of so many items, or an error that names what was expected."""
     try:
         found = tuple(value.tolist() if hasattr(value, "tolist") else value)
     except TypeError:  # a number, or nothing

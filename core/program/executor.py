@@ -48,7 +48,7 @@ class Plan:
             there in all groups but the last that `extrapolate` goes by.
         past: the slot they begin to keep them at: those of sample k are at place k modulo `NODES`, those of groups in order.
         carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
-        continued: the same where those after it are not predicted by `predict`; as `carried` where nothing is said.
+        continued: the same where those after it are not predicted by `predict`; `carried`, unless it is given.
         kept: slots that are stored of every sample.
         largest, smallest: slots of which the largest and the smallest are found: by `follow` over the samples it keeps, by `parts`
             over the parts.

@@ -29,7 +29,7 @@ class Memory:
         self.count = 0
 
     def take(self, count: int) -> slice:
-        """So many more. Raises MemoryError where a table could not name them."""
+        """The next rows, as many as that. Raises MemoryError where a table could not name them."""
         first, self.count = self.count, self.count + count
         if self.count > MOST:
             raise MemoryError(f"{self.count} rows of numbers are asked for, a table names {MOST} at most")

@@ -40,7 +40,7 @@ from .turning import Turn
 MOVES = 1e-6
 """A body that moves at least this much, in a motion whose largest component is one, is free."""
 FEW = 5
-"""So many names are said in a message."""
+"""Names listed in a message, at most."""
 
 
 class FailedError(ArithmeticError):

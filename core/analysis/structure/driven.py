@@ -34,7 +34,7 @@ DENSE = 25
 # driver has a part there of one over the root of the rows that share in the contradiction: of a million, 1e-3.
 ROUNDS, LEFT = 2, 1e-6
 FEW = 5
-"""So many names are said in a message."""
+"""Names listed in a message, at most."""
 
 
 def require_driven(mechanism: Mechanism) -> None:

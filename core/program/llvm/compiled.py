@@ -16,8 +16,8 @@ class Code:
     """Machine code of functions; calls of them release Python's lock.
 
     Args:
-        signatures: by function, how many arguments it takes: addresses and whole numbers. All return a whole number, or nothing
-            of sense. Others are known by their address.
+        signatures: by function, how many arguments it takes: addresses and whole numbers. All return a whole number;
+            what those without a result return means nothing. Others are known by their address.
 
     Attributes:
         address: where the function of a name stands.
