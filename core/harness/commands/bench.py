@@ -136,12 +136,9 @@ def _with_one_thread(command: str, variables: Sequence[str]) -> int:
 
 
 def _destinations(options: argparse.Namespace, name: str) -> list[str]:
-    from ..reporting import deliver as delivery
+    from ..reporting.deliver import Destinations
 
-    problems: list[str] = []
-    names = [f"{name}.{kind}" for kind in ("json", "html")]
-    delivery.check_destinations(problems, out=options.out, json=options.json, names=names)
-    return problems
+    return Destinations.of(options).problems([f"{name}.{kind}" for kind in ("json", "html")])
 
 
 def _formulation(options: argparse.Namespace, house: House) -> int:

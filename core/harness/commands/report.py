@@ -59,12 +59,9 @@ def _report(options: argparse.Namespace, house: House) -> int:
     from ..regression.report import regressions
     from ..regression.subject import find, find_against
     from ..regression.summary import to_markdown
-    from ..reporting.deliver import check_destinations
+    from ..reporting.deliver import Destinations
 
-    problems: list[str] = []
-    files: dict[str, Any] = {name: getattr(options, name) for name in ("out", "json", "junit", "markdown")}
-    check_destinations(problems, **files, names=OUT)
-    if problems:
+    if problems := Destinations.of(options).problems(OUT):
         raise KincheckError("\n".join(problems))
     with ExitStack() as open_files:
         store = open_files.enter_context(Store(Path(options.history), writable=False)) if options.history else None

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from ..case import Case
     from ..engine import Engine
     from ..history.keeping import Keeping
-    from ..record import Record
+    from ..record import Record, Results
+    from ..reporting.deliver import Destinations
     from ..reporting.measures import Past
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized coordinates, and a thousandth of
@@ -99,10 +100,45 @@ def positive(text: str) -> float:
 
 def _run(options: argparse.Namespace, house: House) -> int:
     """Solve every case with every engine, judge each, print a table and write what was asked for."""
-    from .. import run as running
-    from ..probe import probes
     from ..reporting import deliver as delivery
-    from ..workers.distributed import ClusterError
+
+    to = delivery.Destinations.of(options)
+    cases, engines, baseline = _planned(options, house, to)
+    precision: Any = None
+    if options.bench is not None:
+        from ..bench.engines import efforts_in
+
+        precision = efforts_in(options.bench)
+    with delivery.json_only() if to.json == "-" else nullcontext():
+        results, problems, keeping = _solved(options, cases, engines, baseline)
+    if to.out or to.json or keeping:
+        from ..scene import with_scenes
+
+        results = with_scenes(results, cases)
+    history: Any = None
+    if keeping:
+        keeping.end(results, interrupted=bool(problems))
+        problems += keeping.problems
+        history = _trends(keeping) if to.out and not keeping.problems else None
+    delivery.deliver(results, problems, to, matrix=options.joints, precision=precision, history=history)
+    if options.explain:
+        from ..explain import explain
+
+        print(*(line for case in cases for line in explain(case)), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
+    problems += lacking(results, options.require)
+    complain(problems)
+    if problems:
+        return Status.FAILED
+    return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
+
+
+def _planned(options: argparse.Namespace, house: House, to: Destinations) -> tuple[list[Case], list[Engine], Engine | None]:
+    """The cases, the engines, and what to compare with where that is not among them.
+
+    Raises:
+        KincheckError: what cannot be done, all of it, and before anything is computed.
+    """
+    from ..probe import probes
 
     problems: list[str] = isolation.contradictions(options)
     if options.resume and options.history is None:
@@ -119,16 +155,19 @@ def _run(options: argparse.Namespace, house: House) -> int:
 
         cases = judged_by(cases, options.reference)
     engines, baseline = _engines(options, house, problems)
-    files: dict[str, Any] = {"out": options.out, "json": options.json, "junit": options.junit, "markdown": options.markdown}
-    delivery.check_destinations(problems, **files)
-    if problems:  # all of them, and before anything is computed
+    problems += to.problems()
+    if problems:
         raise KincheckError("\n".join(problems))
+    return cases, engines, baseline
 
-    precision: Any = None
-    if options.bench is not None:
-        from ..bench.engines import efforts_in
 
-        precision = efforts_in(options.bench)
+def _solved(
+    options: argparse.Namespace, cases: Sequence[Case], engines: Sequence[Engine], baseline: Engine | None
+) -> tuple[Results, list[str], Keeping | None]:
+    """The results, those made before an interrupt too, what interrupted them if something did, and their place in the history."""
+    from .. import run as running
+    from ..workers.distributed import ClusterError
+
     solver, settings = isolation.solver(options, engines)
     keeping = _keeping(options, cases, engines, settings)
     made = [*keeping.made] if keeping else []
@@ -146,36 +185,13 @@ def _run(options: argparse.Namespace, house: House) -> int:
         settings |= conditions()
     common: dict[str, Any] = {"tol": options.tol, "command": options.command, "facts": keeping.facts if keeping else settings}
     started = datetime.now(UTC)
-    stopped = False
-    with delivery.json_only() if options.json == "-" else nullcontext():
-        try:
-            results = running.run(cases, engines, progress=keep, baseline=baseline, solver=solver, made=made, **common)
-        except (KeyboardInterrupt, ClusterError) as reason:
-            plan = running.planned(cases, engines)
-            how = str(reason) or "interrupted"
-            problems.append(f"{how}: {len(records)} of {len(plan)} records were made and are kept")
-            stopped = True
-            records.sort(key=lambda each: plan.index((each.case, each.engine, each.mode)))
-            results = running.results(cases, records, started=started, plan=plan, **common)
-    if options.out or options.json or keeping:
-        from ..scene import with_scenes
-
-        results = with_scenes(results, cases)
-    history: Any = None
-    if keeping:
-        keeping.end(results, interrupted=stopped)
-        problems += keeping.problems
-        history = _trends(keeping) if options.out and not keeping.problems else None
-    delivery.deliver(results, problems, matrix=options.joints, precision=precision, history=history, **files)
-    if options.explain:
-        from ..explain import explain
-
-        print(*(line for case in cases for line in explain(case)), sep="\n", file=sys.stderr if options.json == "-" else sys.stdout)
-    problems += lacking(results, options.require)
-    complain(problems)
-    if problems:
-        return Status.FAILED
-    return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
+    try:
+        return running.run(cases, engines, progress=keep, baseline=baseline, solver=solver, made=made, **common), [], keeping
+    except (KeyboardInterrupt, ClusterError) as reason:
+        plan = running.planned(cases, engines)
+        records.sort(key=lambda each: plan.index((each.case, each.engine, each.mode)))
+        problem = f"{str(reason) or 'interrupted'}: {len(records)} of {len(plan)} records were made and are kept"
+        return running.results(cases, records, started=started, plan=plan, **common), [problem], keeping
 
 
 def _keeping(

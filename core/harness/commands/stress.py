@@ -76,7 +76,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
         return _replay(options, house, engines)
     known = Family.registry
     problems += [unknown("family", name, [*known]) for name in options.family if name not in known]
-    delivery.check_destinations(problems, out=options.out, json=options.json, names=FILES)
+    problems += delivery.Destinations.of(options).problems(FILES)
     if problems:
         raise KincheckError("\n".join(problems))
     with delivery.json_only() if options.json == "-" else nullcontext():

@@ -70,16 +70,14 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
 
     Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the work could not be done.
     """
-    from ..reporting import deliver as delivery
+    from ..reporting.deliver import Destinations
     from ..study.study import Study
     from ..study.sweep import how_many
     from ..study.vary import read_variation
 
     problems: list[str] = []
     names = ("results.json", "report.html") if options.replay else FILES
-    delivery.check_destinations(problems, out=options.out, json=options.json, names=names)
-    if options.store is not None:
-        delivery.check_destinations(problems, out=None, json=None, store=options.store)
+    problems += Destinations.of(options).problems(names)
     if options.scheduler is not None and options.jobs is not None:
         problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
     if options.replay and options.samples is not None:
@@ -181,7 +179,7 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
     cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
     results = running.run(cases, engines, tol=options.tol, command=options.command, solver=_solver(options, engines[-1]))
     problems: list[str] = []
-    delivery.deliver(results, problems, matrix=False, out=options.out, json=options.json, junit=None, markdown=None)
+    delivery.deliver(results, problems, delivery.Destinations.of(options))
     complain(problems)
     if problems:
         return Status.FAILED

@@ -106,11 +106,9 @@ def _facts(case: str, curves: list[Curve], design: float, unit: str) -> dict[str
 
 
 def _check(json: str | None) -> None:
-    from ..reporting.deliver import check_destinations
+    from ..reporting.deliver import Destinations
 
-    problems: list[str] = []
-    check_destinations(problems, out=None, json=json)
-    if problems:
+    if problems := Destinations(json=json).problems():
         raise KincheckError("\n".join(problems))
 
 

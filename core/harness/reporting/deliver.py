@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,30 +17,50 @@ if TYPE_CHECKING:  # what draws is imported where a report is asked for
     from .measures import Effort, Past
 
 
-def check_destinations(
-    problems: list[str],
-    *,
-    out: Path | None,
-    json: str | None,
-    junit: Path | None = None,
-    markdown: Path | None = None,
-    store: Path | None = None,
-    names: Sequence[str] = ("results.json", "report.html"),
-) -> None:
-    """Find out before the work, not after it, what cannot be written; makes the folder `out`, for files of these names."""
-    if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            problems.append(f"--out {out}: cannot be made a folder ({error.strerror}); give another one")
-            return
-    files = [] if out is None else [("--out", out / name) for name in names]
-    files += [("--json", Path(json))] if json not in (None, "-") else []
-    files += [("--junit", junit)] if junit is not None else []
-    files += [(option, file) for option, file in (("--markdown", markdown), ("--store", store)) if file is not None]
-    for option, path in files:
-        if path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-            problems.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
+REPORT = ("results.json", "report.html")
+"""The files of a folder of results."""
+
+
+@dataclass(frozen=True)
+class Destinations:
+    """Where results are to go; None where they are not wanted.
+
+    Attributes:
+        out: folder for the results and the report.
+        json: a file, or "-" for standard output, which then has nothing else.
+        junit: a file.
+        markdown: a file, for the matrix of cases and engines.
+        store: a file, for values in bulk.
+    """
+
+    out: Path | None = None
+    json: str | None = None
+    junit: Path | None = None
+    markdown: Path | None = None
+    store: Path | None = None
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Destinations:
+        """Those that a command's options name."""
+        return cls(**{each.name: getattr(options, each.name, None) for each in fields(cls)})
+
+    def problems(self, names: Sequence[str] = REPORT) -> list[str]:
+        """What cannot be written, found before the work and not after it; makes the folder, for files of these names."""
+        found, files = list[str](), list[tuple[str, Path]]()
+        if self.out is not None:
+            try:
+                self.out.mkdir(parents=True, exist_ok=True)
+                files += [("--out", self.out / name) for name in names]
+            except OSError as error:
+                found.append(f"--out {self.out}: cannot be made a folder ({error.strerror}); give another one")
+        if self.json not in (None, "-"):
+            files.append(("--json", Path(self.json)))
+        singles = (("--junit", self.junit), ("--markdown", self.markdown), ("--store", self.store))
+        files += [(option, file) for option, file in singles if file is not None]
+        for option, path in files:
+            if path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+                found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
+        return found
 
 
 @contextmanager
@@ -62,12 +84,9 @@ def json_only() -> Generator[None]:
 def deliver(
     results: Results,
     problems: list[str],
+    to: Destinations,
     *,
-    matrix: bool,
-    out: Path | None,
-    json: str | None,
-    junit: Path | None,
-    markdown: Path | None,
+    matrix: bool = False,
     precision: Mapping[str, Sequence[Effort]] | None = None,
     history: Mapping[str, Sequence[Past]] | None = None,
 ) -> None:
@@ -75,11 +94,7 @@ def deliver(
 
     Args:
         matrix: print a line for each case, and a column for each engine, rather than a line for each pair.
-        out: folder for results.json and report.html.
-        json: a file, or "-" for standard output, which then has nothing else.
-        junit: a file.
-        markdown: a file, for the matrix of cases and engines.
-        precision: error against time at several efforts, by case, for report.html.
+        precision: error against time at several efforts, by case, for the report.
         history: what the engines made of each case in the runs up to this one, likewise.
     """
     from .matrix import print_matrix, to_markdown
@@ -94,21 +109,21 @@ def deliver(
     def write_json(path: Path) -> None:
         path.write_bytes(to_json(results))
 
-    if junit is not None:
+    if to.junit is not None:
         from .junit import to_junit
 
-        write(junit, lambda path: path.write_bytes(to_junit(results)))
-    if markdown is not None:
-        write(markdown, lambda path: path.write_text(to_markdown(results), "utf-8"))
-    if out is not None:
-        write(out / "results.json", write_json)
-    if json not in (None, "-"):
-        write(Path(json), write_json)
-    (print_matrix if matrix else print_table)(results, sys.stderr if json == "-" else sys.stdout)
-    if json == "-":
+        write(to.junit, lambda path: path.write_bytes(to_junit(results)))
+    if to.markdown is not None:
+        write(to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8"))
+    if to.out is not None:
+        write(to.out / "results.json", write_json)
+    if to.json not in (None, "-"):
+        write(Path(to.json), write_json)
+    (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
+    if to.json == "-":
         sys.stdout.write(to_json(results).decode())
         sys.stdout.flush()
-    if out is not None:
+    if to.out is not None:
         from .report import write_report
 
-        write(out / "report.html", lambda path: write_report(results, path, history=history, precision=precision))
+        write(to.out / "report.html", lambda path: write_report(results, path, history=history, precision=precision))
