@@ -127,7 +127,12 @@ def test_the_state_of_a_repository(tmp_path):
     assert git_state(tmp_path) == {"commit": git("rev-parse", "HEAD"), "branch": "trunk", "changed": False}
     (tmp_path / "case.toml").write_text("b")
     git("checkout", "--detach")
-    assert git_state(tmp_path) == {"commit": git("rev-parse", "HEAD"), "branch": None, "changed": True}
+    found = git_state(tmp_path)
+    edits = found.pop("edits")
+    assert found == {"commit": git("rev-parse", "HEAD"), "branch": None, "changed": True}
+    assert git_state(tmp_path)["edits"] == edits
+    (tmp_path / "case.toml").write_text("c")
+    assert git_state(tmp_path)["edits"] != edits
 
 
 def test_calibration_is_a_time():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -91,7 +92,10 @@ def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
 
 
 def git_state(folder: Path) -> dict[str, Any] | None:
-    """Commit, branch (null where none is checked out) and whether files differ from it; None where there is no repository."""
+    """Commit, branch (null where none is checked out), whether files differ from it, and a digest of how where they do.
+
+    None where there is no repository.
+    """
 
     def git(*arguments: str) -> str | None:
         try:
@@ -104,10 +108,12 @@ def git_state(folder: Path) -> dict[str, Any] | None:
     changed = git("status", "--porcelain", "--untracked-files=no")
     if not commit:
         return None
+    edits = {"edits": hashlib.sha256((git("diff", "HEAD") or "").encode()).hexdigest()[:12]} if changed else {}
     return {
         "commit": commit,
         "branch": git("symbolic-ref", "--short", "HEAD"),
         "changed": None if changed is None else bool(changed),
+        **edits,
     }
 
 

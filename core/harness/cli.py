@@ -28,6 +28,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return int(options.do(options, house()))
     except KincheckError as error:
         complain(str(error).splitlines())
+    except KeyboardInterrupt:
+        complain(["interrupted"])
     except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception:  # a defect of ours: shown in full, and never taken for a deviation (Python's own status would be 1)

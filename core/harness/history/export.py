@@ -52,11 +52,14 @@ def _rows(store: Store, cases: Sequence[str], engines: Sequence[str]) -> Iterato
     chosen = [(column, names) for column, names in (("case", cases), ("engine", engines)) if names]
     where = " AND ".join(f'"{column}" IN ({", ".join("?" * len(names))})' for column, names in chosen) or "true"
     with store.explained("read"):
-        values = [name for _, names in chosen for name in names]
+        values = [name for _, wanted in chosen for name in wanted]
         cursor = store.connection.execute(f"SELECT * FROM measured WHERE {where}", values)
-        yield [tuple(name for name, *_ in cursor.description)]
+        names = tuple(name for name, *_ in cursor.description)
+        yield [names]
+        run, status = (names.index(name) for name in ("run", "status"))
+        now = {row.id: row.status for row in store.runs()}
         while rows := cursor.fetchmany(ROWS):
-            yield rows
+            yield [(*row[:status], now[row[run]], *row[status + 1 :]) for row in rows]
 
 
 def _csv(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..case import Case
-from ..circumstances import circumstances, conditions, plain
+from ..circumstances import circumstances, conditions, plain, references
 from ..engine import Engine
 from ..record import Record, Results
 from ..run import planned
@@ -65,7 +65,7 @@ def keep(
     settings: Mapping[str, Any],
     resume: bool,
 ) -> Keeping:
-    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits, versions and commit.
+    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits, versions, machine and files.
 
     Args:
         settings: further circumstances.
@@ -79,14 +79,15 @@ def keep(
     plan = planned(cases, engines)
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
     git: Mapping[str, Any] = facts["git"] or {}
-    code = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed")]
-    identity = digest(cases, plan, tol, limits, code)
+    code = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed", "edits")]
+    machine = [facts[name] for name in ("host", "processor")] + [(each.name, each.mode, each.version()) for each in engines]
+    identity = digest(cases, plan, tol, limits, code, machine)
     store = Store(path)
     try:
         earlier = store.resume_run(identity) if resume else None
         if earlier is not None:
             return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
-        run = store.begin_run(identity, plan, facts)
+        run = store.begin_run(identity, plan, facts, references(cases))
     except BaseException:
         store.close()
         raise

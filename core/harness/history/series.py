@@ -38,7 +38,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class History:
-    """Runs of a history that have an end, oldest first, and the entries of their pairs, likewise."""
+    """Runs of a history that nobody is writing, oldest first, and the entries of their pairs, likewise."""
 
     runs: Mapping[int, RunRow]
     pairs: Mapping[Pair, Sequence[Entry]]
@@ -116,15 +116,15 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
     return [row for row in store.runs() if row.status == "finished" and row.id in good and (before is None or row.id < before)]
 
 
-def present(store: Store, run: int) -> set[Pair]:
-    """The pairs of a run whose engine was there.
+def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
+    """Of the pairs of a run whose engine was there and able, the outputs and motions that were compared.
 
     Raises:
         HistoryError: the file cannot be read.
     """
-    query = "SELECT case_name, engine, mode FROM records WHERE run_id = ? AND outcome != ?"
-    with store.explained("read"):
-        return {*store.connection.execute(query, (run, Outcome.UNAVAILABLE)).fetchall()}
+    idle = Outcome.UNAVAILABLE, Outcome.UNSUPPORTED
+    able = ((pair, entry.errors) for pair, entry in _entries(store, run) if entry.outcome not in idle)
+    return {pair: {(output, motion) for output, each in errors.items() for motion, _ in each.items()} for pair, errors in able}
 
 
 def calibration(run: RunRow | Mapping[str, Any]) -> float | None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import sqlite3
 import zlib
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -30,7 +30,8 @@ from ..record import Record, Results
 from .owner import alive, owner
 from .schema import MIGRATIONS, check, migrate
 
-Status: TypeAlias = Literal["running", "finished", "interrupted"]
+Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
+"""The file says that a run is running until it ends; where its process is gone it was killed."""
 Plan: TypeAlias = Sequence[tuple[str, str, str]]
 
 # For another run to let go of the file [s]: it holds it for a millisecond a record. Longer, and something is wrong with it.
@@ -80,13 +81,16 @@ class Store:
         with suppress(sqlite3.Error):  # what was committed is on the disk; tidying up can fail on a full one
             self.connection.close()
 
-    def begin_run(self, identity: str, plan: Plan, circumstances: dict[str, Any]) -> int:
+    def begin_run(
+        self, identity: str, plan: Plan, circumstances: dict[str, Any], references: Mapping[str, Any] | None = None
+    ) -> int:
         """A new run; its number.
 
         Args:
             identity: by which it is found to be resumed: equal for runs that give the same records.
             plan: case, engine and mode of its pairs, in the order of the results.
             circumstances: as `Results.run`; among them when it started, and the command.
+            references: as `Results.references`, for whoever reads the run before it has ended, or if it never does.
         """
         started, command = circumstances["started"], circumstances["command"]
         row = (started, "running", command, identity, owner(), _json(plan), _json(circumstances))
@@ -95,7 +99,8 @@ class Store:
                 "INSERT INTO runs (started, status, command, identity, owner, plan, circumstances) VALUES (?, ?, ?, ?, ?, ?, ?)",
                 row,
             )
-        assert done.lastrowid is not None
+            assert done.lastrowid is not None
+            self._attach(done.lastrowid, "references", references or {})
         return done.lastrowid
 
     def resume_run(self, identity: str) -> RunRow | None:
@@ -108,13 +113,6 @@ class Store:
                     self.connection.execute(change, (owner(), run))
                     return self.run(run)
         return None
-
-    def at_work(self, run: int) -> bool:
-        """Whether a process is writing that run now: one without an end and without a process was ended by force."""
-        with self.explained("read"):
-            query = "SELECT owner FROM runs WHERE id = ? AND status = 'running'"
-            row = self.connection.execute(query, (run,)).fetchone()
-        return row is not None and alive(row[0])
 
     def add_record(self, run: int, record: Record) -> None:
         """Keep a record. A pair that has one keeps that: it is never there twice."""
@@ -151,7 +149,8 @@ class Store:
         """The run has ended. What the results have besides records, references above all, is kept with it."""
         with self._transaction():
             if results is not None:
-                self._attach(run, results)
+                for kind in (name for name in results.__struct_fields__ if name not in ("schema", "run", "records")):
+                    self._attach(run, kind, getattr(results, kind))
             self.connection.execute("UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run))
 
     def runs(self) -> list[RunRow]:
@@ -166,12 +165,19 @@ class Store:
             HistoryError: there is none.
         """
         with self.explained("read"):
-            query = "SELECT id, started, finished, status, command, plan, circumstances FROM runs WHERE id = ?"
+            query = "SELECT id, started, finished, status, command, plan, circumstances, owner FROM runs WHERE id = ?"
             row = self.connection.execute(query, (run,)).fetchone()
-        if row is None:
-            raise HistoryError(f"history {self.path}: there is no run {run}")
-        plan = msgspec.json.decode(row[5], type=list[tuple[str, str, str]])
-        return RunRow(*row[:5], plan=plan, circumstances=msgspec.json.decode(row[6]))
+            if row is not None:
+                return RunRow(
+                    id=row[0],
+                    started=row[1],
+                    finished=row[2],
+                    status="killed" if row[3] == "running" and not alive(row[7]) else row[3],
+                    command=row[4],
+                    plan=msgspec.json.decode(row[5], type=list[tuple[str, str, str]]),
+                    circumstances=msgspec.json.decode(row[6], type=dict[str, Any]),
+                )
+        raise HistoryError(f"history {self.path}: there is no run {run}")
 
     def records(self, run: int) -> list[Record]:
         """The records of a run, in the order of its plan."""
@@ -179,7 +185,7 @@ class Store:
         with self.explained("read"):
             rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
             records = [msgspec.json.decode(zlib.decompress(blob), type=Record) for (blob,) in rows]
-        return sorted(records, key=lambda each: place[each.case, each.engine, each.mode])
+        return sorted(records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place)))
 
     def results(self, run: int) -> Results:
         """A run as the command wrote it; of one without an end, what there is, and in `run["missing"]` what is not."""
@@ -193,13 +199,12 @@ class Store:
         whole: dict[str, Any] = {"run": facts, "records": [], **attached}
         return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
 
-    def _attach(self, run: int, results: Results) -> None:
-        for kind in (name for name in results.__struct_fields__ if name not in ("schema", "run", "records")):
-            for case, document in getattr(results, kind).items():
-                text = msgspec.json.encode(document)
-                digest = hashlib.sha256(text).hexdigest()
-                self.connection.execute("INSERT OR IGNORE INTO documents VALUES (?, ?)", (digest, zlib.compress(text)))
-                self.connection.execute("INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest))
+    def _attach(self, run: int, kind: str, documents: Mapping[str, Any]) -> None:
+        for case, document in documents.items():
+            text = msgspec.json.encode(document)
+            digest = hashlib.sha256(text).hexdigest()
+            self.connection.execute("INSERT OR IGNORE INTO documents VALUES (?, ?)", (digest, zlib.compress(text)))
+            self.connection.execute("INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest))
 
     def _writable(self) -> sqlite3.Connection:
         connection = sqlite3.connect(self.path, timeout=BUSY, isolation_level=None)

@@ -63,13 +63,19 @@ def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
     # an engine that only one of the runs has was not asked for in the other
     pairs: list[tuple[str, Any, Any]] = [(name, old[name], new[name]) for name in new if name in old]
     pairs += [(name, before.get(name), now.get(name)) for name in CIRCUMSTANCES]
-    pairs.append(("commit", _commit(before), _commit(now)))
+    pairs.append(("commit", _git(before, "commit"), _git(now, "commit")))
+    pairs.append(("uncommitted edits", _edits(before), _edits(now)))
     return [Change(what=what, before=a, now=b) for what, a, b in pairs if a != b]
 
 
-def _commit(facts: Mapping[str, Any]) -> str | None:
+def _git(facts: Mapping[str, Any], what: str) -> Any:
     git: Mapping[str, Any] = facts.get("git") or {}
-    return git.get("commit")
+    return git.get(what)
+
+
+def _edits(facts: Mapping[str, Any]) -> str | None:
+    """What tells edits apart: a digest, or where none was kept that there are some."""
+    return _git(facts, "edits") or ("some" if _git(facts, "changed") else None)
 
 
 def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:

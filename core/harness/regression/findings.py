@@ -117,7 +117,7 @@ class Loose(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         largest: the largest error in tolerances over all engines, motions and runs.
-        factor: by which the tolerance could be smaller.
+        factor: by which the tolerance could be smaller; null where all errors are exactly zero.
         why: the reason that the case gives for its tolerance; it may be the better one.
     """
 
@@ -125,7 +125,7 @@ class Loose(msgspec.Struct, frozen=True, kw_only=True):
     output: str
     runs: int
     largest: float
-    factor: float
+    factor: float | None
     why: str
 
 

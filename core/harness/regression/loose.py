@@ -31,7 +31,7 @@ def loose(history: History, cases: Mapping[str, Any]) -> list[Loose]:
             output=output,
             runs=len(runs[case, output]),
             largest=ratio,
-            factor=1.0 / (HEADROOM * ratio) if ratio else float("inf"),
+            factor=1.0 / (HEADROOM * ratio) if ratio else None,
             why=str(_facts(cases, case, output).get("why", "")),
         )
         for (case, output), ratio in sorted(largest.items())

@@ -7,7 +7,8 @@ import msgspec
 from ..history.series import NIGHTS, NOTHING, History, read
 from ..history.store import Store
 from .compare import changes, compare, same_machine, unmade
-from .findings import Finding, Regressions, Step
+from .creeping import crept
+from .findings import Finding, Kind, Regressions, Step
 from .limits import slowest
 from .loose import loose
 from .steps import OUTCOME, TIME, steps
@@ -27,12 +28,13 @@ def regressions(subject: Subject, against: Subject | None, reason: str, store: S
         HistoryError: the history cannot be read.
     """
     around = _around(subject, store)
-    limit = slowest(_alike(subject, around, before=subject.number))
+    limit = slowest(_alike(subject, around, before=subject.before))
     standing = steps(around, standing=True)
     found = unmade(subject)
     if against is not None:
         then = NOTHING if against.number is None else _alike(subject, around, before=against.number + 1)
         found += compare(subject, against, then, limit)
+        found += crept(subject, around, found)
     records = subject.results.records
     return Regressions(
         run=subject.label,
@@ -53,7 +55,7 @@ def _around(subject: Subject, store: Store | None) -> History:
     if store is None:
         return NOTHING
     cases = list(dict.fromkeys(record.case for record in subject.results.records))
-    before = None if subject.number is None else subject.number + 1
+    before = subject.before if subject.number is None else subject.number + 1
     return read(store, before=before, last=NIGHTS, cases=cases)
 
 
@@ -71,8 +73,9 @@ def _alike(subject: Subject, around: History, *, before: int | None) -> History:
 
 def _since(finding: Finding, standing: list[Step]) -> Finding:
     """With the first run that has it, where a step says so."""
-    quantity = {"slower": TIME, "new failure": OUTCOME}.get(finding.kind, finding.motion)
+    quantity = {Kind.SLOWER: TIME, Kind.FAILURE: OUTCOME, Kind.DRIFTED: finding.motion}.get(finding.kind)
+    about = (finding.case, finding.engine, finding.mode, quantity, finding.output if finding.kind is Kind.DRIFTED else None)
     for step in standing:
-        if (step.case, step.engine, step.mode, step.quantity) == (finding.case, finding.engine, finding.mode, quantity):
+        if (step.case, step.engine, step.mode, step.quantity, step.output) == about:
             return msgspec.structs.replace(finding, since=step.first)
     return finding

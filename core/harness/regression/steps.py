@@ -14,6 +14,7 @@ from ..case import Array
 from ..history.series import Entry, History, Pair, calibration
 from ..history.store import RunRow
 from ..history.trends import unit_of
+from ..record import Deviation
 from ..reporting.wording import MOTIONS
 from .compare import changes
 from .findings import Change, Step
@@ -37,10 +38,10 @@ _Series: TypeAlias = Sequence[tuple[Entry, float]]
 
 @dataclass(frozen=True)
 class _Found:
-    """A change of level: indices into the series of the last value before it and of the first after it, and the levels."""
+    """A change of level: indices into the series of the values before it and of those after it, and the levels."""
 
-    last: int
-    first: int
+    earlier: range
+    later: range
     before: float
     now: float
 
@@ -118,7 +119,7 @@ def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]
             series.append((entry, math.log(entry.seconds / loop)))
     found: list[Step] = []
     for each in _levels(series, math.log(PACE), LASTING):
-        loop = calibration(history.runs[series[each.first][0].run]) or 1.0
+        loop = calibration(history.runs[series[each.later[0]][0].run]) or 1.0
         before, now = (math.exp(level) * loop for level in (each.before, each.now))
         if abs(now - before) > TIME_FLOOR:
             found.append(_levelled(pair, TIME, None, series, each, before, now, history))
@@ -129,19 +130,27 @@ def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str)
     """Where the error of an output has changed; of several outputs that changed in the same run, the one that did most."""
     largest: dict[tuple[int, bool], tuple[float, Step]] = {}
     for output in dict.fromkeys(output for entry in entries for output in entry.errors):
-        series: list[tuple[Entry, float]] = []
-        for entry in entries:
-            deviation = getattr(entry.errors.get(output), motion, None)
-            # below the floor one error is like another
-            floor = DRIFT_FLOOR * deviation.tolerance if deviation else 0.0
-            if deviation and max(deviation.max_abs, floor) > 0.0:
-                series.append((entry, math.log(max(deviation.max_abs, floor))))
+        errors = errors_of(entries, output, motion)
+        series = [(entry, math.log(size)) for (entry, _), size in zip(errors, above_floor(errors), strict=True)]
         for each in _levels(series, math.log(DRIFT), 1):
-            step = _levelled(pair, motion, output, series, each, math.exp(each.before), math.exp(each.now), history)
+            before, now = (float(np.median([errors[k][1].max_abs for k in part])) for part in (each.earlier, each.later))
+            step = _levelled(pair, motion, output, series, each, before, now, history)
             key, size = (step.first, step.worse), abs(each.now - each.before)
             if key not in largest or size > largest[key][0]:
                 largest[key] = size, step
     return [step for _, step in sorted(largest.values(), key=lambda each: each[1].first)]
+
+
+def errors_of(entries: Sequence[Entry], output: str, motion: str) -> list[tuple[Entry, Deviation]]:
+    """The errors of an output where they were found, but for those of nothing that is held to nothing."""
+    found = [(entry, getattr(entry.errors.get(output), motion, None)) for entry in entries]
+    return [(entry, each) for entry, each in found if each is not None and max(each.max_abs, each.tolerance) > 0.0]
+
+
+def above_floor(errors: Sequence[tuple[Entry, Deviation]]) -> list[float]:
+    """Sizes of errors, none below one floor for all: there one is like another, whatever the tolerance was then."""
+    floor = DRIFT_FLOOR * min((each.tolerance for _, each in errors if each.tolerance > 0.0), default=0.0)
+    return [max(each.max_abs, floor) for _, each in errors]
 
 
 def _levels(series: _Series, least: float, lasting: int) -> Iterator[_Found]:
@@ -149,13 +158,13 @@ def _levels(series: _Series, least: float, lasting: int) -> Iterator[_Found]:
     places = change_points(values, least=least, lasting=lasting)
     for before, place, after in zip([0, *places], places, [*places[1:], len(values)], strict=False):
         levels = float(np.median(values[before:place])), float(np.median(values[place:after]))
-        yield _Found(place - 1, place, *levels)
+        yield _Found(range(before, place), range(place, after), *levels)
 
 
 def _levelled(
     pair: Pair, quantity: str, output: str | None, series: _Series, found: _Found, before: float, now: float, history: History
 ) -> Step:
-    a, b = series[found.last][0], series[found.first][0]
+    a, b = series[found.earlier[-1]][0], series[found.later[0]][0]
     return _step(pair, quantity, output, a, b, history, worse=now > before, before=before, now=now)
 
 

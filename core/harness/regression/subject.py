@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import KincheckError
-from ..history.series import NIGHTS, Pair, green, present
+from ..history.series import Pair, compared, green
 from ..history.store import RunRow, Store
 from ..reading.results import read_results
 from ..record import Results
@@ -23,12 +23,14 @@ class Subject:
     """A run to be compared.
 
     Attributes:
-        number: in the history; None for one from a file.
+        number: in the history; None for one that it does not have.
+        before: runs of smaller numbers are earlier; None: all are.
     """
 
     name: str
     number: int | None
     results: Results
+    before: int | None
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -52,14 +54,17 @@ def find(name: str | None, store: Store | None) -> Subject:
         KincheckError: there is none, or it cannot be read.
     """
     if name is not None and not name.isdecimal():
-        return _in_file(Path(name))
+        return _in_file(Path(name), store)
     if store is None:
         raise KincheckError(
             f"report: {'no run' if name is None else f'run {name}'} without a history; give --history FILE, or a results.json"
         )
     if name is not None:
-        return _kept(store, store.run(int(name)))
-    row = next((row for row in store.runs() if not store.at_work(row.id)), None)
+        row = store.run(int(name))
+        if row.status == "running":
+            raise KincheckError(f"report: run {row.id} is being made now; report it when it has ended")
+        return _kept(store, row)
+    row = next((row for row in store.runs() if row.status != "running"), None)
     if row is None:
         raise KincheckError(f"history {store.path}: no run to report; `kincheck run --history {store.path}` makes one")
     return _kept(store, row)
@@ -76,10 +81,10 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
             return None, f"{name} is found in a history, and there is none"
         branch = name.removesuffix(BASELINE)
         if name == LAST_GREEN:
-            # with engines that were there: one that is gone since would be told of once, and never again
-            row = _most_alike(green(store, before=subject.number)[:NIGHTS], subject, lambda row: present(store, row.id))
+            # what is not compared any more would be told of once, and never again
+            row = _most(green(store, before=subject.before), lambda row: _compared(store, row, subject))
         else:
-            row = _most_alike(_of_branch(store, branch, subject), subject, lambda row: {*row.plan})
+            row = _most(_of_branch(store, branch, subject), lambda row: len(_pairs(subject) & {*row.plan}))
         if row is not None:
             return _kept(store, row, name.replace("-", " ")), ""
         if name == LAST_GREEN:
@@ -95,16 +100,20 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
     return against, ""
 
 
-def _in_file(file: Path) -> Subject:
+def _in_file(file: Path, store: Store | None) -> Subject:
     if not file.exists():
         known = f"a number of the history, a results.json, {LAST_GREEN} or BRANCH{BASELINE}"
         raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
-    return Subject(str(file), None, read_results(file))
+    results = read_results(file)
+    rows, told = store.runs() if store else [], results.run
+    same = [row.id for row in rows if all(row.circumstances.get(key) == told.get(key) for key in ("started", "host", "command"))]
+    later = [row.id for row in rows if row.started > str(told.get("started", "~"))]
+    return Subject(str(file), max(same, default=None), results, max(same, default=min(later, default=None)))
 
 
 def _kept(store: Store, row: RunRow, rule: str = "") -> Subject:
-    status = "" if row.status == "finished" else f", {'without an end' if row.status == 'running' else row.status}"
-    return Subject(f"run {row.id}" + (f" ({rule})" if rule else "") + status, row.id, store.results(row.id))
+    status = "" if row.status == "finished" else f", {'without an end' if row.status == 'killed' else row.status}"
+    return Subject(f"run {row.id}" + (f" ({rule})" if rule else "") + status, row.id, store.results(row.id), row.id)
 
 
 def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
@@ -112,15 +121,26 @@ def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
 
     def fits(row: RunRow) -> bool:
         git: dict[str, Any] = row.circumstances.get("git") or {}
-        earlier = subject.number is None or row.id < subject.number
+        earlier = subject.before is None or row.id < subject.before
         return row.status == "finished" and earlier and git.get("branch") == branch and not git.get("changed")
 
     return [row for row in store.runs() if fits(row)]
 
 
-def _most_alike(rows: list[RunRow], subject: Subject, there: Callable[[RunRow], set[Pair]]) -> RunRow | None:
-    """The run that has most of the subject's pairs, the latest of several; None where none has any."""
-    pairs = {(record.case, record.engine, record.mode) for record in subject.results.records} | {*subject.results.missing}
-    shared: Callable[[RunRow], int] = lambda row: len(pairs & there(row))  # noqa: E731
-    best = max(rows, key=lambda row: (shared(row), row.id), default=None)
-    return best if best is not None and shared(best) else None
+def _pairs(subject: Subject) -> set[Pair]:
+    return {(record.case, record.engine, record.mode) for record in subject.results.records} | {*subject.results.missing}
+
+
+def _compared(store: Store, row: RunRow, subject: Subject) -> int:
+    """How much of what the subject was to compare was compared in a run: outputs that a case has no more do not count."""
+    outputs = {(record.case, record.engine, record.mode): {*record.errors} for record in subject.results.records}
+    there = compared(store, row.id)
+    return sum(1 + len([output for output, _ in there[pair] if output in (outputs.get(pair) or {output})])
+               for pair in _pairs(subject) & there.keys())  # fmt: skip
+
+
+def _most(rows: list[RunRow], shared: Callable[[RunRow], int]) -> RunRow | None:
+    """The run that shares most, the latest of several; None where none shares anything."""
+    amounts = {row.id: shared(row) for row in rows}
+    best = max(rows, key=lambda row: (amounts[row.id], row.id), default=None)
+    return best if best is not None and amounts[best.id] else None

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from ..markdown import escaped, row
 from ..reporting.wording import product
 from .findings import WHY, Kind, Regressions, Step
-from .wording import LONGEST, headline, loose_says, rows, step_says
+from .wording import LONGEST, headline, loose_says, pairs, rows, step_says
 
 
 def to_markdown(found: Regressions) -> str:
@@ -47,7 +47,7 @@ def _lines(found: Regressions) -> Iterator[str]:
         if not group:
             continue
         folded = not kind.regression and kind is not Kind.FIXED
-        title = f"{kind.capitalize()} ({len(group)}): {WHY[kind]}"
+        title = f"{kind.capitalize()} ({len(pairs(found, kind))}): {WHY[kind]}"
         yield from [f"<details><summary>{escaped(title)}</summary>", ""] if folded else [f"**{escaped(title)}**", ""]
         yield from ("| engine | case | what |", "| --- | --- | --- |")
         for each in group[:LONGEST]:

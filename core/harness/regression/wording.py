@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -49,10 +50,10 @@ def headline(found: Regressions) -> str:
         # with nothing to compare with there are no other regressions
         failing += f", {len(found.regressions)} never made" if found.regressions else ""
         return f"{found.run.name}: {failing}; compared with nothing: {found.reason}"
-    counts = [f"{len(_pairs(found, kind))} {_plural(kind, found)}" for kind in Kind if kind.regression and _pairs(found, kind)]
+    counts = [f"{len(pairs(found, kind))} {_plural(kind, found)}" for kind in Kind if kind.regression and pairs(found, kind)]
     said = ", ".join(counts) or "nothing regressed"
-    fixed = len(_pairs(found, Kind.FIXED))
-    known = len(found.failing) - len(_pairs(found, Kind.FAILURE))
+    fixed = len(pairs(found, Kind.FIXED))
+    known = len(found.failing) - len(pairs(found, Kind.FAILURE))
     rest = [f"{fixed} fixed"] if fixed else []
     rest += [f"{known} not right before either"] if known > 0 else []
     rest += [", ".join(map(str, versions(found)))] if versions(found) else []
@@ -64,13 +65,14 @@ def versions(found: Regressions) -> list[str]:
     return [str(change) for change in found.changes if change.what not in ("host", "processor", "platform", "commit", "tol")]
 
 
-def _pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
+def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
+    """The pairs that findings of a kind are about."""
     return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
 
 
 def _plural(kind: Kind, found: Regressions) -> str:
     if kind is Kind.FAILURE:
-        return "new failure" + ("s" if len(_pairs(found, kind)) > 1 else "")
+        return "new failure" + ("s" if len(pairs(found, kind)) > 1 else "")
     return "with something lost" if kind is Kind.LOST else "less accurate" if kind is Kind.DRIFTED else str(kind)
 
 
@@ -106,8 +108,9 @@ def loose_says(loose: Sequence[Loose]) -> list[str]:
         by_case.setdefault(each.case, []).append(each)
     lines: list[str] = []
     for case, each in by_case.items():
-        least = min(each, key=lambda one: one.factor)
+        least = min(each, key=lambda one: one.factor or math.inf)
         many = f"{len(each)} outputs" if len(each) > 1 else least.output
         reason = f"; its reason: {least.why}" if least.why else ""
-        lines.append(f"{case}: {many}, {number(least.factor)} times or more, by {least.runs} runs{reason}")
+        factor = f"{number(least.factor)} times or more" if least.factor else "as far as you like, all errors are zero"
+        lines.append(f"{case}: {many}, {factor}, by {least.runs} runs{reason}")
     return lines

@@ -20,7 +20,7 @@ from .caveats import COMPARED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
-from .wording import MOTIONS, TRUTHS, against, engine_name, known, number, output_label
+from .wording import MOTIONS, TRUTHS, against, engine_name, known, number, output_label, product
 
 NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
@@ -57,7 +57,8 @@ def render(given: Material, changes: Markup | None = None) -> str:
     # Loaded here, for runs that write no report; the package has no types.
     plotly: Any = importlib.import_module("plotly.offline")
     records = given.results.records
-    names = dict.fromkeys(engine_name(record) for record in records)
+    never = {(case, product(engine, mode)) for case, engine, mode in given.results.missing}
+    names = dict.fromkeys([*(engine_name(record) for record in records), *sorted(name for _, name in never)])
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}
     figures: dict[str, Figure] = {}
     case_names = dict.fromkeys(record.case for record in records)
@@ -84,6 +85,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
             cases=cases,
             references=given.results.references,
             caveats=caveats(given.results),
+            never=never,
             truths=TRUTHS,
             motions=MOTIONS,
             compared=COMPARED,
@@ -121,11 +123,15 @@ def headline(results: Results) -> str:
     """The run in one sentence."""
     records, missing = results.records, len(results.missing)
     compared, broken = [record for record in records if judged([record])], _count(records, *BROKEN)
-    failed = _count(compared, Outcome.FAIL)
+    failed = [record for record in compared if record.outcome is Outcome.FAIL]
+    outside = sum(any(not each.within for found in record.errors.values() for _, each in found.items()) for record in failed)
+    short = len(failed) - outside  # within tolerance where there is something to compare
+    counts = [f"{outside} of {len(compared)} comparisons {'is' if outside == 1 else 'are'} outside tolerance"] if outside else []
+    counts += [f"{short} of {len(compared)} comparisons {'lacks' if short == 1 else 'lack'} samples or motions"] if short else []
     if not compared:
         said = "Nothing was compared"
     elif failed:
-        said = f"{failed} of {len(compared)} comparisons {'is' if failed == 1 else 'are'} outside tolerance"
+        said = ", ".join(counts)
     else:
         said = (
             f"All {len(compared)} comparisons are within tolerance"
