@@ -138,6 +138,13 @@ def test_a_step_that_was_told_is_not_told_again(path):
         keep(path, changed(records(), **worse(100.0)))
     assert [told(reported(path, run)) for run in ("4", "5", "6")] == [{(Kind.DRIFTED, *FIRST)}, set(), set()]
     assert [(step.first, step.last) for step in reported(path).steps] == [(4, 3)]
+    assert [each.since for each in reported(path, "4").regressions] == [4]
+
+
+def test_a_wide_tolerance_later_does_not_hide_a_step(path):
+    for factor, wide in ((1.0, 1.0), (1.0, 1.0), (100.0, 1.0), (100.0, 1e4)):
+        keep(path, changed(changed(records(), **worse(factor)), **held_to(wide)))
+    assert [(step.first, step.now / step.before) for step in reported(path).steps] == [(3, pytest.approx(100.0))]
 
 
 def test_the_first_bad_run_may_be_one_that_was_killed(path, capsys):

@@ -119,6 +119,19 @@ def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_wi
     assert "no reference: compared with nothing" in page.text
 
 
+def test_samples_that_are_missing_are_not_called_out_of_tolerance(tmp_path: Path) -> None:
+    run = results()
+    fine = {
+        name: msgspec.structs.replace(
+            each, **{motion: msgspec.structs.replace(found, within=True) for motion, found in each.items()}
+        )
+        for name, each in run.records[1].errors.items()
+    }
+    short = msgspec.structs.replace(run.records[1], errors=fine)
+    page = report(Results(run=run.run, records=[run.records[0], short, run.records[2]]), tmp_path)
+    assert "1 of 2 comparisons lacks samples" in page.text
+
+
 def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path: Path) -> None:
     run = results()
     page = report(run, tmp_path)

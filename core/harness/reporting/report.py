@@ -127,7 +127,7 @@ def headline(results: Results) -> str:
     outside = sum(any(not each.within for found in record.errors.values() for _, each in found.items()) for record in failed)
     short = len(failed) - outside  # within tolerance where there is something to compare
     counts = [f"{outside} of {len(compared)} comparisons {'is' if outside == 1 else 'are'} outside tolerance"] if outside else []
-    counts += [f"{short} of {len(compared)} comparisons {'lacks' if short == 1 else 'lack'} samples or motions"] if short else []
+    counts += [f"{short} of {len(compared)} comparisons {'lacks' if short == 1 else 'lack'} samples"] if short else []
     if not compared:
         said = "Nothing was compared"
     elif failed:
