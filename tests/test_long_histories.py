@@ -1,5 +1,8 @@
 """Reports over many nights: what stays wrong is told every night, what grows slowly is told, and nothing is made up."""
 
+import os
+from pathlib import Path
+
 import msgspec
 import pytest
 from kincheck.core.harness import cli
@@ -8,6 +11,7 @@ from kincheck.core.harness.history.store import Store
 from kincheck.core.harness.record import Outcome, to_json
 from kincheck.core.harness.regression.findings import Kind
 from kincheck.core.harness.regression.subject import find, find_against
+from kincheck.core.harness.reporting.deliver import written
 
 from .fakes import Fake, crank
 from .nights import changed, keep, nights, records, worse
@@ -211,3 +215,20 @@ def test_an_interrupt_is_no_traceback(capsys, monkeypatch):
     monkeypatch.setattr("kincheck.core.harness.commands.list._list", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     assert cli.main(["list"]) == 2
     assert capsys.readouterr().err == "kincheck: interrupted\n"
+
+
+def test_a_file_that_cannot_be_finished_leaves_what_stood_there(tmp_path):
+    def half(path):
+        path.write_text("half of it")
+        raise OSError(28, "No space left on device")
+
+    file = tmp_path / "report.html"
+    file.write_text("yesterday's")
+    assert written(file, half) == [f"{file}: cannot be written (No space left on device); what else was asked for is tried"]
+    assert (file.read_text(), [*tmp_path.iterdir()]) == ("yesterday's", [file])
+    link = tmp_path / "latest.html"
+    link.symlink_to(file)
+    assert written(link, lambda path: path.write_text("today's")) == []
+    assert (link.is_symlink(), file.read_text()) == (True, "today's")
+    assert written(Path(os.devnull), lambda path: path.write_text("nowhere")) == []
+    assert not Path(os.devnull).is_file()

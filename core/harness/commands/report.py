@@ -83,6 +83,7 @@ def _write(options: argparse.Namespace, subject: Subject, found: Regressions, st
     from ..record import to_json
     from ..regression.junit import to_regression_junit
     from ..regression.summary import to_markdown, to_markup
+    from ..reporting.deliver import written
     from ..reporting.report import write_report
 
     def page(path: Path) -> None:
@@ -99,10 +100,7 @@ def _write(options: argparse.Namespace, subject: Subject, found: Regressions, st
     named = (("regressions.json", options.json), ("regressions.md", options.markdown), ("junit.xml", options.junit))
     wanted += [(Path(path), contents[name]) for name, path in named if path not in (None, "-")]
     for path, write in wanted:
-        try:
-            write(path)
-        except OSError as error:
-            problems.append(f"{path}: cannot be written ({error.strerror}); the other files are there")
+        problems += written(path, write)
     if options.json == "-":
         sys.stdout.write(to_json(found).decode())
         sys.stdout.flush()

@@ -81,6 +81,30 @@ def json_only() -> Generator[None]:
         os.close(kept)
 
 
+def written(path: Path, content: Callable[[Path], object]) -> list[str]:
+    """Write a file whole or not at all, what stood there until then; or why it cannot be.
+
+    Args:
+        content: writes to the path that it is given.
+    """
+    whole = path.resolve()  # what a link leads to
+    if whole.exists() and not whole.is_file():  # a pipe, or a device
+        whole, part = path, path
+    else:
+        part = whole.with_name(f".{whole.name}.part")
+    try:
+        try:
+            content(part)
+            if part != whole:
+                part.replace(whole)
+        finally:
+            if part != whole:
+                part.unlink(missing_ok=True)
+    except OSError as error:
+        return [f"{path}: cannot be written ({error.strerror}); what else was asked for is tried"]
+    return []
+
+
 def deliver(
     results: Results,
     problems: list[str],
@@ -101,10 +125,7 @@ def deliver(
     from .table import print_table
 
     def write(path: Path, content: Callable[[Path], object]) -> None:
-        try:
-            content(path)
-        except OSError as error:
-            problems.append(f"{path}: cannot be written ({error.strerror}); the other results are kept")
+        problems.extend(written(path, content))
 
     def write_json(path: Path) -> None:
         path.write_bytes(to_json(results))
