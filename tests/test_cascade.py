@@ -5,7 +5,7 @@ from pathlib import Path as File
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import Body, Gear, JointAngle, Point, SolveError, solve
+from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, SolveError, solve
 from kincheck.core.analysis.cascade.cascade import WORST, Cascade
 from kincheck.core.analysis.cascade.sweep import LANES, CascadeSweep
 from kincheck.core.analysis.march import HALVINGS
@@ -129,6 +129,30 @@ def test_an_end_of_the_travel_is_told_with_the_component():
     assert "knuckle" in found.message
     assert "; last reachable sample at stroke = 0.29; shorten the sweep" in found.message
     assert np.array_equal(sweep.solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True)
+
+
+def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
+    """The second of two four-bars, which cannot turn on; the first one's crank can, and its residuals are no larger."""
+    links = {"rod0": (4.0, 3.2, 2.6, 1.0, 1.0), "rod1": (4.0, 3.0, 1.5, 2.0, 1.3)}  # ground, rod, rocker, crank, angle
+    axis = (0.0, 0.0, 1.0)
+    bodies, joints, start = [Body("crank")], [Revolute("turn", "ground", "crank", (0.0, 0.0, 0.0), axis)], 0.0
+    carrier = "crank"
+    for k, (rod, (ground, long, rocker, crank, angle)) in enumerate(links.items()):
+        a, c = np.array([start, 0.0]) + crank * np.array([np.cos(angle), np.sin(angle)]), np.array([start + ground, 0.0])
+        apart = c - a
+        along = (apart @ apart + long**2 - rocker**2) / (2.0 * (apart @ apart))
+        off = np.sqrt(long**2 / (apart @ apart) - along**2)
+        b = a + along * apart + off * np.array([-apart[1], apart[0]])
+        bodies += [Body(rod), Body(f"rocker{k}")]
+        ends = ((f"a{k}", carrier, rod, a), (f"b{k}", rod, f"rocker{k}", b), (f"c{k}", "ground", f"rocker{k}", c))
+        joints += [Revolute(name, i, j, (*map(float, place), 0.0), axis) for name, i, j, place in ends]
+        carrier, start = f"rocker{k}", start + ground
+    mechanism = Mechanism("two loops", bodies, joints, [Point("end", carrier, (start, 0.0, 0.0))], [JointAngle("turn", "turn")])
+    cascade = Cascade(mechanism, Request(("turn",), ("end",)))
+    for values in (np.linspace(0.0, 6.0, 31), [0.0, 3.0], [0.1, 2.0, 4.0]):
+        found = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.array(values))).solve(1e-12)
+        assert not found.solved.all()
+        assert "the component of rod1, rocker1 is the nearest to singular" in found.message
 
 
 def test_what_it_cannot_take_apart_is_refused():

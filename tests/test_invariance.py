@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import Body, Mechanism, Point, PointCoordinate, Revolute
+from kincheck.core import Body, Mechanism, Point, PointCoordinate, Revolute, Translational
 from kincheck.core.analysis.equations.constraints import frames
 from kincheck.core.analysis.equations.geometry import places
 from kincheck.core.analysis.solve import solve
-from kincheck.core.joints import AxialJoint, Joint, ParallelAxes
+from kincheck.core.joints import AxialJoint, Joint, ParallelAxes, Screw
 from kincheck.core.joints.base import position
 
 from .mechanisms import mcpherson, placed, slider_crank, swapped, without_fixed_bodies
@@ -179,3 +179,23 @@ def test_the_points_of_a_joint_are_known_by_their_kind():
     assert frames(mechanism).unit == 4.0 * size  # three wide, to a power of two
     assert [joint.points_on("coupler") for joint in pins] == [[each] for each in corners]
     assert places(mechanism)["joints.pin 2.pin"] == corners[2]
+
+
+def test_a_step_of_too_many_turns_is_not_called_singular():
+    """A fine thread: its smallest singular value is small all along, and nothing is wrong with any pose."""
+    axis, lead = (0.0, 0.0, 1.0), 0.05
+    mechanism = Mechanism(
+        "jack",
+        [Body("spindle"), Body("nut")],
+        [
+            Revolute("bearing", "ground", "spindle", (0.0, 0.0, 0.0), axis),
+            Screw("thread", "spindle", "nut", (0.0, 0.0, 0.0), axis, lead=lead),
+            Translational("guide", "ground", "nut", (4.0, 0.0, 0.0), axis),
+        ],
+        [Point("top", "nut", (4.0, 0.0, 0.0))],
+        [PointCoordinate("height", "top", axis)],
+    )
+    found = solve(mechanism, "height", [0.0, lead, 2000.0 * lead])
+    assert found.solved.tolist() == [True, True, False]
+    assert "hardly nearer; give samples in between" in found.message
+    assert found.message.endswith("shorten the sweep or drive another coordinate")  # and names no row that depends on others

@@ -188,3 +188,19 @@ def test_remarks_are_told(tmp_path, capsys, monkeypatch):
 
     print_sweep(found, sys.stdout)
     assert re.search(r"quantiles are of a random subset of \d+ variants, with their standard errors", capsys.readouterr().out)
+
+
+def test_what_was_found_is_there_when_nobody_reads_the_table(file, tmp_path, monkeypatch):
+    def gone(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr("kincheck.core.harness.study.tables.print_sweep", gone)
+    out, wanted = tmp_path / "out", tmp_path / "found.json"
+    arguments = ["sweep", "mcpherson_strut", "--vary", str(file), "--samples", "20", "--out", str(out), "--json", str(wanted)]
+    kept = os.dup(1)
+    try:
+        main(arguments)
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+    assert wanted.read_bytes() == (out / "sweep.json").read_bytes()

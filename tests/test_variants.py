@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.cases import load
-from kincheck.core import Ramp, Sine, SolveError, solve, solve_designs
+from kincheck.core import Body, JointAngle, Mechanism, Point, Ramp, Screw, Sine, SolveError, solve, solve_designs
 from kincheck.core.analysis import variants
 from kincheck.core.analysis.equations.geometry import placed, places
 from kincheck.core.analysis.model import compile_model
@@ -206,3 +206,23 @@ def test_samples_that_are_nearly_singular_are_refused():
         assert "cannot be followed beyond turn = 1.8707" in message
         assert "; refused at 1 samples" in message
         assert "as at turn = 1.87069633" in message
+
+
+def test_the_lead_of_a_screw_varies():
+    """In the rows it is a weight, which is known only when the programs run."""
+    thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), lead=0.01)
+    mechanism = Mechanism("nut", [Body("nut")], [thread], [Point("rim", "nut", (1.0, 0.0, 0.0))], [JointAngle("turn", "thread")])
+    turns, leads = np.array([0.0, 1.0, 2.0]), [0.01, 0.011, 50.0]  # the last larger than all else there is
+    found = solve_designs(mechanism, "turn", turns, {"joints.thread.lead": leads}, order=1).points["rim"]
+    for k, lead in enumerate(leads):
+        slope = lead / (2.0 * np.pi)
+        place = np.column_stack([np.cos(turns), np.sin(turns), slope * turns])
+        rate = np.column_stack([-np.sin(turns), np.cos(turns), np.full(3, slope)])
+        np.testing.assert_allclose(found.position[k], place, rtol=0, atol=1e-15 * max(1.0, lead))
+        np.testing.assert_allclose(found.velocity[k], rate, rtol=0, atol=1e-15 * max(1.0, lead))
+
+
+def test_a_variant_that_ends_early_is_told_that_it_may_go_on_by_itself():
+    found = solve_designs(strut()[0], "stroke", [0.0, 0.5], {"joints.ball.point": [strut()[0].joint("ball").point]})
+    assert "cannot be followed beyond stroke = 0.293" in found.messages[0]
+    assert found.messages[0].endswith("by itself, a variant may pass a singular pose; many at once do not")

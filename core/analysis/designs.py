@@ -60,7 +60,7 @@ def solve_designs(
             so that a point that varies can be driven by its change only.
         geometry: what varies [m or -]: by place, named as in a case file ("joints.tie_rod.points.0", "joints.hinge.axis",
             "points.wheel_center.position", a length), values of shape (V, 3), or (V,) of a length. Places that are one hardpoint
-            are each to be given.
+            are each to be given. They are not checked as a joint checks its own: two axes of a cross may be askew.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too.
 
     Raises:

@@ -63,6 +63,7 @@ class End:
         lane: all slots of the last pose that was reached.
         wanted: time of the sample that was not.
         early: see `march`: no part of the step was tried.
+        divided: the step was too long to be gone in parts, and nothing else is known to be wrong.
     """
 
     message: str
@@ -70,6 +71,7 @@ class End:
     lane: Array
     wanted: float
     early: bool = False
+    divided: bool = False
 
 
 def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bool = False, low: float = 0.0) -> March:
@@ -191,7 +193,8 @@ class Marcher:
                 if further is None or stopped:
                     columns = side.first + side.step * np.arange(at, side.count)
                     self.kept[:, columns], self.solved[columns] = np.nan, False
-                    return End(self._end(side, at, anchor, stopped or reason), self.route, anchor, wanted, early)
+                    said = self._end(side, at, anchor, stopped or reason)
+                    return End(said, self.route, anchor, wanted, early, divided=bool(stopped))
                 self.track.anchors[number] = further[self.model.ahead]
                 came, at = at, self.track.follow(number, at, stop, anew=False)
                 if at > came:

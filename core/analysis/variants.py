@@ -26,6 +26,8 @@ from .route import Route
 LEAD = 16
 # Bytes of the largest blocks that are used again: glibc's own limit is twice that.
 RECYCLED = 16_000_000
+# What a batch does not do.
+BY_ITSELF = "by itself, a variant may pass a singular pose; many at once do not"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         found = march(replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0]), tol)
         kept[:, :, k], solved[:, k] = found.kept[:, route.order], found.solved[route.order]
         if found.messages:
-            messages[k] = "; ".join(found.messages)
+            messages[k] = "; ".join([*found.messages, BY_ITSELF])
     closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
     doubted = np.zeros_like(solved)
     # the worst of all first: to judge each takes a twentieth of the time

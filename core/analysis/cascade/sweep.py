@@ -138,7 +138,7 @@ class CascadeSweep:
                 lane, here = reached
                 lanes.carry(lane)
                 continue
-            message = path.ended(here, float(times[at]), last, self._why_ended())
+            message = path.ended(here, float(times[at]), last, self._why_ended(tol))
             beyond = cross(lanes, path, sound, start, here, float(times[at]), tol)
             if beyond is None:
                 return message
@@ -164,15 +164,17 @@ class CascadeSweep:
                 return part, float(parts[part])
         return None
 
-    def _why_ended(self) -> str:
+    def _why_ended(self, tol: float) -> str:
         """Which component could not be solved at the shortest part of a step, and how singular it is."""
         lane = self._lanes.last
         closure, sigma = (self._lanes.each(name)[:, lane] for name in ("closure", SIGMA))
-        worst = int(np.nan_to_num(closure, nan=np.inf).argmax())
+        closes = bool((closure <= tol).all())
+        worst = int(np.nanargmin(sigma) if closes else np.nan_to_num(closure, nan=np.inf).argmax())
         order = [part for kind in self.cascade.kinds for part in kind.members]
         bodies = ", ".join(self.cascade.parts[order[worst]].bodies)
-        left = f"the component of {bodies} is left with residual {closure[worst]:.3g} of its size"
-        return f"{left}; smallest singular value there about {np.nanmin(sigma):.3g} (zero at a lock-up or dead centre)"
+        what = "is the nearest to singular" if closes else f"is left with residual {closure[worst]:.3g} of its size"
+        told = f"smallest singular value there about {sigma[worst]:.3g} (zero at a lock-up or dead centre)"
+        return f"the component of {bodies} {what}; {told}"
 
     def _trajectory(self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]) -> Trajectory:
         request, solved = self.cascade.request, ~np.isnan(tests["closure"])

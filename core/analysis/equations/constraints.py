@@ -175,9 +175,9 @@ def _axial(
 
 
 def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relation:
-    """Weights in metres and radians to weights in units and radians, the largest made one."""
+    """Weights in metres and radians to weights in units and radians, the largest of those that are known made one."""
     scaled = {name: k * (frame.unit if name.endswith(".translation") else 1.0) for name, k in weights.items()}
-    largest = max(map(abs, scaled.values()))
+    largest = max(abs(k) for k in scaled.values() if hasattr(k, "__abs__"))  # a traced lead is known only later
     return Relation(owner, {name: k / largest for name, k in scaled.items()})
 
 

@@ -255,6 +255,9 @@ class _Scrutiny:
 
     def end(self, end: End) -> None:
         """Say what stopped a side: a limit point ahead of its last pose, or what that pose is nearest to."""
+        if end.divided:
+            self.findings.messages.append(end.message)
+            return
         model, path = end.route.model, end.route.path
         system, time = system_of(model), float(end.lane[model.slots[FROM + TIME]])
         state = system.state(end.lane[:, None])

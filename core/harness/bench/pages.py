@@ -18,6 +18,7 @@ from rich.text import Text
 from ...errors import KincheckError
 from .. import printing
 from ..record import to_json
+from ..reporting.deliver import write_all
 from ..reporting.report import packed
 from ..reporting.wording import known, number
 
@@ -65,17 +66,15 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
     Raises:
         KincheckError: a file cannot be written.
     """
-    print_report(report, sys.stderr if json == "-" else sys.stdout)
-    if json == "-":
-        sys.stdout.write(to_json(results).decode())
     contents = {Path(json): to_json(results)} if json not in (None, "-") else {}
     if out is not None:
         contents |= {out / f"{report.name}.json": to_json(results), out / f"{report.name}.html": page(report).encode()}
-    for path, content in contents.items():
-        try:
-            path.write_bytes(content)
-        except OSError as error:
-            raise KincheckError(f"{path}: cannot be written ({error.strerror}); give a file in a writable folder") from None
+    problems = write_all(contents)  # before anything is printed: who reads it may have gone
+    print_report(report, sys.stderr if json == "-" else sys.stdout)
+    if json == "-":
+        sys.stdout.write(to_json(results).decode())
+    if problems:
+        raise KincheckError("\n".join(problems))
 
 
 def print_report(report: Report, file: TextIO) -> None:

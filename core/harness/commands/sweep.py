@@ -189,22 +189,21 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
 def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
     """Print the table and write what was asked for."""
     from ..record import to_json
+    from ..reporting.deliver import write_all
     from ..study.page import page
     from ..study.tables import envelope_csv, gradient_csv, print_sweep
 
-    print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
     encoded = to_json(results)
-    if options.json == "-":
-        sys.stdout.write(encoded.decode())
     contents = {Path(options.json): encoded} if options.json not in (None, "-") else {}
     if options.out is not None:
         texts = (encoded, page(results).encode(), envelope_csv(results).encode(), gradient_csv(results).encode())
         contents |= {options.out / name: text for name, text in zip(FILES, texts, strict=True)}
-    for path, content in contents.items():
-        try:
-            path.write_bytes(content)
-        except OSError as error:
-            raise KincheckError(f"{path}: cannot be written ({error.strerror}); give a file in a writable folder") from None
+    problems = write_all(contents)  # before anything is printed: who reads it may have gone
+    print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
+    if options.json == "-":
+        sys.stdout.write(encoded.decode())
+    if problems:
+        raise KincheckError("\n".join(problems))
 
 
 class Teller:

@@ -105,6 +105,15 @@ def written(path: Path, content: Callable[[Path], object]) -> list[str]:
     return []
 
 
+def write_all(contents: Mapping[Path, bytes]) -> list[str]:
+    """Write files, each whole or not at all; why some could not be."""
+
+    def put(path: Path, content: bytes) -> list[str]:
+        return written(path, lambda part: part.write_bytes(content))
+
+    return [problem for path, content in contents.items() for problem in put(path, content)]
+
+
 def deliver(
     results: Results,
     problems: list[str],
@@ -140,11 +149,12 @@ def deliver(
         write(to.out / "results.json", write_json)
     if to.json not in (None, "-"):
         write(Path(to.json), write_json)
-    (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
-    if to.json == "-":
-        sys.stdout.write(to_json(results).decode())
-        sys.stdout.flush()
     if to.out is not None:
         from .report import write_report
 
         write(to.out / "report.html", lambda path: write_report(results, path, history=history, precision=precision))
+    # last: who reads it may have gone
+    (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
+    if to.json == "-":
+        sys.stdout.write(to_json(results).decode())
+        sys.stdout.flush()
