@@ -176,7 +176,7 @@ def test_a_run_that_is_being_made_is_not_reported(path, capsys):
 
 def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_references(path, tmp_path):
     case, engines = crank("first"), [Fake("native"), Fake("mujoco")]
-    kept = begin(path, [case], engines, tol=1e-12, command="kincheck run", settings={}, resume=False)
+    kept = begin(path, [case, crank("second")], engines, tol=1e-12, command="kincheck run", settings={}, resume=False)
     kept.add(next(each for each in records() if (each.case, each.engine) == ("first", "native")))
     kept.store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1'")
     kept.store.close()
@@ -186,6 +186,7 @@ def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_reference
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "never made" in page
     assert "not asked" not in page
+    assert "Lost (3)" in page  # in two rows
 
 
 def test_a_run_of_another_version_is_not_gone_on_with(path):

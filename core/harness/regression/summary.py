@@ -23,7 +23,9 @@ def to_markup(found: Regressions) -> Markup:
     """The same as a part of an HTML page."""
     here = FileSystemLoader(Path(__file__).parent)
     environment = Environment(loader=here, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    groups = [(kind, WHY[kind], rows(each for each in found.findings if each.kind is kind)) for kind in Kind]
+    groups = [
+        (kind, WHY[kind], len(pairs(found, kind)), rows(each for each in found.findings if each.kind is kind)) for kind in Kind
+    ]
     return Markup(
         environment.get_template("regressions.html").render(
             headline=headline(found),
