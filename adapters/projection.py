@@ -29,6 +29,9 @@ EFFORTS: Mapping[str, int | None] = {"predictor only": 0, "1 Newton step": 1, "2
 SMALLEST_STEP = 2.0**-10
 # Singular values below this part of the largest count as zero: far above round-off (1e-15), far below a sound mechanism (1e-2).
 RANK_TOLERANCE = 1e-9
+# Where the Jacobian's determinant changes its sign, steps are shortened to this part of the sample distance before they are
+# believed: beside a fold the motion turns round, and another assembly goes straight on. Where it really passes zero they are then.
+FOLD = 2.0**-8
 
 
 class ProjectionModel(Protocol):
@@ -84,6 +87,7 @@ class _Sample:
     v: Array
     a: Array
     rows: tuple[Array, Array, Array]
+    orientation: float
     corrected: Array
     iterations: int
     residual: float
@@ -129,8 +133,9 @@ class Walk:
         model.reset()
         model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
-        singular = np.linalg.svd(jacobian, compute_uv=False)
+        left, singular, _ = np.linalg.svd(jacobian)
         self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
+        self.independent = left[:, : self.rank].T  # sums of rows that say all
         self.square = jacobian.shape == (self.rank, self.rank)
         self.rows, self.unknowns = jacobian.shape
         if self.rank < self.unknowns:
@@ -189,7 +194,8 @@ class Walk:
         if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
             return None
         position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
-        return _Sample(t, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), *done)
+        orientation = float(np.linalg.slogdet(self.independent @ jacobian)[0])
+        return _Sample(t, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), orientation, *done)
 
     def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
         """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t).
@@ -203,12 +209,13 @@ class Walk:
             dt = to - at.t
             self.model.restore(at.saved)
             self.model.move(dt * at.v)
-            new = self.solve(path, to)
-            if new is not None and self.connected(at, new):
+            new, whole = self.solve(path, to), step or abs(t - start.t)
+            folds = new is not None and new.orientation != at.orientation and abs(dt) > FOLD * whole
+            if new is not None and not folds and self.connected(at, new):
                 at, h = new, 2.0 * h
             else:
                 h = 0.5 * min(abs(h), abs(t - at.t)) * math.copysign(1.0, h)
-                if abs(h) < SMALLEST_STEP * (step or abs(t - start.t)):
+                if abs(h) < SMALLEST_STEP * whole:
                     return at, False
         return at, True
 
