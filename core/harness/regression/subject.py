@@ -135,8 +135,11 @@ def _compared(store: Store, row: RunRow, subject: Subject) -> int:
     """How much of what the subject was to compare was compared in a run: outputs that a case has no more do not count."""
     outputs = {(record.case, record.engine, record.mode): {*record.errors} for record in subject.results.records}
     there = compared(store, row.id)
-    return sum(1 + len([output for output, _ in there[pair] if output in (outputs.get(pair) or {output})])
-               for pair in _pairs(subject) & there.keys())  # fmt: skip
+    shared = 0
+    for pair in _pairs(subject) & there.keys():
+        still = outputs.get(pair)  # none at all where it was not made
+        shared += 1 + sum(not still or output in still for output, _ in there[pair])
+    return shared
 
 
 def _most(rows: list[RunRow], shared: Callable[[RunRow], int]) -> RunRow | None:

@@ -88,7 +88,7 @@ def written(path: Path, content: Callable[[Path], object]) -> list[str]:
         content: writes to the path that it is given.
     """
     whole = path.resolve()  # what a link leads to
-    if whole.exists() and not whole.is_file():  # a pipe, or a device
+    if whole.exists() and not (whole.is_file() and os.access(whole.parent, os.W_OK)):  # a pipe, a device, or in a folder of others
         whole, part = path, path
     else:
         part = whole.with_name(f".{whole.name}.part")
