@@ -154,3 +154,13 @@ def test_estimates_of_what_does_not_move_or_of_other_shapes_are_refused():
         assemble(mechanism, {first: (r, r)})
     with pytest.raises(SolveError, match=rf"find_assemblies: origin r of body '{first}': shape \(2, 3\), expected \(3,\)"):
         find_assemblies(mechanism, {first: (r, p)})
+
+
+@pytest.mark.parametrize("tol", [np.inf, np.nan, 0.0, -1.0])
+def test_a_tolerance_that_is_none_is_refused(tol):
+    """All that is not closed would be, or nothing."""
+    for close in (assemble, find_assemblies):
+        with pytest.raises(SolveError, match=f"{close.__name__}: tol is {tol}, expected a positive number"):
+            close(four_bar(), {}, tol=tol)
+    with pytest.raises(SolveError, match="find_assemblies: samples is -1, expected a positive number"):
+        find_assemblies(four_bar(), {}, samples=-1)

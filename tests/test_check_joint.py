@@ -123,3 +123,10 @@ def test_report_names_what_was_not_checked():
     text = str(report)
     assert all(f"{check}: {message}" in text for check, message in skipped.items())
     assert str(Body("x")) not in text
+
+
+def test_a_script_that_ends_is_not_a_joint_that_passed(tmp_path, monkeypatch, capsys):
+    (tmp_path / "ends_at_once.py").write_text("import sys\nsys.exit(0)\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main(["check-joint", "ends_at_once:Joint"]) == 2
+    assert "module 'ends_at_once' ends the process when it is imported (status 0)" in capsys.readouterr().err

@@ -163,3 +163,9 @@ def test_names_that_need_quotes_get_them(tmp_path):
     points = [replace(point, name=odd) if point.name == "tip_1" else point for point in case.mechanism.points]
     outputs = tuple(replace(each, point=odd) if each.point == "tip_1" else each for each in case.outputs)
     same_after_writing(replace(case, mechanism=replace(case.mechanism, points=points), outputs=outputs), tmp_path)
+
+
+def test_what_is_replayed_is_only_printed(tmp_path, capsys):
+    file = tmp_path / "case.toml"
+    assert cli.main(["stress", "--replay", str(file), "--json", str(tmp_path / "found.json")]) == 2
+    assert "--replay prints what it finds; leave out --out and --json" in capsys.readouterr().err

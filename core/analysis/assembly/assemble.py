@@ -12,6 +12,7 @@ A cap on the turn of a step (0.15 to 1.2 rad) was tried besides: it changes thes
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import astuple, dataclass
 
@@ -76,9 +77,10 @@ def assemble(
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, there is no moving body or driver of a name, or an estimate has
-            another shape.
+            another shape, or the tolerance is not positive and finite.
     """
     require_named("assemble", mechanism, estimates, values or {})
+    require_positive("assemble", "tol", tol)
     n = next((len(np.atleast_2d(r)) for r, _ in estimates.values()), 1)
     require_shapes("assemble", estimates, (n,))
     closing = Closing(mechanism, values or {}, style)
@@ -92,6 +94,12 @@ def require_named(who: str, mechanism: Mechanism, bodies: Iterable[str], drivers
         for name in names:
             if name not in there:
                 raise SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
+
+
+def require_positive(who: str, what: str, number: float) -> None:
+    """Raise SolveError unless a number is positive and finite."""
+    if not (math.isfinite(number) and number > 0):
+        raise SolveError(f"{who}: {what} is {number}, expected a positive number")
 
 
 def require_shapes(who: str, estimates: Mapping[str, tuple[Array, Array]], lanes: tuple[int, ...]) -> None:

@@ -16,7 +16,7 @@ from ...topology import spanning_tree
 from ...trajectory import Array
 from ..equations.constraints import Frames
 from ..equations.poses import displaced
-from .assemble import Closing, require_named, require_shapes
+from .assemble import Closing, require_named, require_positive, require_shapes
 from .signature import Branches
 
 # Starts around an estimate: turned by up to this [rad], and shifted by about this part of the mechanism's size. Bodies that are
@@ -92,10 +92,12 @@ def find_assemblies(
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, there is no moving body or driver of a name, or an estimate has
-            another shape.
+            another shape, or tolerance or samples are not positive and finite.
     """
     require_named("find_assemblies", mechanism, estimate, values or {})
     require_shapes("find_assemblies", estimate, ())
+    require_positive("find_assemblies", "tol", tol)
+    require_positive("find_assemblies", "samples", samples)
     closing = Closing(mechanism, values or {})
     frame = closing.tracer.frame
     near = displaced(mechanism, frame, estimate)

@@ -71,6 +71,8 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     problems: list[str] = []
     engines = house.find_engines(options.engine or ["native"], problems, options.mode)
     if options.replay:
+        if options.out or options.json:
+            problems.append("--replay prints what it finds; leave out --out and --json")
         if problems:
             raise KincheckError("\n".join(problems))
         return _replay(options, house, engines)

@@ -150,6 +150,11 @@ def load_joint(where: str) -> type[Joint]:
         sys.path.insert(0, "")
     try:
         module = importlib.import_module(module_name)
+    except SystemExit as end:  # a script: its class would go unchecked, with the status that it ends in
+        raise KincheckError(
+            f"module {module_name!r} ends the process when it is imported (status {end.code}); guard what it does there by "
+            'if __name__ == "__main__":'
+        ) from end
     except ModuleNotFoundError as error:
         if error.name is None or not module_name.startswith(error.name):
             raise  # found, but what it imports is not: its own trace says more
