@@ -1,5 +1,6 @@
 """Suspension outputs in case files, reference tables, results and reports: units, signs in every header, and clear refusals."""
 
+import json
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from kincheck.core.harness import cli
 from kincheck.core.harness.catalogue import output_catalogue
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.reporting.junit import to_junit
-from kincheck.core.harness.reporting.matrix import to_markdown
+from kincheck.core.harness.reporting.matrix import print_matrix, to_markdown
 from kincheck.core.harness.reporting.report import write_report
 from kincheck.core.harness.reporting.table import print_table
 from kincheck.core.harness.run import run
@@ -18,8 +19,10 @@ from kincheck.core.harness.suspension import SuspensionOutput
 from kincheck.core.harness.suspension.base import Attitude
 
 from .suspension_files import STRUT, TABLE, loaded, unreferenced
+from .test_vary import HEAD
 
 SIGNS = "ISO 8855 (x forward, y left, z up); front right wheel; forward is [-1, 0, 0] and up [0, 0, 1] in the case's axes"
+HEADING = f"Signs of mcpherson_suspension: {SIGNS}"
 
 
 def changed(table, **keys):
@@ -191,14 +194,36 @@ def test_signs_head_everything(results, tmp_path):
     assert again.records[0].outputs["toe.per_travel"].unit == "rad/m"
     with (tmp_path / "table").open("w+") as file:
         print_table(results, file)
+        print_matrix(results, file)
         file.seek(0)
-        assert f"signs of mcpherson_suspension: {SIGNS}" in file.read()
-    assert f"Signs of mcpherson_suspension: {SIGNS}." in to_markdown(results)
+        assert [line.startswith(HEADING) for line in file].count(True) == 2
+        file.seek(0)
+        assert next(file).startswith(HEADING)
+    assert to_markdown(results).startswith(f"{HEADING}.\n\n|")
     write_report(results, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text().replace("&#39;", "'")
     assert SIGNS in page
     assert "Positive: toe-in." in page
     assert "# signs: iso8855" in TABLE
+
+
+def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    varied = {"ball": {"at": "ball", "sigma": 1.0}}
+    (tmp_path / "vary.json").write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied}))
+    sweep = ["sweep", "--samples", "4", "--out", str(tmp_path), "--store", str(tmp_path / "all.parquet"), "--vary"]
+    for command, first in (
+        (["explain"], "output "),
+        (["reference"], "native error"),
+        ([*sweep, str(tmp_path / "vary.json")], "output"),
+    ):
+        assert cli.main([*command, "mcpherson_suspension"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        tables = [k for k, line in enumerate(lines) if line.strip().startswith(first)]
+        assert tables
+        assert all(SIGNS in lines[k - 1] or SIGNS in lines[k - 2] for k in tables), command
+    assert SIGNS in (tmp_path / "sweep.html").read_text().replace("&#39;", "'")
+    assert json.loads(parquet.read_schema(tmp_path / "all.parquet").metadata[b"kincheck"])["signs"] == SIGNS
 
 
 def test_tables_keep_lengths_and_angles_apart(results):

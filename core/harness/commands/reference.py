@@ -98,6 +98,7 @@ def _lines(found: Reference, errors: list[NativeError]) -> list[str]:
         lines.append(f"  {len(found.redundant)} redundant rows, {worst:.1e} or less at the solutions{closes}")
     lines += [f"  {name}: no proof: {each.reason}" for name, each in found.outputs.items() if each.reason]
     lines += _missing(found)
+    lines += [f"  signs: {words}" for words in dict.fromkeys(each.signs for each in found.outputs.values()) if words]
     if errors:
         wide = max(len(error.output) for error in errors)
         heads = ("native error", "position", "velocity", "acceleration")

@@ -51,6 +51,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
 
     Attributes:
         binding: numbers of the geometry that cannot be changed alone without contradiction.
+        signs: the convention of the outputs that have one, in words; empty without.
         not_derived: outputs that are not functions of the pose alone, and have no budget and sensitivities.
         programs: what the native engine computes, and leaves out, in lines to read.
     """
@@ -72,6 +73,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     budgets: list[Budget]
     sensitivities: list[Sensitivity]
     binding: list[str]
+    signs: str
     not_derived: list[str]
     programs: list[str]
 
@@ -135,6 +137,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         budgets=budgets(case, swept, tol, design) if swept and derived else [],
         sensitivities=sensitivities(case, swept, design) if swept and derived else [],
         binding=binding(swept) if swept and derived else [],
+        signs=case.signs,
         not_derived=[output.name for output in case.outputs if output.orders != ORDERS],
         programs=programs,
     )

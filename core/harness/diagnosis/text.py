@@ -103,6 +103,7 @@ def _changes(samples: Sequence[Sample], swept: str) -> Iterator[Text]:
 
 def _budgets(found: Diagnosis) -> Iterator[Text | Table]:
     yield _head("round-off budget: what residuals that engines leave shift outputs by, and the tolerance that follows")
+    yield from _signs(found)
     table = columns("output", ">shift", ">at", ">double precision", ">suggested", ">case has", "unit", "largest share")
     for each in found.budgets:
         numbers = f"{each.shift:.3g}", f"{each.at:.4g}", f"{each.round_off:.1e}", f"{each.suggested:.2g}", f"{each.atol:.3g}"
@@ -111,8 +112,14 @@ def _budgets(found: Diagnosis) -> Iterator[Text | Table]:
     yield Text(f'why = "{max(found.budgets, key=lambda each: each.shift).why}"')
 
 
+def _signs(found: Diagnosis) -> Iterator[Text]:
+    if found.signs:
+        yield Text(f"signs: {found.signs}")
+
+
 def _sensitivities(found: Diagnosis) -> Iterator[Text | Table]:
     yield _head(f"sensitivity of the outputs to the geometry, drivers held: the {PLACES} largest of each")
+    yield from _signs(found)
     table = columns("output", "number", ">largest", "unit", f">at {found.swept}")
     shown: dict[str, int] = {}
     for each in found.sensitivities:

@@ -11,14 +11,18 @@ from .. import printing
 from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
-from .table import COLOURS, QUANTITIES, messages, print_messages, signs, worst
+from .table import COLOURS, QUANTITIES, messages, print_messages, print_signs, worst
+from .wording import signs
 
 NOT_ASKED = "–"
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
-    """Print a row per case and a column per engine, then every message, then a count of outcomes."""
+    """Print the signs of outputs that have a convention, a row per case and a column per engine, every message, and a count of
+    outcomes.
+    """
     console = printing.console(file)
+    print_signs(results.run, console)
     table = Table(box=None, pad_edge=False, header_style="bold", caption=Text(visible(_reading(results))), caption_justify="left")
     table.add_column("case", overflow="fold")
     engines, rows = _laid_out(results)
@@ -32,16 +36,16 @@ def print_matrix(results: Results, file: TextIO) -> None:
 
 
 def to_markdown(results: Results) -> str:
-    """The same as a Markdown table, the engines with their versions, and a line for every message but those of what passed."""
+    """The same in Markdown: the engines with their versions, and a line for every message but those of what passed."""
     engines, rows = _laid_out(results)
     versions = {record.engine: record.version for record in results.records if record.version}
     head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
-    lines = [row(map(escaped, head)), row(["---"] * len(head))]
+    lines = [line for each in signs(results.run) for line in (escaped(f"{each}."), "")]
+    lines += [row(map(escaped, head)), row(["---"] * len(head))]
     for case, records in rows.items():
         cells = (escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escaped(_reading(results))}."]
-    lines += [escaped(f"Signs of {', '.join(cases)}: {words}.") for words, cases in signs(results).items()]
     lines += [
         escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TextIO
+from collections.abc import Mapping
+from typing import Any, TextIO
 
 from rich.console import Console
 from rich.table import Table
@@ -12,6 +13,7 @@ from rich.text import Text
 from .. import printing
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
+from .wording import signs
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
@@ -19,8 +21,9 @@ QUANTITIES = {"position": LENGTH, "velocity": "m/s", "acceleration": "m/s²"}
 
 
 def print_table(results: Results, file: TextIO) -> None:
-    """Print one line per record, then every message, then a count of outcomes."""
+    """Print the signs of outputs that have a convention, one line per record, every message, and a count of outcomes."""
     console = printing.console(file)
+    print_signs(results.run, console)
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("case", overflow="fold")
     for name in ("engine", "outcome"):
@@ -42,10 +45,14 @@ def print_table(results: Results, file: TextIO) -> None:
     print_messages(results, console)
 
 
+def print_signs(run: Mapping[str, Any], console: Console) -> None:
+    """Print what heads every table of outputs that have a convention of signs."""
+    for line in signs(run):
+        console.print(Text(visible(line)), soft_wrap=True)
+
+
 def print_messages(results: Results, console: Console) -> None:
-    """Print the signs of outputs that have a convention, every message, and a count of outcomes."""
-    for words, cases in signs(results).items():
-        console.print(Text(visible(f"signs of {', '.join(cases)}: {words}")), soft_wrap=True)
+    """Print every message, and a count of outcomes."""
     for (engine, outcome, message), cases in messages(results).items():
         console.print(Text(visible(f"{outcome}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
@@ -75,15 +82,6 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
         unit = record.outputs[output].unit if output in record.outputs else LENGTH
         found += [(each, "" if unit == LENGTH else f"[{unit}]") for name, each in errors.items() if name == quantity]
     return max(found, key=lambda each: (not each[0].within, not each[1], each[0].max_abs), default=None)
-
-
-def signs(results: Results) -> dict[str, list[str]]:
-    """The conventions of signs that outputs have, in words, and the cases that they are of."""
-    said: dict[str, list[str]] = {}
-    for case, facts in results.run.get("cases", {}).items():
-        if words := facts.get("signs"):
-            said.setdefault(words, []).append(case)
-    return said
 
 
 def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:

@@ -37,6 +37,15 @@ def output_label(name: str) -> str:
     return _LABELS.get(name, name.replace("_", " "))
 
 
+def signs(run: Mapping[str, Any]) -> list[str]:
+    """The conventions of signs that outputs have, a line each with the cases that they are of, by the circumstances of a run."""
+    said: dict[str, list[str]] = {}
+    for case, facts in run.get("cases", {}).items():
+        if words := facts.get("signs"):
+            said.setdefault(words, []).append(case)
+    return [f"Signs of {', '.join(cases)}: {words}" for words, cases in said.items()]
+
+
 def motion_unit(unit: str, motion: str) -> str:
     """The unit of a motion's derivative, e.g. m/s for a velocity in m."""
     return unit + {"position": "", "velocity": "/s", "acceleration": "/s²"}[motion]

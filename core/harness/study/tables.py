@@ -17,6 +17,7 @@ from rich.text import Text
 
 from ...errors import KincheckError
 from .. import printing
+from ..reporting.table import print_signs
 from ..reporting.wording import number
 from ..visible import cell
 from .page import effect, headline
@@ -26,9 +27,10 @@ from .variation import Coordinate
 
 
 def print_sweep(results: SweepResults, file: TextIO) -> None:
-    """Print a line for each output, then what could not be solved, what deviates, and how fast it was."""
+    """Print the signs of outputs, a line for each output, what could not be solved, what deviates, and how fast it was."""
     console = printing.console(file)
     console.print(Text(headline(results), style="bold"))
+    print_signs(results.run, console)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("output", "unit"):
         table.add_column(name)
@@ -113,7 +115,7 @@ class ParquetStore:
 
     Columns: variant, the offset of each coordinate [SI], and each output as a list over the samples, NaN where there is no value.
     A coordinate that is named like an output, W.x say, has the column W.x.offset.
-    The file's metadata under the key "kincheck" says case, seed, mode, units and the driver's values, as JSON.
+    The file's metadata under the key "kincheck" says case, seed, mode, units, signs and the driver's values, as JSON.
 
     Raises:
         KincheckError: pyarrow is not installed, or the file cannot be written.
@@ -136,6 +138,7 @@ class ParquetStore:
             "seed": study.seed,
             "mode": str(study.variation.mode),
             "units": {row.name: row.unit for row in study.rows} | {name: each.unit for name, each in offsets.items()},
+            "signs": study.case.signs,
             "driver": {name: values.tolist() for name, values in study.case.sweep.moved.items()},
         }
         self._schema = arrow.schema(fields, metadata={"kincheck": json.dumps(about)})
