@@ -20,10 +20,11 @@ from ..core.harness.engine import Floor
 from ..core.trajectory import Array, Trajectory
 from .exudyn_rows import DRIVERS, JOINTS, NO_ROTATION, Rows, turned
 from .floors import floor_of
+from .own_frame import in_own_frame, own_frame
 from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
 
-# Largest change of a coordinate per step of the differences of the Jacobian [m or -]. Round-off, 1e-16 / 1e-3, and truncation,
-# (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
+# Largest change of a coordinate per step of the differences of the Jacobian [units of length or -]. Round-off, 1e-16 / 1e-3, and
+# truncation, (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
 DIFFERENCE = 1e-3
 # Central differences of sixth order: h f' = sum of weight * f(k h).
 WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
@@ -63,11 +64,11 @@ class Exudyn:
 
     def build(self, case: Case) -> ExudynModel:
         """Exudyn's system of the case, at the design position."""
-        return ExudynModel(case)
+        return ExudynModel(in_own_frame(case))
 
     def solve(self, model: ExudynModel, case: Case, tol: float) -> Trajectory:
         """All samples; see `kincheck.core.harness.engine.Engine.solve`."""
-        return solve_by_projection(model, case, tol, {"rows": len(model.target)}, self.corrections)
+        return solve_by_projection(model, case, tol, {"rows": len(model.target)}, self.corrections, own_frame(case))
 
     def efforts(self) -> Mapping[str, Exudyn]:
         """By the number of Newton steps."""

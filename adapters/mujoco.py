@@ -24,6 +24,7 @@ from ..core.harness.engine import Floor
 from ..core.trajectory import Array, Trajectory
 from .floors import floor_of
 from .mujoco_spec import JOINTS, Closure, Sketch, coordinate
+from .own_frame import in_own_frame, own_frame
 from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
 
 DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
@@ -43,10 +44,10 @@ class MuJoCo:
     def settings(self) -> Mapping[str, Any]:
         """What is solved and how."""
         return {
-            "residual": "efc_pos: m; angles: sin(angle/2) of welds, rad of joints; drivers: m or rad",
+            "residual": "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers: units or rad",
             "jacobian": "efc_J, dense",
             "linear_solver": "LU where the rows are square and of full rank at design, else least squares",
-            "options": "no gravity, no contact, no autoreset",
+            "options": "no gravity, no contact, no autoreset; equalities without spring and damper",
             "cut_joints": "tendon; or connect or weld, to an auxiliary body where the joint has slides or hinges",
             "relations": "joint equalities",
             **corrected(self.corrections),
@@ -65,11 +66,13 @@ class MuJoCo:
 
     def build(self, case: Case) -> MuJoCoModel:
         """The compiled model and its rows."""
-        return MuJoCoModel(mujoco(), case)
+        model = MuJoCoModel(mujoco(), in_own_frame(case))
+        model.m.eq_solref[:] = 0.0  # no spring and no damper: aref is minus Jdot v, to the last bit
+        return model
 
     def solve(self, model: MuJoCoModel, case: Case, tol: float) -> Trajectory:
         """All samples; see `Engine.solve`."""
-        return solve_by_projection(model, case, tol, model.details, self.corrections)
+        return solve_by_projection(model, case, tol, model.details, self.corrections, own_frame(case))
 
     def efforts(self) -> Mapping[str, MuJoCo]:
         """By the number of Newton steps."""

@@ -39,6 +39,7 @@ from ..core.trajectory import Array, Trajectory
 from .closures import CLOSURES, ends_of, twistless
 from .conditions import Condition
 from .floors import floor_of
+from .own_frame import in_own_frame, own_frame
 from .pinocchio_rows import DrivenPoint, Frame, Linear
 from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
 
@@ -77,11 +78,11 @@ class Pinocchio:
 
     def build(self, case: Case) -> PinocchioModel:
         """Tree, frames and conditions of the case, at the design position."""
-        return PinocchioModel(importlib.import_module("pinocchio"), case)
+        return PinocchioModel(importlib.import_module("pinocchio"), in_own_frame(case))
 
     def solve(self, model: PinocchioModel, case: Case, tol: float) -> Trajectory:
         """Solve all samples; see `Engine.solve`."""
-        return solve_by_projection(model, case, tol, {"closures": model.closures}, self.corrections)
+        return solve_by_projection(model, case, tol, {"closures": model.closures}, self.corrections, own_frame(case))
 
     def efforts(self) -> Mapping[str, Pinocchio]:
         """By the number of Newton steps."""

@@ -21,6 +21,7 @@ from ..core.harness.compare import size
 from ..core.joints import Joint
 from ..core.motions import Path, outwards
 from ..core.trajectory import Array, PointMotion, Trajectory, largest_found
+from .own_frame import GLOBAL, OwnFrame
 
 MAX_ITERATIONS = 20
 # Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method. None is as many as it takes.
@@ -38,7 +39,8 @@ FOLD = 4.0 * SMALLEST_STEP
 class ProjectionModel(Protocol):
     """A simulator's kinematics: unknowns x (its tree or body coordinates), rows for closures and drivers.
 
-    All methods speak of the current configuration. `residual` updates whatever the other methods read.
+    Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of the current configuration.
+    `residual` updates whatever the other methods read.
     """
 
     def reset(self) -> None:
@@ -111,14 +113,20 @@ def corrected(corrections: int | None) -> Mapping[str, Any]:
 
 
 def solve_by_projection(
-    model: ProjectionModel, case: Case, tol: float, details: Mapping[str, Any] | None = None, corrections: int | None = None
+    model: ProjectionModel,
+    case: Case,
+    tol: float,
+    details: Mapping[str, Any] | None = None,
+    corrections: int | None = None,
+    frame: OwnFrame = GLOBAL,
 ) -> Trajectory:
     """Solve all samples of the case with the model; see `Engine.solve`.
 
     Args:
         corrections: exactly so many Newton steps after the predictor, whatever residual they leave; None: until it meets tol.
+        frame: in which the model has the mechanism.
     """
-    return Walk(model, case, tol, corrections).trajectory(details or {})
+    return Walk(model, case, tol, corrections, frame).trajectory(details or {})
 
 
 LOST = "Newton does not converge or jumps to another assembly"
@@ -128,10 +136,13 @@ LOST = "Newton does not converge or jumps to another assembly"
 class Walk:
     """The way of a model through a case, sample by sample."""
 
-    def __init__(self, model: ProjectionModel, case: Case, tol: float, corrections: int | None = None) -> None:
-        self.model, self.case, self.tol, self.corrections = model, case, tol, corrections
+    def __init__(
+        self, model: ProjectionModel, case: Case, tol: float, corrections: int | None = None, frame: OwnFrame = GLOBAL
+    ) -> None:
+        self.model, self.case, self.tol, self.corrections, self.frame = model, case, tol, corrections, frame
         self.drivers = [driver.name for driver in case.mechanism.drivers]
-        self.size = size(case)
+        self.units = np.array([[1.0 if driver.turns else frame.unit] for driver in case.mechanism.drivers])
+        self.size = size(case) / frame.unit
         model.reset()
         model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
@@ -180,7 +191,7 @@ class Walk:
 
     def solve(self, path: Path, t: float) -> _Sample | None:
         """Position, velocity and acceleration on a path at time t from the current configuration, or None."""
-        c, c_t, c_tt = path.drive(self.drivers, np.array([t]))[..., 0]
+        c, c_t, c_tt = (path.drive(self.drivers, np.array([t])) / self.units)[..., 0]
         done = self.newton(c)
         if done is None:
             return None
@@ -265,9 +276,11 @@ class Walk:
                     last = float(times[k])
                     motion[:, k] = at.rows
                     iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
-        moves = {name: PointMotion(motion[0, :, k], motion[1, :, k], motion[2, :, k]) for k, name in enumerate(points)}
-        facts = {"rank": self.rank, "unknowns": self.unknowns, **details}
-        return Trajectory(moves, solved, iterations, largest_found(residual[solved]), "; ".join(messages), facts)
+        unit = self.frame.unit
+        position, velocity, acceleration = self.frame.back(motion[0]), unit * motion[1], unit * motion[2]
+        moves = {name: PointMotion(position[:, k], velocity[:, k], acceleration[:, k]) for k, name in enumerate(points)}
+        facts = {"rank": self.rank, "unknowns": self.unknowns, "length_unit": unit, "origin": [*self.frame.origin], **details}
+        return Trajectory(moves, solved, iterations, largest_found(unit * residual[solved]), "; ".join(messages), facts)
 
 
 def _met(jacobian: Array, v: Array, wanted: Array) -> bool:

@@ -15,7 +15,18 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 SIMULATORS = {"mujoco", "pinocchio", "exudyn"}
-SHARED_BY_ADAPTERS = {"chains", "floors", "jointed", "simulation", "poses", "xml_text", "projection", "closures", "conditions"}
+SHARED_BY_ADAPTERS = {
+    "chains",
+    "floors",
+    "jointed",
+    "simulation",
+    "poses",
+    "xml_text",
+    "projection",
+    "closures",
+    "conditions",
+    "own_frame",
+}
 LONGEST = 300
 
 DESCRIPTION = {"errors", "algebra", "trajectory", "joints", "drivers", "motions", "mechanism", "topology"}

@@ -86,7 +86,7 @@ def test_a_rod_square_to_a_slider():
     """At its dead centre MuJoCo leaves the rod's row out; the row is zero there, its rate v^2 / span."""
     guide = Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     rod = Distance("rod", "ground", "slider", ((0.0, 0.3, 0.0), (0.4, 0.0, 0.0)))
-    model = adapter.MuJoCo().build(case([guide, rod], {}, [JointDisplacement("push", "guide")], [0.0]))
+    model = adapter.MuJoCoModel(adapter.mujoco(), case([guide, rod], {}, [JointDisplacement("push", "guide")], [0.0]))
     for shift, span, row, rate in ((0.0, 0.5, 0.8, 0.6**2 / 0.5), (-0.4, 0.3, 0.0, 1 / 0.3)):
         model.move(np.array([shift]))
         np.testing.assert_allclose(model.residual(np.zeros(1)), [span - 0.5, shift], rtol=0, atol=1e-15)

@@ -48,8 +48,8 @@ class Engine(Protocol):
 
         Args:
             model: what `build` gave; may be used for several solves.
-            tol: largest accepted constraint residual [m or -]. In simulate mode the simulator's own settings say what it accepts,
-                and the residual tells what came of it.
+            tol: largest accepted constraint residual, relative to the mechanism's size. In simulate mode the simulator's own
+                settings say what it accepts, and the residual tells what came of it.
 
         Returns:
             A trajectory of case.points; samples that cannot be reached are NaN and explained, never numbers. Its iterations are

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Self
 
 from ..errors import MechanismError
+from .base import Kind
 from .given import held
 
 
@@ -48,6 +49,11 @@ class Coupler(ABC):
 
     def __str__(self) -> str:
         return f"joint {self.name!r} ({self.type})"
+
+    def scaled(self, factor: float) -> Self:
+        """The same coupler with all lengths multiplied by the factor."""
+        lengths = [each.name for each in fields(self) if each.metadata.get("kind") is Kind.LENGTH]
+        return replace(self, **{name: factor * getattr(self, name) for name in lengths})
 
     @property
     @abstractmethod
