@@ -30,7 +30,7 @@ EFFORTS: Mapping[str, int | None] = {"predictor only": 0, "1 Newton step": 1, "2
 SMALLEST_STEP = 2.0**-10
 # Singular values below this part of the largest count as zero: far above round-off (1e-15), far below a sound mechanism (1e-2).
 RANK_TOLERANCE = 1e-9
-# Where the Jacobian's determinant changes its sign, steps are shortened to this part of the sample distance before they are
+# Where singular values of the Jacobian pass zero, steps are shortened to this part of the sample distance before they are
 # believed: beside a fold the motion turns round, and another assembly goes straight on. Where it really passes zero they are then.
 # Four times the smallest step: a pose that fails there can still be come nearer to. A fold of 0.05 of a step was passed over.
 FOLD = 4.0 * SMALLEST_STEP
@@ -90,7 +90,7 @@ class _Sample:
     v: Array
     a: Array
     rows: tuple[Array, Array, Array]
-    orientation: float
+    sums: Array
     corrected: Array
     iterations: int
     residual: float
@@ -207,8 +207,8 @@ class Walk:
         if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
             return None
         position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
-        orientation = float(np.linalg.slogdet(self.independent @ jacobian)[0])
-        return _Sample(t, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), orientation, *done)
+        sums = self.independent @ jacobian
+        return _Sample(t, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), sums, *done)
 
     def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
         """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t).
@@ -223,7 +223,7 @@ class Walk:
             self.model.restore(at.saved)
             self.model.move(dt * at.v)
             new, whole = self.solve(path, to), step or abs(t - start.t)
-            folds = new is not None and new.orientation != at.orientation and abs(dt) > FOLD * whole
+            folds = new is not None and abs(dt) > FOLD * whole and passes_zero(at.sums, new.sums)
             if new is not None and not folds and self.connected(at, new):
                 at, h = new, 2.0 * h
             else:
@@ -281,6 +281,22 @@ class Walk:
         moves = {name: PointMotion(position[:, k], velocity[:, k], acceleration[:, k]) for k, name in enumerate(points)}
         facts = {"rank": self.rank, "unknowns": self.unknowns, "length_unit": unit, "origin": [*self.frame.origin], **details}
         return Trajectory(moves, solved, iterations, largest_found(unit * residual[solved]), "; ".join(messages), facts)
+
+
+def passes_zero(before: Array, after: Array) -> bool:
+    """Whether singular values of a matrix seem to have passed zero between two states of it: one or, of equal loops, several.
+
+    What the one makes of the other is near the identity where they are near each other; then its eigenvalues are. One that has
+    passed zero is negative. An even number of them leaves the sign of the determinant as it was.
+    """
+    try:
+        change = np.linalg.solve(before, after)
+    except np.linalg.LinAlgError:
+        return True
+    if np.linalg.norm(change - np.eye(len(change))) < 1.0:  # no eigenvalue is as far from one as zero is
+        return False
+    values = np.linalg.eigvals(change)
+    return bool((-values.real >= np.abs(values.imag)).any())  # equal ones come out as pairs beside the axis
 
 
 def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
