@@ -7,13 +7,13 @@ finiteness, never by a simulator's own word; a step that does not converge, or c
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from ..core.analysis.continuity import continuous
+from ..core.analysis.continuity import EPSILON, continuous
 from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
@@ -22,6 +22,7 @@ from ..core.joints import Joint
 from ..core.motions import Path, outwards
 from ..core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .own_frame import GLOBAL, OwnFrame
+from .projection_model import ProjectionModel
 
 MAX_ITERATIONS = 20
 # Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method. None is as many as it takes.
@@ -34,50 +35,10 @@ RANK_TOLERANCE = 1e-9
 # believed: beside a fold the motion turns round, and another assembly goes straight on. Where it really passes zero they are then.
 # Four times the smallest step: a pose that fails there can still be come nearer to. A fold of 0.05 of a step was passed over.
 FOLD = 4.0 * SMALLEST_STEP
-
-
-class ProjectionModel(Protocol):
-    """A simulator's kinematics: unknowns x (its tree or body coordinates), rows for closures and drivers.
-
-    Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of the current configuration.
-    `residual` updates whatever the other methods read.
-    """
-
-    def reset(self) -> None:
-        """Back to the design configuration."""
-        ...
-
-    def save(self) -> Any:
-        """A copy of the configuration."""
-        ...
-
-    def restore(self, saved: Any) -> None:
-        """Back to a saved configuration."""
-        ...
-
-    def move(self, dx: Array) -> None:
-        """Advance the configuration by dx, shape (unknowns,)."""
-        ...
-
-    def residual(self, c: Array) -> Array:
-        """All rows with the drivers at c, in the mechanism's order, from their design values, shape (rows,)."""
-        ...
-
-    def jacobian(self) -> Array:
-        """Derivative of the rows by dx, shape (rows, unknowns); a copy, or valid until the next call."""
-        ...
-
-    def driver_columns(self) -> Array:
-        """Derivative of the rows by c, negated: J v = driver_columns c_t, shape (rows, drivers)."""
-        ...
-
-    def bias(self, v: Array) -> Array:
-        """Jdot v of all rows, shape (rows,)."""
-        ...
-
-    def points(self, v: Array, a: Array) -> Sequence[tuple[Array, Array, Array]]:
-        """Position, velocity and acceleration of each of case.points, in order, global axes."""
-        ...
+# Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
+ROUNDING = 64.0 * EPSILON
+# Least squares have arrived where a step is this short: no more is to be gained, and what is left are rows that contradict others.
+ARRIVED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +91,9 @@ def solve_by_projection(
 
 
 LOST = "Newton does not converge or jumps to another assembly"
-"""Why a motion ends, as far as it is known here."""
+"""Why a motion ends, where nothing more is known."""
+STUCK = "drivers cannot move: it is a dead centre, or the motions that joints leave contradict each other"
+"""Why it ends where it closes."""
 
 
 class Walk:
@@ -143,6 +106,7 @@ class Walk:
         self.drivers = [driver.name for driver in case.mechanism.drivers]
         self.units = np.array([[1.0 if driver.turns else frame.unit] for driver in case.mechanism.drivers])
         self.size = size(case) / frame.unit
+        self.lost = LOST  # why the last pose that was looked for was not found
         model.reset()
         model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
@@ -166,7 +130,8 @@ class Walk:
 
     def newton(self, c: Array) -> tuple[Array, int, float] | None:
         """Sum of all steps, iterations and final residual at driver values c, or None."""
-        met, corrected = False, np.zeros(self.unknowns)
+        self.lost = LOST
+        met, worst, step, corrected = False, math.inf, np.full(self.unknowns, math.inf), np.zeros(self.unknowns)
         for iteration in range(1, MAX_ITERATIONS + 1):
             r = self.model.residual(c)
             worst = float(np.abs(r).max()) if np.isfinite(r).all() else math.inf
@@ -174,10 +139,11 @@ class Walk:
                 return None
             if iteration - 1 == self.corrections:
                 return corrected, iteration - 1, worst
-            if (
-                met and self.corrections is None
-            ):  # one step after meeting the tolerance: quadratic convergence makes it exact to round-off
-                return (corrected, iteration - 1, worst) if worst <= self.tol else None
+            # one step after meeting the tolerance: quadratic convergence makes it exact to round-off
+            if met and self.corrections is None:
+                if worst <= self.tol:
+                    return corrected, iteration - 1, worst
+                break
             met = worst <= self.tol
             try:
                 step = self.linear(self.model.jacobian(), -r)
@@ -187,6 +153,11 @@ class Walk:
                 return None
             self.model.move(step)
             corrected += step
+        if worst <= ROUNDING:
+            self.lost = f"the residual {worst:.3g} is rounding, and the tolerance {self.tol:.3g} is less; allow more"
+        elif not self.square and np.abs(step).max() <= ARRIVED:
+            ends = "the motion ends, or joints contradict each other"
+            self.lost = f"no pose near there closes better than to {worst:.3g} of the mechanism's size: {ends}"
         return None
 
     def solve(self, path: Path, t: float) -> _Sample | None:
@@ -205,6 +176,7 @@ class Walk:
             return None
         # least squares would hide rates that no row set can meet (a driver pushed at a dead centre)
         if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
+            self.lost = STUCK
             return None
         position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
         sums = self.independent @ jacobian
@@ -244,12 +216,20 @@ class Walk:
         lead_in = path if path.from_design else path.lead_in()
         design = self.solve(lead_in, 0.0)
         if design is None:
-            return None, "no assembly at the design position: the model does not close there"
+            if self.lost is STUCK:
+                return None, f"at the design position the {STUCK}"
+            return (
+                None,
+                f"no assembly at the design position: {'the model does not close there' if self.lost is LOST else self.lost}",
+            )
         if path.from_design:
             return design, ""
         first, reached = self.advance(lead_in, design, 1.0, 1.0)
         if not reached:
-            return None, f"the drivers reach only {first.t:.3g} of the way from the design to the first sample; start nearer"
+            return (
+                None,
+                f"the drivers reach only {first.t:.3g} of the way from the design to the first sample: {self.lost}; start nearer",
+            )
         self.model.restore(first.saved)
         found = self.solve(path, float(path.times[0]))
         return found, "" if found else "the first sample's pose is reached, but its drivers cannot move there (a dead centre)"
@@ -271,7 +251,7 @@ class Walk:
                 for k in side:
                     at, reached = self.advance(path, at, float(times[k]), step)
                     if not reached:
-                        messages.append(path.ended(at.t, float(times[k]), last, LOST))
+                        messages.append(path.ended(at.t, float(times[k]), last, self.lost))
                         break
                     last = float(times[k])
                     motion[:, k] = at.rows

@@ -19,7 +19,8 @@ from ..core.errors import KincheckError, SolveError
 from ..core.harness.case import Case
 from ..core.motions import outwards
 from ..core.trajectory import Array, PointMotion, Trajectory, largest_found
-from .projection import ProjectionModel, Walk
+from .projection import Walk
+from .projection_model import ProjectionModel
 
 # A loop that is open by more than this part of the mechanism's size is torn: the pose is no longer one of the mechanism. The
 # softest simulator, MuJoCo as it comes, stays below on most built-in cases.

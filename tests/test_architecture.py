@@ -26,6 +26,7 @@ SHARED_BY_ADAPTERS = {
     "closures",
     "conditions",
     "own_frame",
+    "projection_model",
 }
 LONGEST = 300
 

@@ -155,3 +155,45 @@ def test_a_fold_between_two_samples_is_not_stepped_over(name, loops):
     off = -np.sqrt(coupler**2 / (apart * apart).sum(axis=1) - along**2)
     truth = pin + along[:, None] * apart + off[:, None] * np.column_stack([-apart[:, 1], apart[:, 0]])
     np.testing.assert_allclose(found.points["P"].position[:, :2], truth, rtol=0, atol=1e-11)
+
+
+class Doubled(Crank):
+    """The driver's row once more, off by a gap, and its rates by a push."""
+
+    def __init__(self, gap, push):
+        super().__init__(lambda c: 0.0)
+        self.gap, self.push = gap, push
+
+    def residual(self, c):
+        first, hidden = super().residual(c)
+        return np.array([first, hidden, first + self.gap])
+
+    def jacobian(self):
+        return np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+
+    def driver_columns(self):
+        return np.array([[1.0], [0.0], [1.0]])
+
+    def bias(self, v):
+        return np.array([0.0, 0.0, self.push])
+
+
+@pytest.mark.parametrize(
+    ("gap", "push", "tol", "message"),
+    [
+        (0.0, 0.0, 1e-12, ""),
+        (
+            2e-3,
+            0.0,
+            1e-12,
+            "no assembly at the design position: no pose near there closes better than to 0.001 of the mechanism's size",
+        ),
+        (2e-15, 0.0, 1e-16, "no assembly at the design position: the residual 1e-15 is rounding, and the tolerance 1e-16 is less"),
+        (0.0, 1.0, 1e-12, "at the design position the drivers cannot move"),
+    ],
+)
+def test_why_there_is_no_pose_is_told(gap, push, tol, message):
+    found = solve_by_projection(Doubled(gap, push), CASE, tol)
+    assert found.solved.all() == (not message)
+    assert found.message.startswith(message)
+    assert bool(found.message) == bool(message)
