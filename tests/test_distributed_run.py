@@ -1,8 +1,11 @@
 """Runs on a dask.distributed cluster: a real scheduler and workers on loopback, and what happens when they are lost."""
 
+import gc
 import importlib
 import os
 import signal
+import socket
+import time
 from collections import Counter
 
 import pytest
@@ -62,11 +65,47 @@ def test_a_cluster_that_goes_is_a_message(cluster):
 
 
 def test_no_scheduler_is_a_message(monkeypatch):
-    monkeypatch.setattr(ours, "CONNECT", 0.5)
+    """Where nobody listens, and where somebody does who is none and says nothing."""
+    monkeypatch.setattr(ours, "ANSWER", 0.25)
     with pytest.raises(ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"):
         run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
-    with pytest.raises(ClusterError, match="does not answer"):
-        run([crank()], [Fake()], tol=TOL, solver=on_cluster("nonsense://", LIMITS))
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(ClusterError, match=rf"scheduler {address}: does not answer \(TimeoutError"):
+            run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["foo", "", "nonsense://", "nonsense://a:1", "tcp://:8786", "127.0.0.1:99999", "127.0.0.1:0", "127.0.0.1:a", "inproc://x"],
+)
+def test_what_cannot_be_an_address_is_said_at_once(address, monkeypatch):
+    monkeypatch.setattr(ours, "ANSWER", 60.0)
+    begin = time.perf_counter()
+    with pytest.raises(ClusterError) as caught:
+        run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
+    assert time.perf_counter() - begin < 20.0
+    message = str(caught.value)
+    assert message.startswith(f"scheduler {address}: found no address (")
+    assert message.endswith("), expected HOST:PORT or tcp://HOST:PORT; write it as `dask scheduler` prints it")
+
+
+@pytest.mark.parametrize("command", ["run", "sweep"])
+def test_a_command_without_its_cluster_is_one_message_and_ends_soon(kincheck_main, capsys, tmp_path, command):
+    """Soon after the message too: nothing of the client is left to be waited for."""
+    (tmp_path / "vary.toml").write_text(
+        'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nat = "tip"\nsigma = 1\n'
+    )
+    more = {"run": ["--history", tmp_path / "h.db"], "sweep": ["--vary", tmp_path / "vary.toml", "--samples", 3]}[command]
+    begin = time.perf_counter()
+    assert kincheck_main(command, "crank", "--scheduler", "foo", *more, jobs=None) == 2
+    gc.collect()
+    assert time.perf_counter() - begin < 20.0
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    assert line.startswith("kincheck: scheduler foo: found no address (")
+    assert not (tmp_path / "h.db").exists()
 
 
 def test_without_dask_there_is_a_message(monkeypatch):

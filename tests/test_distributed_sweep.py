@@ -69,7 +69,7 @@ def test_a_cluster_that_goes_is_a_message(cluster, tmp_path, monkeypatch):
 
 
 def test_no_scheduler_is_a_message(tmp_path, monkeypatch):
-    monkeypatch.setattr(ours, "CONNECT", 0.5)
+    monkeypatch.setattr(ours, "ANSWER", 0.25)
     case = crank()
     variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})
     with pytest.raises(ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"):

@@ -58,6 +58,19 @@ def contradictions(options: argparse.Namespace) -> list[str]:
     return problems
 
 
+def unreachable(options: argparse.Namespace) -> list[str]:
+    """Why there is no cluster, where one is asked for: found before the work, and after all other problems, for it takes time."""
+    if options.scheduler is None:
+        return []
+    from ..workers.distributed import ClusterError, connected, loaded
+
+    try:
+        connected(loaded(), options.scheduler).close()
+    except ClusterError as error:
+        return [str(error)]
+    return []
+
+
 def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
     """Where the pairs are solved, and what the results say of it."""
     from ..attempt import here

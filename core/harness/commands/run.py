@@ -156,6 +156,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> tup
         cases = judged_by(cases, options.reference)
     engines, baseline = _engines(options, house, problems)
     problems += to.problems()
+    problems = problems or isolation.unreachable(options)
     if problems:
         raise KincheckError("\n".join(problems))
     return cases, engines, baseline

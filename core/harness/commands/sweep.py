@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..console import complain
-from . import foreign
+from . import foreign, isolation
 from .house import House, Status, unknown, whole
 from .run import TOL, positive
 
@@ -87,6 +87,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     engine, share = _check(options, house, problems)
     case = _only(house.find_case(options.case, foreign.supplied(options)), options.output, problems)
     foreign.tell_left_out([case])
+    problems = problems or isolation.unreachable(options)
     if problems:
         raise KincheckError("\n".join(problems))
     variation = read_variation(options.vary, case)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 from typing import Any
+from urllib.parse import urlsplit
 from uuid import uuid4
 
 from ...errors import KincheckError
@@ -16,7 +19,10 @@ from .frames import pack
 from .limits import Limits
 from .worker import Seat
 
-# For the scheduler to answer at all [s]: a name is looked up and a port is asked, which takes milliseconds or never succeeds.
+# For a port to answer [s], and as long again for a scheduler behind it: each takes milliseconds, unless packets are lost, which are
+# sent again after 1 s and after 3 s.
+ANSWER = 5.0
+# For a scheduler that has answered to do so again, if it is lost on the way [s].
 CONNECT = 20.0
 
 
@@ -43,15 +49,32 @@ def connected(distributed: Any, address: str) -> Any:
     """A client of the scheduler, to be used in a `with`.
 
     Raises:
-        ClusterError: the scheduler does not answer.
+        ClusterError: the address cannot be one, or no scheduler answers there.
     """
     try:
+        # asked before there is a client, for one that finds no scheduler waits for its own end in vain; and in a thread, for that
+        # of a notebook has a loop already
+        with ThreadPoolExecutor(1) as aside:
+            aside.submit(asyncio.run, asyncio.wait_for(_asked(distributed, address), 2.0 * ANSWER)).result()
         return distributed.Client(address, timeout=CONNECT, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
+    except OSError as error:
         raise ClusterError(
             f"scheduler {address}: does not answer ({said(error)}); start one with `dask scheduler` and workers with "
             "`dask worker ADDRESS`, where kincheck and the engines are installed"
         ) from error
+    except (ValueError, TypeError) as error:
+        raise ClusterError(
+            f"scheduler {address}: found no address ({said(error)}), expected HOST:PORT or tcp://HOST:PORT; write it as "
+            "`dask scheduler` prints it"
+        ) from error
+
+
+async def _asked(distributed: Any, address: str) -> None:
+    place = urlsplit(address if "://" in address else f"//{address}")
+    if not place.hostname or place.port == 0:  # a port out of range raises ValueError when it is asked for
+        raise ValueError("no host and port")
+    comm = await distributed.comm.connect(address, timeout=ANSWER, **distributed.Security().get_connection_args("client"))
+    await comm.close()
 
 
 def _gathered(distributed: Any, client: Any, address: str, pairs: Sequence[Pair], limits: Limits) -> Attempts:
