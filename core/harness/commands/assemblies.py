@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import KincheckError
 from . import foreign
 from .export import keep_texts
-from .house import House, Status, unknown, whole
+from .house import House, Status, given, unknown, whole
 
 if TYPE_CHECKING:
     from ..assemblies import Survey
@@ -34,7 +34,7 @@ def add(commands: Any) -> None:
     listing.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random starts; default %(default)s")
     listing.add_argument("--json", metavar="FILE", help="write the assemblies with all poses as JSON; - for standard output")
     listing.add_argument("--export", metavar="FORMAT", help="write the mechanism, started in one of them: mjcf, exudyn or urdf")
-    listing.add_argument("--number", type=int, default=1, metavar="K", help="which one to export; default 1, the first of the list")
+    listing.add_argument("--number", type=whole(1), metavar="K", help="which one to export; default 1, the first of the list")
     listing.add_argument("--out", type=Path, metavar="FILE", help="of the export; default: CASE.K in this folder")
     foreign.add_options(listing)
 
@@ -53,7 +53,12 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
     """
     from ..assemblies import survey, written
     from ..printing import write_json
+    from ..reporting.deliver import unwritable
 
+    if options.export is None and (found := given(options, ("number", "out"))):
+        raise KincheckError(f"{found}: found without --export, expected with it, to say what it writes; leave it out, or export")
+    if problems := unwritable([("--json", options.json), ("--out", options.out)]):
+        raise KincheckError("\n".join(problems))
     if options.export is not None and options.export not in house.writers:
         raise KincheckError(unknown("format", options.export, house.writers))
     case = house.find_case(options.case, foreign.supplied(options))
@@ -62,8 +67,9 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
     _print(found, options.json)
     write_json(found.report(), options.json)
     if options.export is not None:
-        texts = written(found, house.writer(options.export), options.number)
-        keep_texts(texts, f"{case.name}.{options.number}", options.out, quiet=options.json == "-")
+        number: int = options.number or 1
+        texts = written(found, house.writer(options.export), number)
+        keep_texts(texts, f"{case.name}.{number}", options.out, options.json)
     return Status.WITHIN if found.assemblies.found else Status.DEVIATES
 
 

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from . import foreign
-from .house import House, Status
+from .house import House, Status, whole
 from .run import TOL, positive
 
 
@@ -18,7 +18,9 @@ def add(commands: Any) -> None:
     )
     explaining.set_defaults(do=_explain)
     explaining.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
-    explaining.add_argument("--samples", type=int, default=41, metavar="N", help="of the sweep to look at; default %(default)s")
+    explaining.add_argument(
+        "--samples", type=whole(1), default=41, metavar="N", help="of the sweep to look at; default %(default)s"
+    )
     explaining.add_argument(
         "--tol", type=positive, default=TOL, metavar="X", help=f"residual that engines may leave [m or -]; default {TOL:g}"
     )
@@ -38,7 +40,7 @@ def _explain(options: argparse.Namespace, house: House) -> int:
 
     case = house.find_case(options.case, foreign.supplied(options), driven=False)
     foreign.tell_left_out([case])
-    found = diagnose(case, samples=max(1, options.samples), tol=options.tol)
+    found = diagnose(case, samples=options.samples, tol=options.tol)
     print_diagnosis(found, page(options.json))
     write_json(found, options.json)
     return Status.DEVIATES if found.findings else Status.WITHIN

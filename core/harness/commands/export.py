@@ -45,12 +45,17 @@ def _export(options: argparse.Namespace, house: House) -> int:
     return Status.WITHIN
 
 
-def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, *, quiet: bool = False) -> None:
+def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None) -> None:
     """Write texts, given by the endings of their files, beside each other, and print the files' names.
 
+    Args:
+        json: where the JSON is written; "-" for standard output, which then has nothing else.
+
     Raises:
-        KincheckError: a file cannot be written, or without `out` would be written over.
+        KincheckError: a file cannot be written, would be over the JSON, or without `out` over what is there.
     """
+    from ..reporting.deliver import unwritable
+
     first = next(iter(texts))
     # a name may be anything, also a path
     main: Path = out or Path("".join(each if each.isalnum() or each in "-_. ()'" else "_" for each in name) + first)
@@ -58,9 +63,11 @@ def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, *, quiet: 
     for file in files:
         if out is None and file.exists():
             raise KincheckError(f"{file} is there already; name a file with --out to write over it")
+    if json and (problems := unwritable([("--json", json), *(("--out", file) for file in files)])):
+        raise KincheckError("\n".join(problems))
     for file, text in files.items():
         try:
             file.write_text(text, encoding="utf-8")
         except OSError as error:
             raise KincheckError(f"{file}: cannot be written ({error.strerror}); name another with --out") from error
-        print(file, file=sys.stderr if quiet else sys.stdout)
+        print(file, file=sys.stderr if json == "-" else sys.stdout)

@@ -54,9 +54,12 @@ def _history(options: argparse.Namespace, house: House) -> int:
     """List the runs, the latest first; for a case or an engine, its errors and times in them and the steps in these."""
     from ..history.series import read
     from ..history.store import Store
+    from ..reporting.deliver import unwritable
 
     if options.history is None:
         raise KincheckError(f"history: which file? give --history FILE, or set {HISTORY}")
+    if problems := unwritable([("--plot", options.plot), ("--export", options.export)], options.history):
+        raise KincheckError("\n".join(problems))
     with Store(Path(options.history), writable=False) as store:
         chosen: dict[str, Any] = {"cases": options.case, "engines": options.engine}
         _check_names(store, **chosen)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -121,6 +121,12 @@ def unknown(what: str, name: str, known: Sequence[str]) -> str:
     """What to say of a name that is none of the known ones."""
     close = difflib.get_close_matches(name, known, n=1)
     return f"there is no {what} {name!r}; " + (f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}")
+
+
+def given(options: argparse.Namespace, names: Iterable[str]) -> str:
+    """Those of the options that were given, to be named in a message; they have no default, or false, or no names."""
+    found = (name for name in names if getattr(options, name) not in ([], None) and getattr(options, name) is not False)
+    return ", ".join(f"--{name.replace('_', '-')}" for name in found)
 
 
 def whole(least: int) -> Callable[[str], int]:

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..workers.limits import MEMORY, TIMEOUT, Limits, default_jobs
+from ..workers.limits import MEMORY, MOST, TIMEOUT, Limits, default_jobs
 
 if TYPE_CHECKING:
     from ..attempt import Solver
@@ -15,6 +15,13 @@ if TYPE_CHECKING:
 
 def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float]) -> None:
     """Add the options to a command that solves pairs."""
+
+    def limit(text: str) -> float:
+        number = positive(text)
+        if number > MOST:
+            raise argparse.ArgumentTypeError(f"{text!r} is more than can be counted, expected {MOST:g} at most; give less")
+        return number
+
     group = parser.add_argument_group("isolation", "A pair of case and engine is solved in a worker process of its engine.")
     group.add_argument(
         "--jobs",
@@ -25,13 +32,13 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
     )
     group.add_argument(
         "--timeout",
-        type=positive,
+        type=limit,
         metavar="SECONDS",
         help=f"of a pair, from its start; default {TIMEOUT:g}, a hundred times what the built-in cases take",
     )
     group.add_argument(
         "--memory",
-        type=positive,
+        type=limit,
         metavar="GB",
         help=f"of a worker process, on Linux; default {MEMORY:g}, sixteen times what the built-in cases take",
     )

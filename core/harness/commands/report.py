@@ -61,7 +61,7 @@ def _report(options: argparse.Namespace, house: House) -> int:
     from ..regression.summary import to_markdown
     from ..reporting.deliver import Destinations
 
-    if problems := Destinations.of(options).problems(OUT):
+    if problems := Destinations.of(options).problems(OUT, options.history):
         raise KincheckError("\n".join(problems))
     with ExitStack() as open_files:
         store = open_files.enter_context(Store(Path(options.history), writable=False)) if options.history else None

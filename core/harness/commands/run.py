@@ -155,7 +155,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> tup
 
         cases = judged_by(cases, options.reference)
     engines, baseline = _engines(options, house, problems)
-    problems += to.problems()
+    problems += to.problems(history=options.history)
     problems = problems or isolation.unreachable(options)
     if problems:
         raise KincheckError("\n".join(problems))

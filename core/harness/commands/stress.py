@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
-from .house import House, Status, unknown, whole
+from .house import House, Status, given, unknown, whole
 from .run import MODES, TOL, positive
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 SAMPLES = 2000
 FILES = ("stress.json", "stress.html", "stress.md")
+OF_FAMILIES = ("family", "samples", "seed", "no_proofs")
+"""Options of what is made up."""
 
 
 def add(commands: Any) -> None:
@@ -28,8 +30,8 @@ def add(commands: Any) -> None:
     stress.set_defaults(do=_stress)
     stress.add_argument("--family", nargs="+", action="extend", default=[], metavar="NAME", help="default: all families")
     stress.add_argument("--list", action="store_true", help="list the families")
-    stress.add_argument("--samples", type=_count, default=SAMPLES, metavar="N", help="over all families; default %(default)s")
-    stress.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the random mechanisms; default %(default)s")
+    stress.add_argument("--samples", type=_count, metavar="N", help=f"over all families; default {SAMPLES}")
+    stress.add_argument("--seed", type=whole(0), metavar="S", help="of the random mechanisms; default 0")
     stress.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native")
     stress.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
     stress.add_argument(
@@ -41,7 +43,7 @@ def add(commands: Any) -> None:
         "--replay", nargs="+", action="extend", default=[], type=Path, metavar="FILE", help="judge case files instead"
     )
     stress.add_argument(
-        "--tol", type=positive, default=TOL, metavar="X", help=f"of replayed files: largest constraint residual; default {TOL:g}"
+        "--tol", type=positive, metavar="X", help=f"of replayed files: largest constraint residual; default {TOL:g}"
     )
 
 
@@ -64,6 +66,8 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     from ..stress.report import markdown, report
 
     if options.list:
+        if found := given(options, [name for name in vars(options) if name not in ("list", "command", "do")]):
+            raise KincheckError(f"--list runs nothing; leave out {found}")
         width = max(map(len, Family.registry))
         for name, family in Family.registry.items():
             print(f"{name:{width}}  {family.about}")
@@ -73,9 +77,13 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     if options.replay:
         if options.out or options.json:
             problems.append("--replay prints what it finds; leave out --out and --json")
+        if found := given(options, OF_FAMILIES):
+            problems.append(f"--replay judges files as they are, which are of no family; leave out {found}")
         if problems:
             raise KincheckError("\n".join(problems))
         return _replay(options, house, engines)
+    if options.tol is not None:
+        problems.append("--tol is for replayed files, and families have tolerances of their own; leave it out, or give --replay")
     known = Family.registry
     problems += [unknown("family", name, [*known]) for name in options.family if name not in known]
     problems += delivery.Destinations.of(options).problems(FILES)
@@ -106,8 +114,8 @@ def _run(options: argparse.Namespace, families: list[Family], engines: list[Engi
     found, examples = stress(
         families,
         engines,
-        samples=options.samples,
-        seed=options.seed,
+        samples=options.samples or SAMPLES,
+        seed=options.seed or 0,
         command=options.command,
         prove=not options.no_proofs,
         tell=tell,
@@ -126,7 +134,7 @@ def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) ->
     for file in options.replay:
         case = house.find_case(str(file))
         for engine in engines:
-            found = judge(case, engine, options.tol)
+            found = judge(case, engine, options.tol or TOL)
             counts = ", ".join(f"{verdict} {found.counts[verdict]}" for verdict in Verdict if found.counts[verdict])
             print(f"{file.name}  {engine.name} {engine.mode}: {counts}")
             for verdict in BAD:

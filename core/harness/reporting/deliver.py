@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from ..record import Results, to_json
 
@@ -19,6 +19,9 @@ if TYPE_CHECKING:  # what draws is imported where a report is asked for
 
 REPORT = ("results.json", "report.html")
 """The files of a folder of results."""
+
+Named: TypeAlias = tuple[str, Path | str | None]
+"""An option and the file that it names, "-" for standard output; None where it was not given."""
 
 
 @dataclass(frozen=True)
@@ -44,23 +47,38 @@ class Destinations:
         """Those that a command's options name."""
         return cls(**{each.name: getattr(options, each.name, None) for each in fields(cls)})
 
-    def problems(self, names: Sequence[str] = REPORT) -> list[str]:
+    def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
         """What cannot be written, found before the work and not after it; makes the folder, for files of these names."""
-        found, files = list[str](), list[tuple[str, Path]]()
+        found, files = list[str](), list[Named]()
         if self.out is not None:
             try:
                 self.out.mkdir(parents=True, exist_ok=True)
                 files += [("--out", self.out / name) for name in names]
             except OSError as error:
                 found.append(f"--out {self.out}: cannot be made a folder ({error.strerror}); give another one")
-        if self.json not in (None, "-"):
-            files.append(("--json", Path(self.json)))
-        singles = (("--junit", self.junit), ("--markdown", self.markdown), ("--store", self.store))
-        files += [(option, file) for option, file in singles if file is not None]
-        for option, path in files:
-            if path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-                found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
-        return found
+        files += [("--json", self.json), ("--junit", self.junit), ("--markdown", self.markdown), ("--store", self.store)]
+        return found + unwritable(files, history)
+
+
+def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]:
+    """What cannot be written of the files that options name, or would be written over by the next.
+
+    Args:
+        history: kept in a file of its own, which is none of these.
+    """
+    found = list[str]()
+    seen = {} if history is None else {history.resolve(): "--history"}
+    for option, name in files:
+        if name in (None, "-"):
+            continue
+        path = Path(name)
+        if path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+            found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
+        elif path.exists() and not path.is_file():
+            continue  # a pipe or a device takes what several have to say
+        elif (other := seen.setdefault(path.resolve(), option)) != option:
+            found.append(f"{option} {path}: found the file of {other}, expected one of its own; give another")
+    return found
 
 
 @contextmanager

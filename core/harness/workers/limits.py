@@ -14,6 +14,9 @@ TIMEOUT = 300.0
 # leak or a wrong size, and most machines have it to spare.
 MEMORY = 4.0
 
+# Of either: bytes are counted to 9.2e18, and a thread waits for 9.2e9 s at the most.
+MOST = 1e9
+
 # For an interpreter to start and load numpy on a machine that is busy with other things [s]; it takes a third of a second.
 STARTUP = 120.0
 
