@@ -4,6 +4,7 @@ import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
+import kincheck.core
 import pytest
 from kincheck import adapters
 from kincheck.core import Body, InPlane, Joint, Revolute, Universal
@@ -107,12 +108,50 @@ def test_command_tells_of_a_failure(monkeypatch, capsys, tmp_path):
         ("no_such_module:Joint", "no module 'no_such_module'"),
         ("rzeppa", "write MODULE:CLASS"),
         ("rzeppa:Rzepa", "did you mean 'Rzeppa'"),
+        ("rzeppa:Nothing", "its joints: Revolute, Rzeppa, Spherical"),
         ("rzeppa:np", "is no joint type"),
+        ("kincheck.core:Revolut", "did you mean 'Revolute'?"),
+        (
+            "kincheck.core:Xyz",
+            "its joints: ConstantVelocity, Cylindrical, Distance, Fixed, InPlane, Inline, ",
+        ),
+        (".rzeppa:Rzeppa", "module '.rzeppa' cannot be imported: TypeError: "),
     ],
 )
 def test_command_that_cannot_do_its_work(in_folder, capsys, where, message):
     assert main(["check-joint", where]) == 2
     assert message in capsys.readouterr().err
+
+
+RAISING = "def f():\n    return 1 / 0\n\nf()\n"
+ENDLESS = "def f():\n    f()\n\nf()\n"
+REFUSED = 'from kincheck.core import Spherical\nball = Spherical("ball", "a", "a", (0.0, 0.0, 0.0))\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("def f(:\n    pass\n", "SyntaxError: invalid syntax ({file}, line 1: def f(:); correct it"),
+        ("\nx = 1\n  y = 2\n", "IndentationError: unexpected indent ({file}, line 3: y = 2); correct it"),
+        (RAISING, "ZeroDivisionError: division by zero ({file}, line 2: return 1 / 0, called from {file}, line 4: f()); "),
+        ("import nowhere_to_be_found\n", "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found); "),
+        ("import brok\n", "No module named 'brok' ({file}, line 1: import brok); correct it"),
+        ("import broken_too\n", "was never closed ({too}, line 2: x = (, called from {file}, line 1: import broken_too); "),
+        (ENDLESS, "{file}, line 2: f(), called from {file}, line 2: f(), called from {file}, line 4: f()); "),
+        (REFUSED, "joins 'a' with itself; a joint needs two different bodies ({file}, line 2: ball = Spherical("),
+    ],
+    ids=["syntax", "indent", "raises", "needs", "needs a name that begins its own", "imports", "recursion", "refused"],
+)  # fmt: skip
+def test_a_module_that_fails_is_one_message_with_its_place(tmp_path, monkeypatch, capsys, text, said):
+    file, too = tmp_path / "broken_joint.py", tmp_path / "broken_too.py"
+    file.write_text(text, encoding="utf-8")
+    too.write_text("y = 1\nx = (\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main(["check-joint", "broken_joint:Own"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("kincheck: module 'broken_joint' cannot be imported: ")
+    assert said.format(file=file, too=too) in line
+    assert str(Path(kincheck.core.__file__).parent) not in line
 
 
 def test_report_names_what_was_not_checked():

@@ -116,6 +116,8 @@ TABLE_FAULTS = {
     "upside down": ((), Supplied(WISHBONE, "mm", "rearward,right,down"), ["uca_outer", "lca_outer", "expected it above"]),
     "travel": ((), Supplied(WISHBONE, "mm", "adams", "5cm"), ["--travel", "'5cm'", "METRES"]),
     "separated travel": ((), Supplied(WISHBONE, "mm", "adams", "0.0_5"), ["--travel", "'0.0_5'", "METRES"]),
+    "many samples": ((), Supplied(WISHBONE, "mm", "adams", "0.05:1000000000"), ["METRES:SAMPLES, 2 to 1000000 of them"]),
+    "one sample": ((), Supplied(WISHBONE, "mm", "adams", "0.05:1"), ["METRES:SAMPLES, 2 to 1000000 of them"]),
     "no travel": ((), Supplied(WISHBONE, "mm", "adams", "0"), ["--travel", "'0'", "METRES"]),
     "drive": ((), Supplied(WISHBONE, "mm", "adams", drive=("a:0:1",)), ["--drive", "hardpoint table"]),
     "cut row": (("417,-750,330", "417,-750"), WHOLE, ["line 6", "found 3 fields", "expected 4"]),

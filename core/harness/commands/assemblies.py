@@ -56,7 +56,9 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
     from ..reporting.deliver import unwritable
 
     if options.export is None and (found := given(options, ("number", "out"))):
-        raise KincheckError(f"{found}: found without --export, expected with it, to say what it writes; leave it out, or export")
+        raise KincheckError(
+            f"{found}: found without --export, expected with it, to say what it writes; add --export FORMAT, or leave out"
+        )
     if problems := unwritable([("--json", options.json), ("--out", options.out)]):
         raise KincheckError("\n".join(problems))
     if options.export is not None and options.export not in house.writers:

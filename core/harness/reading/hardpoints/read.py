@@ -14,6 +14,7 @@ from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ..coordinates import AXES, with_all_coordinates
 from ..document import MOST_NAMED, brief, decimal, explained, fault, remedy, shown, similar
+from ..schema import MOST_SAMPLES
 from ..supplied import LEFT_OUT, Supplied
 from .table import HardpointTable, placed, require_size
 from .templates import TEMPLATES, Template
@@ -153,8 +154,11 @@ def _travel(file: Path, said: str | None) -> Array:
             travel, samples = decimal(first), int(last or SAMPLES)
         except ValueError:
             travel = math.nan
-        if not (0.0 < travel < math.inf and 1 < samples <= 1_000_000):
+        if not (0.0 < travel < math.inf and 1 < samples <= MOST_SAMPLES):
             raise fault(
-                file, "--travel", f"found {shown(said)}, expected METRES or METRES:SAMPLES; say --travel 0.05 for 50 mm up and down"
+                file,
+                "--travel",
+                f"found {shown(said)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of them; say --travel 0.05 for 50 mm "
+                "up and down",
             )
     return np.linspace(-travel, travel, samples)

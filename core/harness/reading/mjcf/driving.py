@@ -11,12 +11,13 @@ import numpy as np
 from ....errors import CaseError
 from ....trajectory import Array
 from ..document import decimal, fault, remedy, shown
+from ..schema import MOST_SAMPLES
 from ..supplied import Supplied
 from .elements import Element
 from .tree import Tree
 
-SAMPLES, MOST_SAMPLES = 41, 1_000_000
-_FORM = "JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates [rad, m]"
+SAMPLES = 41
+_FORM = f"JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates [rad, m], 2 to {MOST_SAMPLES} samples"
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,14 @@ def read_driving(file: Path, tree: Tree, supplied: Supplied) -> Driving:
 def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
     """The joint and its values; names may hold colons too."""
     parts = text.split(":")
-    named = [(":".join(parts[:-n]), parts[-n:]) for n in (3, 2) if len(parts) > n]
+    named = [(":".join(parts[:k]), parts[k:]) for k in range(max(1, len(parts) - 3), len(parts) + 1)]
     for name, numbers in named:
         if name not in tree.joints:
             continue
         if tree.joints[name].type == "ball":
             raise fault(file, "--drive", f"{name!r} is a ball joint, expected a hinge or a slide; drive one of those")
+        if len(numbers) < 2:
+            raise fault(file, "--drive", f"found {shown(text)}, expected {_FORM}; say from where to where: {name}:START:STOP")
         try:
             start, stop, steps = decimal(numbers[0]), decimal(numbers[1]), int(numbers[2]) if len(numbers) == 3 else SAMPLES
         except ValueError:
@@ -85,7 +88,7 @@ def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
         return name, np.linspace(start, stop, steps)
     else:
         hinges = [name for name, joint in tree.joints.items() if joint.type != "ball"]
-        name = named[-1][0] if named else text
+        name = named[0][0]
         raise fault(file, "--drive", f"found {shown(text)}, expected {_FORM}; {remedy(name, hinges)}")
     raise fault(file, "--drive", f"found {shown(text)}, expected {_FORM}; correct the numbers")
 
