@@ -40,6 +40,21 @@ def test_case_files_are_tests_of_every_engine(repository):
     ]
 
 
+def test_a_printed_id_runs_that_case_with_that_engine(repository):
+    folder = repository / "of.dots"
+    folder.mkdir()
+    (folder / "my.slider.toml").write_text(BASE + INLINE)
+    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native", "-v")
+    assert status == 0, out
+    printed = re.findall(r"^(\S+::\S+) PASSED", out, re.MULTILINE)
+    assert sorted(printed) == ["of.dots/my.slider.toml::native", "slider.toml::native"]
+    for each in printed:
+        out, status = pytest_there(repository, "--kincheck", "-v", each)
+        assert status == 0, out
+        assert re.findall(r"^(\S+::\S+) PASSED", out, re.MULTILINE) == [each]
+        assert "1 passed" in out
+
+
 def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(repository):
     (repository / "wrong.toml").write_text(edited(('name = "slider"', 'name = "wrong"')) + WRONG)
     out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")

@@ -121,8 +121,8 @@ class EngineTest(pytest.Item):
         return super().repr_failure(excinfo)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """The file, and what pytest calls the test."""
-        return self.path, None, f"{self.path.name}::{self.name}"
+        """The file, and the test in it: pytest prints them as the id that it takes, FILE::ENGINE."""
+        return self.path, None, self.name
 
 
 class CaseFailedError(Exception):
