@@ -2,6 +2,9 @@
 
 import importlib.metadata
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -44,6 +47,26 @@ def test_a_missing_engine_is_no_obstacle_and_its_remedy_is_named(without_imports
     assert main(["doctor"]) == 0
     (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("pin "))
     assert "not installed: pip install 'pin>=" in line
+
+
+def test_an_llvmlite_that_cannot_be_loaded_leaves_the_work_to_numpy(tmp_path):
+    """Its package is there, and its library is not; nothing that it made before is kept here."""
+    for file, text in (("__init__.py", ""), ("binding.py", 'raise OSError("no libllvmlite.so")')):
+        (tmp_path / "llvmlite").mkdir(exist_ok=True)
+        (tmp_path / "llvmlite" / file).write_text(text)
+    here = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    ran = subprocess.run(
+        [sys.executable, "-c", "import sys; from kincheck.core.harness.cli import main; sys.exit(main())", "doctor", "--json", "-"],
+        env=here,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    found = json.loads(ran.stdout)
+    (llvmlite,) = (part for part in found["parts"] if part["name"] == "llvmlite")
+    assert "no libllvmlite.so" in llvmlite["problem"]
+    assert (found["check"]["outcome"], found["machine"]["vector_width"]) == ("pass", None)
 
 
 def test_a_missing_essential_is_an_obstacle(without_imports, monkeypatch, capsys):

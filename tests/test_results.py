@@ -86,7 +86,9 @@ def test_junit_has_a_test_case_per_case_engine_and_output():
     assert "y: position is off by" in found["a.wrong.projection", "y"][0][1]
     assert found["a.partial.projection", "x"] == [("failure", "7 of 9 samples solved: cannot be followed beyond 0.5")]
     assert found["b.broken.projection", "y"] == [("error", "error: ValueError: no")]
-    assert found["b.missing.projection", "y"] == [("skipped", "unavailable: missing is not installed")]
+    assert found["b.missing.projection", "y"] == [
+        ("skipped", "unavailable: missing is not installed, or cannot be imported: kincheck doctor says which")
+    ]
     assert found["b.unable.projection", "y"] == [("skipped", "unsupported: no such joint")]
 
 

@@ -131,7 +131,9 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
         tell(facts)
         version = engine.version()
         if version is None:
-            return become(Failure(Outcome.UNAVAILABLE, f"{engine.name} is not installed"))
+            return become(
+                Failure(Outcome.UNAVAILABLE, f"{engine.name} is not installed, or cannot be imported: kincheck doctor says which")
+            )
         facts = replace(facts, version=bounded(version))
         tell(facts)
         reason = engine.unsupported(case)

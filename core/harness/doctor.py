@@ -108,7 +108,7 @@ def examine(case: Case, native: Engine, tol: float) -> Examination:
         about["platform"],
         about["processor"],
         os.cpu_count() or 1,
-        "machine code" if compiler.available() else "numpy: pip install llvmlite makes it some fifty times faster",
+        "machine code" if compiler.available() else "numpy: with llvmlite it is some fifty times faster",
         compiler.vector_width() if compiler.available() else None,
         str(disk_cache.folder() or "nowhere"),
         _cache_problem(),

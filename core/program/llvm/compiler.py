@@ -26,8 +26,17 @@ class Processor(NamedTuple):
 
 
 def available() -> bool:
-    """Whether llvmlite is installed."""
-    return importlib.util.find_spec("llvmlite") is not None
+    """Whether llvmlite is installed, and its library could be loaded here when that was needed first."""
+    return importlib.util.find_spec("llvmlite") is not None and _loads()
+
+
+@cache
+def _loads() -> bool:
+    try:
+        processor()  # asks LLVM only if it was never asked here: whoever has its products does without
+    except (ImportError, OSError):  # `kincheck doctor` tells it
+        return False
+    return True
 
 
 @cache
