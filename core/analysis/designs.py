@@ -13,6 +13,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion
 from ..trajectory import Array, PointMotion
+from .arguments import real
 from .equations.geometry import places
 from .route import recent_route
 from .solve import asked
@@ -79,14 +80,14 @@ def solve_designs(
     for place, given in geometry.items():
         if place not in known:
             raise SolveError(f"solve_designs: there is no place {place!r} to vary; known: {', '.join(known)}")
-        numbers.append(_numbers(place, np.asarray(given, dtype=np.float64), len(known[place])))
+        numbers.append(_numbers(place, real("solve_designs", place, given, "a row for each design"), len(known[place])))
     counts = {found.shape[1] for found in numbers}
     if len(counts) != 1:
         raise SolveError(f"solve_designs: found {sorted(counts)} designs for different places, expected as many of each")
     (count,) = counts
     route = recent_route(mechanism, replace(request, varied=tuple(geometry)), path)
     rows, lanes, n = route.model.rows, np.concatenate(numbers), len(path.times)
-    labels = ("position", "velocity", "acceleration")[: order + 1]
+    labels = ("position", "velocity", "acceleration")[: request.order + 1]
     motion: dict[str, dict[str, Any]] = {name: {label: np.empty((count, n, 3)) for label in labels} for name in request.points}
     solved, messages = np.empty((count, n), dtype=np.bool_), dict[int, str]()
     for first in range(0, count, LANES):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,6 +10,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
+from .arguments import finite, real
 from .equations.constraints import Style
 from .prepare import prepare
 from .request import Request
@@ -93,7 +93,7 @@ def asked(
         SolveError: an argument makes no sense; the message begins with who asks.
     """
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
-    values = _numbers(who, values)
+    values = real(who, "values", values, "one driver value for each sample")
     problem = _problem(driver, values, motions, rate, order, tol)
     if problem:
         raise SolveError(f"{who}: {problem}")
@@ -113,24 +113,17 @@ def asked(
     if not np.isfinite(times).all():
         raise SolveError(f"{who}: rate is {rate}: no number is the time of the values then; give a larger one")
     path = Path({**as_changes(motions, design), driver: Ramp(rate)}, times, design)
-    return path, Request(tuple(path.motions), wanted, tuple(bodies), order, Style(style))
-
-
-def _numbers(who: str, values: Sequence[float] | Array) -> Array:
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SolveError(f"{who}: values are {values!r}, expected numbers: one driver value for each sample") from None
+    return path, Request(tuple(path.motions), wanted, tuple(bodies), int(order), Style(style))
 
 
 def _problem(driver: str, values: Array, motions: Mapping[str, Motion], rate: float, order: int, tol: float) -> str:
     """What makes no sense about arguments, or nothing; told only where there is something, because telling takes its time."""
     if order not in (0, 1, 2):
-        return f"order is {order}, expected 0, 1 or 2"
-    if not (math.isfinite(rate) and rate != 0.0):
-        return f"rate is {rate}, expected driver units per second other than 0; 1 serves"
-    if not (math.isfinite(tol) and tol > 0.0):
-        return f"tol is {tol}, expected a positive number; 1e-12 serves"
+        return f"order is {order!r}, expected 0, 1 or 2"
+    if not (finite(rate) and rate != 0.0):
+        return f"rate is {rate!r}, expected driver units per second other than 0; 1 serves"
+    if not (finite(tol) and tol > 0.0):
+        return f"tol is {tol!r}, expected a positive number; 1e-12 serves"
     if values.ndim != 1:
         return f"values have shape {values.shape}, expected (n,): one driver value for each sample"
     if not np.isfinite(values).all():

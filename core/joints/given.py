@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from numbers import Real
+from numbers import Complex, Real
+from types import NoneType
 from typing import Any
 
 from ..errors import MechanismError
@@ -27,8 +28,12 @@ def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
 
 def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
     """Raise MechanismError unless all are finite numbers, or known only later (traced)."""
-    if any(isinstance(number, str) or (isinstance(number, Real) and not math.isfinite(number)) for number in numbers):
+    if any(isinstance(number, str | NoneType | Complex) and not _finite(number) for number in numbers):
         raise MechanismError(f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}")
+
+
+def _finite(number: Any) -> bool:
+    return isinstance(number, Real) and math.isfinite(number)
 
 
 def require_direction(who: str, numbers: Sequence[float]) -> None:

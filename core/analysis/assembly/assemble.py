@@ -12,7 +12,6 @@ A cap on the turn of a step (0.15 to 1.2 rad) was tried besides: it changes thes
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import astuple, dataclass
 
@@ -24,6 +23,7 @@ from ...mechanism import Mechanism
 from ...primitives.base import Pose
 from ...program import NumpyExecutor, Plan, Program, program
 from ...trajectory import Array, BodyMotion
+from ..arguments import real, require_positive
 from ..equations.constraints import Style
 from ..equations.drives import standing_drives
 from ..equations.poses import displaced, state_of
@@ -81,7 +81,8 @@ def assemble(
     """
     require_named("assemble", mechanism, estimates, values or {})
     require_positive("assemble", "tol", tol)
-    n = next((len(np.atleast_2d(r)) for r, _ in estimates.values()), 1)
+    origins = (real("assemble", f"origin r of body {name!r}", r, "of shape (n, 3)") for name, (r, _) in estimates.items())
+    n = next((len(np.atleast_2d(r)) for r in origins), 1)
     require_shapes("assemble", estimates, (n,))
     closing = Closing(mechanism, values or {}, style)
     return closing.run(displaced(mechanism, closing.tracer.frame, estimates), n, tol)
@@ -96,18 +97,13 @@ def require_named(who: str, mechanism: Mechanism, bodies: Iterable[str], drivers
                 raise SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
 
 
-def require_positive(who: str, what: str, number: float) -> None:
-    """Raise SolveError unless a number is positive and finite."""
-    if not (math.isfinite(number) and number > 0):
-        raise SolveError(f"{who}: {what} is {number}, expected a positive number")
-
-
 def require_shapes(who: str, estimates: Mapping[str, tuple[Array, Array]], lanes: tuple[int, ...]) -> None:
     """Raise SolveError unless all origins and Euler parameters are given for these lanes."""
     for name, pose in estimates.items():
         for what, numbers, count in zip(("origin r", "Euler parameters p"), pose, (3, 4), strict=True):
-            if np.shape(numbers) != (*lanes, count):
-                raise SolveError(f"{who}: {what} of body {name!r}: shape {np.shape(numbers)}, expected {(*lanes, count)}")
+            shape = real(who, f"{what} of body {name!r}", numbers, f"of shape {(*lanes, count)}").shape
+            if shape != (*lanes, count):
+                raise SolveError(f"{who}: {what} of body {name!r}: shape {shape}, expected {(*lanes, count)}")
 
 
 class Closing:

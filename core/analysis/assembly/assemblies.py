@@ -14,9 +14,10 @@ from ...mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Pose
 from ...topology import spanning_tree
 from ...trajectory import Array
+from ..arguments import require_positive
 from ..equations.constraints import Frames
 from ..equations.poses import displaced
-from .assemble import Closing, require_named, require_positive, require_shapes
+from .assemble import Closing, require_named, require_shapes
 from .signature import Branches
 
 # Starts around an estimate: turned by up to this [rad], and shifted by about this part of the mechanism's size. Bodies that are

@@ -12,6 +12,7 @@ from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...motions import Path, Ramp
 from ...trajectory import Array
+from ..arguments import require_positive
 from ..equations.constraints import Style
 from ..model import compile_model
 from ..request import Request
@@ -114,8 +115,7 @@ def trace(
     if direction not in (1, -1):
         raise SolveError(f"trace: direction is {direction}, expected 1 (the driver's value grows) or -1 (it falls)")
     for name, given in (("length", length), ("longest", longest), ("tol", tol)):
-        if not (np.isfinite(given) and given > 0.0):
-            raise SolveError(f"trace: {name} is {given}, expected a positive number")
+        require_positive("trace", name, given)
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
     unknown = [name for name in wanted if name not in [point.name for point in mechanism.points]]
     if unknown:

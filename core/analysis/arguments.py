@@ -1,0 +1,40 @@
+"""What callers give functions: real numbers where numbers are expected, or an error that says what was found."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..errors import SolveError
+from ..trajectory import Array
+
+
+def finite(number: Any) -> bool:
+    """Whether it is a finite number, or an array of one."""
+    try:
+        return math.isfinite(number)
+    except (TypeError, ValueError):  # of no number, a complex one, or several
+        return False
+
+
+def require_positive(who: str, what: str, number: Any) -> None:
+    """Raise SolveError unless a number is positive and finite."""
+    if not (finite(number) and number > 0):
+        raise SolveError(f"{who}: {what} is {number!r}, expected a positive number")
+
+
+def real(who: str, what: str, given: Any, expected: str) -> Array:
+    """Numbers as an array of their own; an imaginary part is none to be lost.
+
+    Raises:
+        SolveError: they are no real numbers.
+    """
+    try:
+        found = np.asarray(given)
+        if not np.iscomplexobj(found):
+            return np.array(found, dtype=np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise SolveError(f"{who}: {what} are {given!r}, expected numbers: {expected}")
