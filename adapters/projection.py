@@ -27,14 +27,16 @@ from .projection_model import ProjectionModel
 MAX_ITERATIONS = 20
 # Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method. None is as many as it takes.
 EFFORTS: Mapping[str, int | None] = {"predictor only": 0, "1 Newton step": 1, "2 Newton steps": 2, "until converged": None}
-# A step shorter than this part of the sample distance that still fails is the end of the motion, not a coarse grid.
-SMALLEST_STEP = 2.0**-10
+# A step shorter than this part of the sample distance that still fails is the end of the motion, not a coarse grid. Change points
+# that are missed by a part d of the size ask for steps of the root of d; with 2^-10 those by 1e-8 were ends, or passed over.
+SMALLEST_STEP = 2.0**-20
 # Singular values below this part of the largest count as zero: far above round-off (1e-15), far below a sound mechanism (1e-2).
 RANK_TOLERANCE = 1e-9
 # Where singular values of the Jacobian pass zero, steps are shortened to this part of the sample distance before they are
 # believed: beside a fold the motion turns round, and another assembly goes straight on. Where it really passes zero they are then.
-# Four times the smallest step: a pose that fails there can still be come nearer to. A fold of 0.05 of a step was passed over.
-FOLD = 4.0 * SMALLEST_STEP
+# A few times the smallest step: a pose that fails there can still be come nearer to. Nearer than the root of round-off to where it
+# passes zero, rounding would choose the assembly.
+FOLD = 8.0 * SMALLEST_STEP
 # Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
 ROUNDING = 64.0 * EPSILON
 # Least squares have arrived where a step is this short: no more is to be gained, and what is left are rows that contradict others.
