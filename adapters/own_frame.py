@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,6 +37,10 @@ class OwnFrame:
         x, y, z = ((x - o) / self.unit for x, o in zip(position, self.origin, strict=True))
         return x, y, z
 
+    def units(self, length: float) -> float:
+        """A length [m] in units."""
+        return length / self.unit
+
     def back(self, position: Array) -> Array:
         """Positions in this frame [units], shape (..., 3), as global ones [m]."""
         return self.unit * position + np.array(self.origin)
@@ -58,7 +61,7 @@ def own_frame(case: Case) -> OwnFrame:
 def in_own_frame(case: Case) -> Case:
     """The case, its mechanism in its own frame; what drives it and what is compared stay in SI."""
     mechanism, frame = case.mechanism, own_frame(case)
-    ways: dict[Kind, Any] = {Kind.POSITION: frame.there, Kind.LENGTH: partial(_divided, frame.unit)}
+    ways: dict[Kind, Any] = {Kind.POSITION: frame.there, Kind.LENGTH: frame.units}
     return replace(
         case,
         mechanism=replace(
@@ -69,7 +72,3 @@ def in_own_frame(case: Case) -> Case:
             couplers=[coupler.scaled(1.0 / frame.unit) for coupler in mechanism.couplers],
         ),
     )
-
-
-def _divided(unit: float, length: float) -> float:
-    return length / unit
