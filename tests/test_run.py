@@ -140,7 +140,8 @@ def test_an_interrupt_is_not_swallowed():
 
 def test_missing_and_unable_engines_have_records_with_reasons():
     missing = record_of(Fake(installed=None))
-    assert (missing.outcome, missing.message, missing.version) == (Outcome.UNAVAILABLE, "fake is not installed", None)
+    said = "fake is not installed, or cannot be imported: kincheck doctor says which"
+    assert (missing.outcome, missing.message, missing.version) == (Outcome.UNAVAILABLE, said, None)
     unable = record_of(Fake(refusal="joint 'cv' (universal) has no counterpart"))
     assert (unable.outcome, unable.message) == (Outcome.UNSUPPORTED, "joint 'cv' (universal) has no counterpart")
     assert unable.version == "1.2"
