@@ -177,6 +177,36 @@ def test_runs_at_once_do_not_disturb_each_other(path):
     assert sorted(said) == [["1", "True"], ["2", "True"], ["3", "True"]]
 
 
+OPENERS = """
+import os, sys, time
+from pathlib import Path
+from kincheck.core.harness.history.store import Store
+for k in range(80):
+    at, children = time.time() + 0.004, []
+    for c in range(4):
+        child = os.fork()
+        if not child:
+            while time.time() < at + 0.0007 * c:
+                pass
+            try:
+                with Store(Path(sys.argv[1]) / f"{k}.sqlite"):
+                    os._exit(0)
+            except BaseException as error:
+                print(error, flush=True)
+                os._exit(1)
+        children.append(child)
+    for child in children:
+        os.waitpid(child, 0)
+"""
+
+
+def test_a_new_file_is_opened_by_several_at_once(tmp_path):
+    """A thousandth of a second apart, while one of them is making the tables."""
+    ran = subprocess.run([sys.executable, "-c", OPENERS, tmp_path], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert ran.stdout == ""
+    assert len(list(tmp_path.glob("*.sqlite"))) == 80
+
+
 # Files of another time or kind
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
+from time import monotonic, sleep
 
 APPLICATION = 0x6B696E63
 """The application_id of these files ("kinc"): another program's database is refused, not added to."""
@@ -122,14 +123,32 @@ def check(connection: sqlite3.Connection) -> int:
     Raises:
         ValueError: another program's file, or one that a later version has made.
     """
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    (application,) = connection.execute("PRAGMA application_id").fetchone()
-    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    # in one statement: another process may be making the tables, and is not to be seen halfway
+    tables, version, application = connection.execute(
+        "SELECT (SELECT count(*) FROM sqlite_master), user_version, application_id FROM pragma_user_version, pragma_application_id"
+    ).fetchone()
     if application != APPLICATION and (tables or version or application):
         raise ValueError("a database of another program; give another file")
     if version > len(MIGRATIONS):
         raise ValueError(f"its schema is version {version}, this kincheck knows {len(MIGRATIONS)}; update kincheck")
     return version
+
+
+def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
+    """Have readers and a writer not wait for each other.
+
+    Of those who ask for that in a new file at once, SQLite has some fail instead of wait: they ask again.
+    """
+    end = monotonic() + patience
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError:
+            if monotonic() > end:
+                raise
+            sleep(0.01)
+        else:
+            return
 
 
 def _statements(text: str) -> Iterator[str]:

@@ -28,7 +28,7 @@ from ...errors import KincheckError
 from ..circumstances import missing, versions
 from ..record import Record, Results
 from .owner import alive, owner
-from .schema import MIGRATIONS, check, migrate
+from .schema import MIGRATIONS, check, migrate, write_ahead
 
 Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
 """The file says that a run is running until it ends; where its process is gone it was killed."""
@@ -210,7 +210,7 @@ class Store:
         connection = sqlite3.connect(self.path, timeout=BUSY, isolation_level=None)
         try:
             check(connection)  # before anything is changed in a file that may not be ours
-            connection.execute("PRAGMA journal_mode = WAL")  # readers and a writer do not wait for each other
+            write_ahead(connection, BUSY)
             connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power cut too
             connection.execute("PRAGMA foreign_keys = ON")
             migrate(connection)
