@@ -53,7 +53,7 @@ class _Sample:
     v: Array
     a: Array
     rows: tuple[Array, Array, Array]
-    sums: Array
+    sums: Array  # of the rows, as many as unknowns and independent at design; by the unknowns
     corrected: Array
     iterations: int
     residual: float
