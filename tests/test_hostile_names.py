@@ -3,6 +3,8 @@
 import csv
 import io
 import re
+from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import msgspec
@@ -16,9 +18,10 @@ from kincheck.core.harness.reporting.report import render
 from kincheck.core.harness.reporting.table import print_table
 from kincheck.core.harness.reporting.views import Material
 from kincheck.core.harness.study.tables import _csv
-from kincheck.core.harness.visible import cell, visible
+from kincheck.core.harness.visible import cell, file_name, visible
 from markdown_it import MarkdownIt
 
+from .fakes import crank
 from .made_up import results
 from .test_report import Page
 
@@ -139,3 +142,18 @@ def test_what_prints_stays_as_it_is():
     assert visible("é α 漢 ² |<>") == "é α 漢 ² |<>"
     assert visible("a\nb\tc\x1b", also="\n") == "a\nb\\tc\\x1b"
     assert visible("\u202e\udcff\U000e0001") == "\\u202e\\udcff\\U000e0001"
+
+
+@pytest.mark.parametrize("name", [*NAMES.values(), "../escaped", "/tmp/escaped", "..", "a\\b", "C:a"])
+def test_no_name_leads_out_of_a_folder(name, tmp_path):
+    file = tmp_path / f"{file_name(name)}.reference.json"
+    assert file.resolve().parent == tmp_path.resolve()
+    assert not re.search(r"[/\\:]", file_name(name))
+
+
+def test_a_reference_stays_in_its_folder(kincheck_main, tmp_path):
+    pytest.importorskip("flint")
+    (tmp_path / "proofs").mkdir()
+    case = replace(crank(reference=False), name="../escaped")
+    assert kincheck_main("reference", "crank", "--digits", 20, "--out", tmp_path / "proofs", cases={"crank": case}) == 0
+    assert [each.relative_to(tmp_path) for each in tmp_path.rglob("*.json")] == [Path("proofs/.._escaped.reference.json")]

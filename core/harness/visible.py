@@ -18,6 +18,11 @@ def visible(text: str, also: str = "") -> str:
     )
 
 
+def file_name(text: str) -> str:
+    """A name of a file that stays in its folder, from a text that may be anything, also a path."""
+    return "".join(letter if letter.isalnum() or letter in "-_. ()'" else "_" for letter in text)
+
+
 def cell(value: object) -> object:
     """A value for a cell of a CSV file: a text that a spreadsheet would take for a formula, and compute, gets an apostrophe."""
     if not isinstance(value, str):

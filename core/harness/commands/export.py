@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import KincheckError
+from ..visible import file_name
 from . import foreign
 from .house import House, Status, unknown
 
@@ -57,8 +58,7 @@ def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, json: str 
     from ..reporting.deliver import unwritable
 
     first = next(iter(texts))
-    # a name may be anything, also a path
-    main: Path = out or Path("".join(each if each.isalnum() or each in "-_. ()'" else "_" for each in name) + first)
+    main: Path = out or Path(file_name(name) + first)
     files = {main if ending == first else main.with_suffix(ending): text for ending, text in texts.items()}
     for file in files:
         if out is None and file.exists():

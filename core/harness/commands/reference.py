@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
+from ..visible import file_name
 from .house import House, Status
 from .run import TOL
 
@@ -72,7 +73,7 @@ def _prove(options: argparse.Namespace, house: House) -> int:
         complete &= found.proved == len(found.samples)
         print(*_lines(found, errors), sep="\n", flush=True)
         if options.out is not None:
-            _write(options.out / f"{case.name}.reference.json", to_json(found))
+            _write(options.out / f"{file_name(case.name)}.reference.json", to_json(found))
     return Status.WITHIN if complete else Status.DEVIATES
 
 
