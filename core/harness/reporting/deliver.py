@@ -10,6 +10,7 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
+from uuid import uuid4
 
 from ..record import Results, to_json
 
@@ -109,7 +110,7 @@ def written(path: Path, content: Callable[[Path], object]) -> list[str]:
     if whole.exists() and not (whole.is_file() and os.access(whole.parent, os.W_OK)):  # a pipe, a device, or in a folder of others
         whole, part = path, path
     else:
-        part = whole.with_name(f".{whole.name}.part")
+        part = whole.with_name(f".{whole.name}.{uuid4().hex}.part")  # another run may be writing the same file
     try:
         try:
             content(part)
