@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from ..errors import SolveError
+from ..joints.given import finite
 from ..trajectory import Array
-
-
-def finite(number: Any) -> bool:
-    """Whether it is a finite number, or an array of one."""
-    try:
-        return math.isfinite(number)
-    except (TypeError, ValueError):  # of no number, a complex one, or several
-        return False
 
 
 def require_positive(who: str, what: str, number: Any) -> None:

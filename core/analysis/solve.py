@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import SolveError
+from ..joints.given import finite
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
-from .arguments import finite, real
+from .arguments import real
 from .equations.constraints import Style
 from .prepare import prepare
 from .request import Request
@@ -118,7 +119,7 @@ def asked(
 
 def _problem(driver: str, values: Array, motions: Mapping[str, Motion], rate: float, order: int, tol: float) -> str:
     """What makes no sense about arguments, or nothing; told only where there is something, because telling takes its time."""
-    if order not in (0, 1, 2):
+    if not finite(order) or order not in (0, 1, 2):
         return f"order is {order!r}, expected 0, 1 or 2"
     if not (finite(rate) and rate != 0.0):
         return f"rate is {rate!r}, expected driver units per second other than 0; 1 serves"

@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from numbers import Complex, Real
+from numbers import Complex
 from types import NoneType
 from typing import Any
+
+import numpy as np
 
 from ..errors import MechanismError
 
 SHORTEST = 1e-150
 """Of a direction: the square of a shorter one has fewer digits than others, or none."""
+
+
+def finite(number: Any) -> bool:
+    """Whether it is a finite number, or an array that is one."""
+    try:
+        # numpy's complex numbers would be taken by their real part
+        return not np.iscomplexobj(number) and math.isfinite(number)
+    except (TypeError, ValueError):  # of no number, or several
+        return False
 
 
 def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
@@ -28,12 +39,8 @@ def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
 
 def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
     """Raise MechanismError unless all are finite numbers, or known only later (traced)."""
-    if any(isinstance(number, str | NoneType | Complex) and not _finite(number) for number in numbers):
+    if any(isinstance(number, str | NoneType | Complex) and not finite(number) for number in numbers):
         raise MechanismError(f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}")
-
-
-def _finite(number: Any) -> bool:
-    return isinstance(number, Real) and math.isfinite(number)
 
 
 def require_direction(who: str, numbers: Sequence[float]) -> None:
