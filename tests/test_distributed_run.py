@@ -1,11 +1,9 @@
 """Runs on a dask.distributed cluster: a real scheduler and workers on loopback, and what happens when they are lost."""
 
-import gc
 import importlib
 import os
 import signal
 import socket
-import time
 from collections import Counter
 
 import pytest
@@ -64,6 +62,13 @@ def test_a_cluster_that_goes_is_a_message(cluster):
         run(cases, [Slow("slow", seconds=0.05)], tol=TOL, solver=on_cluster(cluster.scheduler_address, LIMITS), progress=hear)
 
 
+def forbid_clients(monkeypatch):
+    def client(*_, **__):
+        raise AssertionError("a client without a scheduler")
+
+    monkeypatch.setattr(importlib.import_module("distributed"), "Client", client)
+
+
 def test_no_scheduler_is_a_message(monkeypatch):
     """Where nobody listens, and where somebody does who is none and says nothing."""
     monkeypatch.setattr(ours, "ANSWER", 0.25)
@@ -80,27 +85,24 @@ def test_no_scheduler_is_a_message(monkeypatch):
     ["foo", "", "nonsense://", "nonsense://a:1", "tcp://:8786", "127.0.0.1:99999", "127.0.0.1:0", "127.0.0.1:a", "inproc://x"],
 )
 def test_what_cannot_be_an_address_is_said_at_once(address, monkeypatch):
-    monkeypatch.setattr(ours, "ANSWER", 60.0)
-    begin = time.perf_counter()
+    """Who had waited in vain would be told that nobody answers."""
+    forbid_clients(monkeypatch)
     with pytest.raises(ClusterError) as caught:
         run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
-    assert time.perf_counter() - begin < 20.0
     message = str(caught.value)
     assert message.startswith(f"scheduler {address}: found no address (")
     assert message.endswith("), expected HOST:PORT or tcp://HOST:PORT; write it as `dask scheduler` prints it")
 
 
 @pytest.mark.parametrize("command", ["run", "sweep"])
-def test_a_command_without_its_cluster_is_one_message_and_ends_soon(kincheck_main, capsys, tmp_path, command):
-    """Soon after the message too: nothing of the client is left to be waited for."""
+def test_a_command_without_its_cluster_is_one_message(kincheck_main, capsys, tmp_path, monkeypatch, command):
+    """And no client is made, for whose end the process would wait."""
+    forbid_clients(monkeypatch)
     (tmp_path / "vary.toml").write_text(
         'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nat = "tip"\nsigma = 1\n'
     )
     more = {"run": ["--history", tmp_path / "h.db"], "sweep": ["--vary", tmp_path / "vary.toml", "--samples", 3]}[command]
-    begin = time.perf_counter()
     assert kincheck_main(command, "crank", "--scheduler", "foo", *more, jobs=None) == 2
-    gc.collect()
-    assert time.perf_counter() - begin < 20.0
     captured = capsys.readouterr()
     assert captured.out == ""
     (line,) = captured.err.splitlines()
