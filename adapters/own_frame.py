@@ -50,7 +50,7 @@ GLOBAL = OwnFrame(1.0, (0.0, 0.0, 0.0))
 
 
 def own_frame(case: Case) -> OwnFrame:
-    """The frame of a case; about the global origin where that is nearer to the mechanism's middle than its size."""
+    """The frame of a case; about the global origin where the mechanism's middle is within half a unit of it along every axis."""
     mechanism, unit = case.mechanism, 2.0 ** round(math.log2(size(case)))
     positions = [at for joint in mechanism.joints for at in joint.points_on()] + [point.position for point in mechanism.points]
     # a multiple of the unit: what is on such a grid is moved without being rounded
