@@ -1,6 +1,7 @@
 """Comparing: projections, tolerances, and deviations that must not be missed."""
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -8,9 +9,12 @@ from kincheck.core.drivers import PointCoordinate
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.case import Output, Series
 from kincheck.core.harness.compare import NO_SIZE, as_numbers, describe, deviation, deviations, output_series, pace, size
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.reporting.junit import to_junit
+from kincheck.core.harness.run import run
 from kincheck.core.mechanism import Mechanism
 
-from .fakes import RADIUS, SAMPLES, crank, exact, partial, solution
+from .fakes import RADIUS, SAMPLES, Fake, crank, exact, partial, solution
 
 REFERENCE = np.array([0.0, 1.0, 3.0, 2.0])
 
@@ -171,3 +175,38 @@ def test_a_deviation_is_described_by_output_quantity_sample_driver_and_tolerance
     assert said == (
         "half_track_change: velocity is off by 0.004 m/s at sample 2 (stroke = 0.1), tolerance 0.001 m/s, against closed_form"
     )
+
+
+class Undefined(Output):
+    """An output without a value, whose derivatives are known."""
+
+    def of(self, at, design):
+        return replace(super().of(at, design), x=np.full(SAMPLES, np.nan))
+
+
+class Derivative(Undefined):
+    """Made of velocities."""
+
+    orders = 2
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_an_output_without_any_value_fails_where_all_samples_were_solved(complete):
+    x, y = crank().outputs
+    case = replace(crank(), outputs=(Undefined(**vars(x)), y))
+    results = run([case], [Fake(answer=solution if complete else partial)], tol=1e-12)
+    (record,) = results.records
+    assert record.outcome is Outcome.FAIL
+    assert record.errors["x"].position is None
+    assert record.errors["x"].lost is complete
+    assert (f"x: position: {SAMPLES} samples without a value where closed_form has one" in record.message) is complete
+    failed = ElementTree.fromstring(to_junit(results)).findall(".//testcase[failure]")
+    assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
+
+
+def test_a_derivative_of_an_engine_without_velocities_is_not_lost():
+    case, right = crank(), crank().reference["x"]
+    rate = Derivative(**vars(case.outputs[0]))
+    for velocity, lost in ((None, False), (exact(case)[1], True)):
+        found = output_series(case, rate, solution(case, velocity=velocity, acceleration=None))
+        assert deviations(case, rate, found, [("closed_form", right)], complete=True).lost is lost

@@ -80,6 +80,10 @@ class Sweep:
         return {self.driver: self.values, **further}
 
 
+ORDERS = 3
+"""Of an output that is a function of the pose alone: value, velocity and acceleration follow."""
+
+
 class Quantity(Protocol):
     """What is compared: a function of the motion of points.
 

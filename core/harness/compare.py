@@ -30,8 +30,8 @@ from ..errors import CaseError
 from ..jet import Jet
 from ..mechanism import Vector
 from ..trajectory import Array, PointMotion, Trajectory
-from .case import MARKER, Case, Quantity, Series
-from .record import Deviation, Deviations, OutputSeries
+from .case import MARKER, ORDERS, Case, Quantity, Series
+from .record import LOST, Deviation, Deviations, OutputSeries
 
 # D of a mechanism whose points all coincide, to rounding, [m]: keeps the pace finite.
 NO_SIZE = 1e-3
@@ -76,7 +76,9 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
         jet = output.of(at, {name: _standing(case.mechanism.point(name).position) for name in output.points})
     solved = trajectory.solved
     position, *rates = (np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a))
-    known = [rate if np.isfinite(rate).any() or not solved.any() else None for rate in rates]
+    motions = [trajectory.points[name] for name in output.points]
+    given = [all(getattr(each, quantity) is not None for each in motions) for quantity in ("velocity", "acceleration")]
+    known = [rate if order < output.orders and given[order - 1] else None for order, rate in enumerate(rates, 1)]
     return Series(position, *known)
 
 
@@ -139,13 +141,14 @@ def deviations(
             name, reference = known[0]
             compared[quantity] = off = deviation(values, reference, output.atol * beat**order, output.rtol, name)
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
-            if off is not None and lost:
-                compared[quantity] = msgspec.structs.replace(off, within=False)
-                reasons.append(f"{quantity}: {lost} samples without a value where {name} has one")
+            # an output that is a derivative has none either where the engine gives no velocities to make it of
+            if lost and (off is not None or found.velocity is not None or output.orders == ORDERS):
+                compared[quantity] = off and msgspec.structs.replace(off, within=False)
+                reasons.append(f"{quantity}: {lost} {LOST} {name} has one")
+            elif off is None:
+                reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
             if off is not None and (alone := int((np.isfinite(values) & ~np.isfinite(reference)).sum())):
                 reasons.append(f"{quantity}: {name} has no value at {alone} of {len(values)} samples: {NOTHING}")
-            if off is None:
-                reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
     return Deviations(**compared, reason="; ".join(reasons) or None)
 
 

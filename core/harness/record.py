@@ -43,6 +43,10 @@ class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
     reason: str | None = None
 
 
+LOST = "samples without a value where"
+"""Said of samples that the standard has a value at, and the engine should."""
+
+
 class Deviation(msgspec.Struct, frozen=True, kw_only=True):
     """How far an output is from what it is compared with, over the samples both have.
 
@@ -66,6 +70,11 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
     velocity: Deviation | None
     acceleration: Deviation | None
     reason: str | None = None
+
+    @property
+    def lost(self) -> bool:
+        """Whether samples have no value where what they are compared with has one; maybe none has, and nothing is compared."""
+        return LOST in (self.reason or "")
 
     def items(self) -> list[tuple[str, Deviation]]:
         """Quantity and deviation of what was compared."""

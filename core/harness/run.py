@@ -218,6 +218,9 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
         more = f" (worst of {len(outside)} quantities out of tolerance)" if len(outside) > 1 else ""
         unit = next(each.unit for each in case.outputs if each.name == output)
         messages.append(describe(output, quantity, deviation, case.sweep.driver, values, unit) + more)
+    # with no value at all there is nothing to be out of tolerance
+    within = {name: each for name, each in errors.items() if all(off.within for _, off in each.items())}
+    messages += [f"{name}: {each.reason}" for name, each in within.items() if each.lost]
     outcome = Outcome.FAIL if messages else Outcome.PASS
     if outcome is Outcome.PASS:
         messages += _not_compared(errors)

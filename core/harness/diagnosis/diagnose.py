@@ -10,9 +10,9 @@ from ...analysis.diagnosis.rank import Blocked, Component, Dependency, Ranks, Ro
 from ...analysis.diagnosis.screws import Screw, described
 from ...analysis.equations.geometry import places
 from ...errors import SolveError
-from ..case import MARKER, Case
+from ..case import MARKER, ORDERS, Case
 from ..explain import explain
-from .outputs import ORDERS, Budget, Sensitivity, binding, budgets, read_points, sensitivities
+from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
 SCHEMA = "kincheck-explain/1"
 

@@ -15,15 +15,13 @@ from ...analysis.equations.geometry import kinds
 from ...jet import Jet
 from ...joints import Kind
 from ...trajectory import Array
-from ..case import Case, Quantity
+from ..case import ORDERS, Case, Quantity
 
 # The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for accelerations, whose rows carry rates.
 MARGIN = 100.0
 # Derivatives are of size one; below this they are round-off, a hundred times of a condition of 1e5.
 NOTHING = 1e-9
 ROUND_OFF = float(np.finfo(np.float64).eps)
-ORDERS = 3
-"""Of an output that is a function of the pose alone: value, velocity and acceleration follow."""
 
 
 class Budget(msgspec.Struct, frozen=True):

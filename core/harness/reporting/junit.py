@@ -59,6 +59,8 @@ def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, 
         (driver, values), *_ = record.driver.items()
         unit = record.outputs[output].unit
         off = [describe(output, quantity, each, driver, values, unit) for quantity, each in deviations.items() if not each.within]
+        if deviations.lost and not off:
+            off = [f"{output}: {deviations.reason}"]
         # samples that are missing are missing from every output
         missing = [record.message] if record.solved != record.samples and not off else []
         return ("failure", "; ".join(off + missing)) if off or missing else ("", "")
