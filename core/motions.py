@@ -201,8 +201,11 @@ class Path:
 
     @property
     def from_design(self) -> bool:
-        """Whether the mechanism is at its design position at time zero, and so can be followed from there both ways."""
-        return all(float(motion.at(np.zeros(1))[0][0]) == 0.0 for motion in self.motions.values())
+        """Whether the mechanism is at its design position at time zero, and so can be followed from there both ways.
+
+        Where there are no samples there is nothing to be led to.
+        """
+        return not len(self.times) or all(float(motion.at(np.zeros(1))[0][0]) == 0.0 for motion in self.motions.values())
 
     @property
     def start(self) -> float:

@@ -1,10 +1,14 @@
 """Arguments that are no numbers, or complex ones, whose imaginary part would be lost: refused by name, by every function."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
+from kincheck import cases
 from kincheck.core import (
     Body,
     Distance,
+    JointAngle,
     MechanismError,
     Point,
     Revolute,
@@ -15,8 +19,10 @@ from kincheck.core import (
     solve_designs,
     trace,
 )
+from kincheck.core.motions import Motion, Table
 
 from .mechanisms import mcpherson
+from .test_chain import chain
 
 VALUES = np.linspace(-0.01, 0.01, 3)
 NO_NUMBERS = (None, "x", 1j, np.complex128(1.0), np.array([1.0 + 0.0j]), [1.0, 2.0])
@@ -68,3 +74,46 @@ def test_descriptions_of_complex_numbers():
     ):
         with pytest.raises(MechanismError, match="is not finite; give a "):
             call()
+
+
+def test_no_values_beside_a_motion_that_does_not_begin_at_the_design():
+    table = {"rack": Table((0.0, 1.0), (0.001, 0.002))}
+    found = solve(cases.load("mcpherson_steered").mechanism, "stroke", [], motions=table)
+    assert found.solved.shape == (0,)
+    assert found.message == ""
+
+
+@dataclass(frozen=True)
+class Held(Motion):
+    """A motion that has no hash."""
+
+    numbers: list[float]
+
+    def at(self, t):
+        return self.numbers[0] * t, np.full_like(t, self.numbers[0]), np.zeros_like(t)
+
+
+def with_an_arm(loops):
+    """A chain, and beside it an arm with a driver of its own."""
+    there = chain(loops)
+    return replace(
+        there,
+        bodies=[*there.bodies, Body("arm")],
+        joints=[*there.joints, Revolute("shoulder", "ground", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))],
+        points=[Point("hand", "arm", (1.0, 0.0, 1.0))],
+        drivers=[*there.drivers, JointAngle("swing", "shoulder")],
+    )
+
+
+@pytest.mark.parametrize("loops", [1, 12], ids=["one program", "components"])
+def test_numbers_that_may_change_are_read_at_each_call(loops):
+    mechanism, turn, rate, numbers = with_an_arm(loops), np.linspace(0.0, 0.4, 5), np.array(1.0), [0.5]
+    for _ in range(2):
+        found = solve(mechanism, "turn", turn, rate=rate, motions={"swing": Held(numbers)})
+        assert found.solved.all(), found.message
+        swing = numbers[0] * turn / rate
+        expected = np.column_stack([np.cos(swing), np.sin(swing), np.ones(5)])
+        # round-off of numbers of size one
+        np.testing.assert_allclose(found.points["hand"].position, expected, rtol=0.0, atol=1e-15)
+        rate *= 4.0
+        numbers[0] = 3.0

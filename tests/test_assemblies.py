@@ -153,7 +153,7 @@ def test_a_simulator_starts_in_the_assembly_that_was_chosen(to, tmp_path, monkey
         (["rssr", "--export", "step"], "there is no format 'step'"),
         (["rssr", "--samples", "8", "--export", "mjcf", "--number", "3"], "there is no assembly 3"),
         (["rssr", "--at", "nan"], "not finite"),
-        (["rssr", "--samples", "0"], "not a number of starts"),
+        (["rssr", "--samples", "0"], "not a whole number of 1 or more"),
     ],
 )
 def test_what_cannot_be_done_is_said(argv, said, tmp_path, monkeypatch, capsys):

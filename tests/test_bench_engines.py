@@ -250,7 +250,7 @@ def test_bad_options_are_named(tmp_path, capsys):
     for options, said in (
         (["--cases", "rsr"], "'rssr'"),
         (["--engine", "natve"], "'native'"),
-        (["--rounds", "0"], "not a number of rounds"),
+        (["--rounds", "0"], "not a whole number of 1 or more"),
         (["--out", str(tmp_path / "file")], "cannot be made a folder"),
     ):
         assert cli.main(["bench", "engines", *options]) == 2

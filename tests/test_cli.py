@@ -104,7 +104,7 @@ def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_tha
         (["crank", "--mode", "simulate"], "no engine has the mode 'simulate'"),
         (["crank", "--engine", "native", "--mode", "simulate"], "engine 'native' has the mode 'projection', not 'simulate'"),
         (["--unknown"], "unrecognized arguments: --unknown"),
-        (["--jobs", "-1"], "'-1' is not a number of processes; give 0, 1, 2, ..."),
+        (["--jobs", "-1"], "'-1' is not a whole number of 0 or more; give one"),
         (
             ["--timeout", "5"],
             "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and --memory, or --jobs",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointAngle, Mechanism, MechanismError, Point, PointCoordinate, Revolute, solve
-from kincheck.core.joints import Gear
+from kincheck.core.joints import Gear, RackPinion, Screw
 from kincheck.core.motions import Ramp, Table
 
 from .running import forget_recent
@@ -68,6 +68,11 @@ WRONG = {
     "a driver of nearly zero": (lambda: PointCoordinate("d", "P", (0, 1e-170, 0)), "driver 'd': direction has length 1e-170"),
     "a driver of zero": (lambda: PointCoordinate("d", "P", (0, 0, 0)), "driver 'd': direction is zero"),
     "a motion of words": (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
+    "no axis": (lambda: Revolute("a", "b", "c", (0, 0, 0), None), "joint 'a' (revolute): axis is None, expected a direction"),
+    "no rod": (lambda: Distance("a", "b", "c", None), "joint 'a' (distance): points is None, expected two points"),
+    "no lead": (lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None), "joint 'a' (screw): lead is None, expected a length"),
+    "no ratio": (lambda: Gear("g", ("a", "b"), ratio=None), "joint 'g' (gear): ratio = None is not finite; give a finite number"),
+    "a radius of words": (lambda: RackPinion("r", ("a", "b"), radius="2"), "joint 'r' (rack_pinion): radius = 2 is not finite"),
     "one joint for two": (lambda: Gear("g", "ab", ratio=1.0), "joints is 'ab', expected two names"),
 }
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness import cli
-from kincheck.core.harness.case import Truth
+from kincheck.core.harness.case import ORDERS, Truth
 from kincheck.core.harness.proving import prove_case
 from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.harness.references import judged_by, read, series
@@ -138,6 +138,7 @@ class Angle:
     points: tuple = ("tip",)
     unit: str = "rad"
     signs: str = ""
+    orders: int = ORDERS
 
     def of(self, at, design):
         tip = at["tip"]
@@ -192,7 +193,7 @@ def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsy
 
 def test_digits_that_make_no_sense_give_status_two(kincheck_main, capsys):
     assert kincheck_main("reference", "crank", "--digits", "16") == 2
-    assert "not a number of digits from 17 to 1000" in capsys.readouterr().err
+    assert "not a whole number from 17 to 1000" in capsys.readouterr().err
 
 
 def test_without_flint_there_is_one_message(kincheck_main, monkeypatch, capsys):

@@ -77,7 +77,7 @@ def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
     [
         (["--family", "unit"], "there is no family 'unit'; did you mean 'units'?"),
         (["--engine", "nativ"], "there is no engine 'nativ'"),
-        (["--samples", "0"], "'0' is not a number of samples"),
+        (["--samples", "0"], "'0' is not a whole number of 1 or more"),
         (["--replay", "nowhere.toml"], "no such file"),
         (["--tol", "-1"], "is not a positive number"),
     ],

@@ -59,11 +59,11 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     if max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
         cascade = Cascade(mechanism, request, parts)
 
-        @lru_cache(maxsize=1)
         def along(path: Path) -> Solver:
             return CascadeSweep(cascade, path).solve
 
-        return along
+        again = lru_cache(maxsize=1)(along)
+        return lambda path: (again if path.ours else along)(path)
     if len(mechanism.moving) <= IRREDUCIBLE:
         return None
     from .sparse.model import SparseModel

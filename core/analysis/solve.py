@@ -113,7 +113,7 @@ def asked(
         times = (values - design.get(driver, 0.0)) / rate
     if not np.isfinite(times).all():
         raise SolveError(f"{who}: rate is {rate}: no number is the time of the values then; give a larger one")
-    path = Path({**as_changes(motions, design), driver: Ramp(rate)}, times, design)
+    path = Path({**as_changes(motions, design), driver: Ramp(float(rate))}, times, design)
     return path, Request(tuple(path.motions), wanted, tuple(bodies), int(order), Style(style))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from enum import Enum
 from functools import partial
 from typing import Any, ClassVar, Self
@@ -111,6 +111,9 @@ class Joint(ABC):
     def __post_init__(self) -> None:
         if self.i == self.j:
             raise MechanismError(f"{self}: joins {self.i!r} with itself; a joint needs two different bodies")
+        for each in fields(self):
+            if each.metadata.get("kind") and each.default is MISSING and getattr(self, each.name) is None:
+                raise MechanismError(f"{self}: {each.name} is None, expected {each.metadata['kind'].value}")
         for name, kind, value in self.geometry():
             who, expected = f"{self}: {name}", kind.value
             if kind is Kind.LENGTH:

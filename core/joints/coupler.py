@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 from ..errors import MechanismError
 from .base import Kind
-from .given import held
+from .given import held, require_finite
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,9 @@ class Coupler(ABC):
         object.__setattr__(self, "joints", held(f"{self}: joints", self.joints, 2, "two names"))
         if self.joints[0] == self.joints[1]:
             raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
+        for each in fields(self):
+            if each.type in (float, "float"):
+                require_finite(f"{self}: {each.name}", (getattr(self, each.name),), "a finite number other than zero")
         if not all(weight and math.isfinite(weight) for weight in self.coefficients):
             given = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ("name", "joints")}
             raise MechanismError(

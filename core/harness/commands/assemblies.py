@@ -30,20 +30,13 @@ def add(commands: Any) -> None:
         metavar="VALUE",
         help="of the swept driver as the sweep has it, in SI units; default: the design position",
     )
-    listing.add_argument("--samples", type=_count, default=200, metavar="N", help="random starts; default %(default)s")
+    listing.add_argument("--samples", type=whole(1), default=200, metavar="N", help="random starts; default %(default)s")
     listing.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random starts; default %(default)s")
     listing.add_argument("--json", metavar="FILE", help="write the assemblies with all poses as JSON; - for standard output")
     listing.add_argument("--export", metavar="FORMAT", help="write the mechanism, started in one of them: mjcf, exudyn or urdf")
     listing.add_argument("--number", type=whole(1), metavar="K", help="which one to export; default 1, the first of the list")
     listing.add_argument("--out", type=Path, metavar="FILE", help="of the export; default: CASE.K in this folder")
     foreign.add_options(listing)
-
-
-def _count(text: str) -> int:
-    number = int(text) if text.isdecimal() else 0
-    if not number:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of starts; give 1 or more")
-    return number
 
 
 def _assemblies(options: argparse.Namespace, house: House) -> int:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..console import complain
-from .house import House, Status
+from .house import House, Status, whole
 from .run import TOL
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def add(commands: Any) -> None:
     )
     engines.add_argument("--engine", nargs="+", default=[], metavar="NAME", help="default: all engines, in both modes")
     engines.add_argument(
-        "--rounds", type=_rounds, default=ROUNDS, metavar="N", help="of all contestants in turn; default %(default)s"
+        "--rounds", type=whole(1), default=ROUNDS, metavar="N", help="of all contestants in turn; default %(default)s"
     )
     engines.add_argument(
         "--parts",
@@ -66,16 +66,6 @@ def add(commands: Any) -> None:
         given: dict[str, Any] = {"default": argparse.SUPPRESS}
         each.add_argument("--out", type=Path, metavar="DIR", help=f"write {names}.json and {names}.html there", **given)
         each.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output", **given)
-
-
-def _rounds(text: str) -> int:
-    try:
-        count = int(text)
-    except ValueError:
-        count = 0
-    if count < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of rounds; give 1, 2, 3, ...")
-    return count
 
 
 def _all(options: argparse.Namespace, house: House) -> int:

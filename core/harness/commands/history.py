@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
-from .house import House, Status, unknown
+from .house import House, Status, unknown, whole
 from .run import HISTORY
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def add(commands: Any) -> None:
     add_history(history, "the history")
     history.add_argument("--case", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these cases only")
     history.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these engines only")
-    history.add_argument("--last", type=_count, default=LAST, metavar="N", help="the latest N runs; default %(default)s; 0: all")
+    history.add_argument("--last", type=whole(0), default=LAST, metavar="N", help="the latest N runs; default %(default)s; 0: all")
     history.add_argument("--plot", type=Path, metavar="FILE.html", help="draw errors and times over the runs, as a page")
     history.add_argument("--export", type=Path, metavar="FILE", help="write all runs as one table: FILE.parquet or FILE.csv")
 
@@ -42,12 +42,6 @@ def add_history(parser: argparse.ArgumentParser, what: str) -> None:
         default=os.environ.get(HISTORY) or None,
         help=f"{what}, which kincheck run --history wrote; default: the environment variable {HISTORY}",
     )
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of runs; give 0, 1, 2, ...")
-    return int(text)
 
 
 def _history(options: argparse.Namespace, house: House) -> int:

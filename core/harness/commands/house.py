@@ -129,16 +129,17 @@ def given(options: argparse.Namespace, names: Iterable[str]) -> str:
     return ", ".join(f"--{name.replace('_', '-')}" for name in found)
 
 
-def whole(least: int) -> Callable[[str], int]:
-    """A whole number of so much or more, as an option gives it."""
+def whole(least: int, most: int | None = None) -> Callable[[str], int]:
+    """A whole number of so much or more, and maybe not beyond a limit, as an option gives it."""
+    expected = f"of {least} or more" if most is None else f"from {least} to {most}"
 
     def read(text: str) -> int:
         try:
             number = int(text)
         except ValueError:
             number = least - 1
-        if number < least:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of {least} or more; give one")
+        if number < least or (most is not None and number > most):
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number {expected}; give one")
         return number
 
     return read

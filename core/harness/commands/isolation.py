@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..workers.limits import MEMORY, MOST, TIMEOUT, Limits, default_jobs
+from .house import whole
 
 if TYPE_CHECKING:
     from ..attempt import Solver
@@ -25,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
     group = parser.add_argument_group("isolation", "A pair of case and engine is solved in a worker process of its engine.")
     group.add_argument(
         "--jobs",
-        type=_count,
+        type=whole(0),
         metavar="N",
         help="worker processes at a time; default: half the processors; 0 solves in this process, without limits, which is the "
         "default where only the native engine takes part and no limit is given",
@@ -43,16 +44,6 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
         help=f"of a worker process, on Linux; default {MEMORY:g}, sixteen times what the built-in cases take",
     )
     group.add_argument("--scheduler", metavar="ADDRESS", help="solve on the workers of this dask.distributed scheduler instead")
-
-
-def _count(text: str) -> int:
-    try:
-        count = int(text)
-    except ValueError:
-        count = -1
-    if count < 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes; give 0, 1, 2, ...")
-    return count
 
 
 def contradictions(options: argparse.Namespace) -> list[str]:

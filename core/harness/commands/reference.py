@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..visible import file_name
-from .house import House, Status
+from .house import House, Status, whole
 from .run import TOL
 
 if TYPE_CHECKING:
@@ -34,19 +34,14 @@ def add(commands: Any) -> None:
     proving.add_argument(
         "--out", type=Path, metavar="DIR", help="write CASE.reference.json there, for run --reference or a case file"
     )
-    proving.add_argument("--digits", type=_digits, default=DIGITS, metavar="N", help="outputs to 10^-N; default %(default)s")
+    proving.add_argument(
+        "--digits", type=whole(FEWEST, MOST), default=DIGITS, metavar="N", help="outputs to 10^-N; default %(default)s"
+    )
     proving.add_argument(
         "--decimal",
         action="store_true",
         help="take the numbers of a case as the decimals that print them, not as the doubles that engines are given",
     )
-
-
-def _digits(text: str) -> int:
-    number = int(text) if text.isdecimal() else 0
-    if not FEWEST <= number <= MOST:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of digits from {FEWEST} to {MOST}")
-    return number
 
 
 def _prove(options: argparse.Namespace, house: House) -> int:

@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
     stress.set_defaults(do=_stress)
     stress.add_argument("--family", nargs="+", action="extend", default=[], metavar="NAME", help="default: all families")
     stress.add_argument("--list", action="store_true", help="list the families")
-    stress.add_argument("--samples", type=_count, metavar="N", help=f"over all families; default {SAMPLES}")
+    stress.add_argument("--samples", type=whole(1), metavar="N", help=f"over all families; default {SAMPLES}")
     stress.add_argument("--seed", type=whole(0), metavar="S", help="of the random mechanisms; default 0")
     stress.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native")
     stress.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
@@ -45,13 +45,6 @@ def add(commands: Any) -> None:
     stress.add_argument(
         "--tol", type=positive, metavar="X", help=f"of replayed files: largest constraint residual; default {TOL:g}"
     )
-
-
-def _count(text: str) -> int:
-    number = int(text) if text.isdecimal() else 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of samples; give 1 or more")
-    return number
 
 
 def _stress(options: argparse.Namespace, house: House) -> int:
