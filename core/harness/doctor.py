@@ -70,6 +70,7 @@ class Machine(msgspec.Struct, frozen=True):
     executor: str
     vector_width: int | None
     cache: str
+    cache_bytes: int
     cache_problem: str
 
 
@@ -102,6 +103,7 @@ class Examination(msgspec.Struct, frozen=True):
 
 def examine(case: Case, native: Engine, tol: float) -> Examination:
     """Look at the installation, and solve a case with the native engine."""
+    problem = _cache_problem()
     about = circumstances([], started=datetime.now(UTC), tol=tol, command="kincheck doctor")
     machine = Machine(
         about["python"],
@@ -111,7 +113,8 @@ def examine(case: Case, native: Engine, tol: float) -> Examination:
         "machine code" if compiler.available() else "numpy: with llvmlite it is some fifty times faster",
         compiler.vector_width() if compiler.available() else None,
         str(disk_cache.folder() or "nowhere"),
-        _cache_problem(),
+        0 if problem else disk_cache.size(),
+        problem,
     )
     return Examination(SCHEMA, about["kincheck"], parts(), machine, _check(case, native, tol))
 

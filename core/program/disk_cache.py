@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from itertools import accumulate
 from pathlib import Path
 
 DIGEST = 32
 """Bytes of the checksum at the head of what is kept."""
+MOST = 2**28
+"""Bytes that are kept, a quarter of a gigabyte: some thousands of mechanisms, of whose programs most take some 50 kilobytes."""
 
 
 def folder() -> Path | None:
@@ -64,8 +69,33 @@ def _write(entry: Path, made: bytes) -> None:
             whole = Path(folder) / entry.name
             whole.write_bytes(_checksum(entry, made) + made)
             whole.replace(entry)  # whole or not at all, whoever else is writing it
+        _shrink(entry.parent)
     except OSError:
         return
+
+
+@cache
+def _shrink(here: Path) -> None:
+    """Leave no more than `MOST`: what was not used for longest goes. Once in a process, for it looks at every file."""
+    entries = sorted(_entries(here), key=lambda each: max(each[1].st_atime, each[1].st_mtime), reverse=True)
+    sizes = accumulate(status.st_size for _, status in entries)
+    for (path, _), size in zip(entries, sizes, strict=True):
+        if size > MOST:
+            path.unlink(missing_ok=True)  # another process may be at it too
+
+
+def size() -> int:
+    """Bytes that are kept."""
+    here = folder()
+    return sum(status.st_size for _, status in _entries(here)) if here and here.exists() else 0
+
+
+def _entries(here: Path) -> Iterator[tuple[Path, os.stat_result]]:
+    with os.scandir(here) as found:
+        for each in found:
+            with suppress(FileNotFoundError):  # it has just gone
+                if each.is_file():
+                    yield Path(each), each.stat()
 
 
 def _checksum(entry: Path, made: bytes) -> bytes:

@@ -57,7 +57,7 @@ def _print(found: Examination, json: str | None) -> None:
     console.print(table)
     width = f", {machine.vector_width} doubles at a time" if machine.vector_width else ""
     console.print(f"programs run by {machine.executor}{width}", soft_wrap=True)
-    state = machine.cache_problem or "writable"
+    state = machine.cache_problem or f"writable, {1e-6 * machine.cache_bytes:.3g} MB now"
     console.print(
         f"compiled code is kept in {machine.cache}: {state}", soft_wrap=True, style="yellow" if machine.cache_problem else None
     )
