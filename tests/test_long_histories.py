@@ -11,7 +11,7 @@ from kincheck.core.harness.history.store import Store
 from kincheck.core.harness.record import Outcome, to_json
 from kincheck.core.harness.regression.findings import Kind
 from kincheck.core.harness.regression.subject import find, find_against
-from kincheck.core.harness.reporting.deliver import written
+from kincheck.core.harness.writing import written
 
 from .fakes import Fake, crank
 from .nights import changed, keep, nights, records, worse

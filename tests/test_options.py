@@ -1,8 +1,10 @@
 """Options that would be ignored, destroy each other's files or be no limits are refused, before anything is computed."""
 
+from pathlib import Path
+
 import pytest
 from kincheck.core.harness.cli import main
-from kincheck.core.harness.reporting.deliver import unwritable, written
+from kincheck.core.harness.writing import unwritable, written
 
 VARY = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.ball]\nat = "ball"\nsigma = 1.0\n'
 
@@ -86,6 +88,18 @@ def test_what_is_no_file_takes_what_several_options_write():
 def test_a_limit_that_can_be_counted_is_one(capsys):
     assert main(["run", "rssr", "--engine", "native", "--jobs", "1", "--memory", "1e9", "--timeout", "1e9"]) == 0
     assert "1 pass" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize(
+    "command", ["trace four_bar --length 1", "explain four_bar --samples 3", "assemblies four_bar --samples 3"]
+)
+def test_a_full_disk_is_one_message(command, capsys, tmp_path):
+    assert main([*command.split(), "--json", "/dev/full"]) == 2
+    err = capsys.readouterr().err
+    assert err.splitlines() == [
+        "kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a folder that exists and is writable"
+    ]
 
 
 def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from ..errors import KincheckError
 from .record import to_json
+from .writing import write
 
 # Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
 LOG_WIDTH = 200
@@ -37,8 +37,8 @@ def columns(*heads: str, title: str | None = None) -> Table:
     return table
 
 
-def write_json(found: msgspec.Struct, json: str | None) -> None:
-    """Write the answer as JSON to a file, or for "-" to standard output.
+def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> None:
+    """Write the answer as JSON to a file, or for "-" to standard output. Before it is printed: who reads that may have gone.
 
     Raises:
         KincheckError: the file cannot be written.
@@ -47,12 +47,7 @@ def write_json(found: msgspec.Struct, json: str | None) -> None:
         sys.stdout.write(to_json(found).decode())
         sys.stdout.flush()
     elif json is not None:
-        try:
-            Path(json).write_bytes(to_json(found))
-        except OSError as error:
-            raise KincheckError(
-                f"--json {json}: cannot be written ({error.strerror}); give a file in a folder that exists"
-            ) from None
+        write("--json", Path(json), to_json(found))
 
 
 def listed(names: Sequence[str]) -> str:

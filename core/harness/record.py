@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Literal
 
@@ -224,7 +225,7 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
         return [(case, engine, mode) for case, engine, mode in self.run.get("missing", [])]
 
 
-def to_json(results: msgspec.Struct) -> bytes:
+def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
     """Indented JSON; floats keep all their digits, a list of numbers stays on one line."""
     text = msgspec.json.format(msgspec.json.encode(results), indent=2)
     # a string cannot hold a bare line break, so only white space between numbers is touched

@@ -18,9 +18,9 @@ from rich.text import Text
 from ...errors import KincheckError
 from .. import printing
 from ..record import to_json
-from ..reporting.deliver import write_all
 from ..reporting.report import packed
 from ..reporting.wording import known, number
+from ..writing import write_all
 
 if TYPE_CHECKING:
     from .diagrams import Diagram

@@ -46,7 +46,7 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
     """
     from ..assemblies import survey, written
     from ..printing import write_json
-    from ..reporting.deliver import unwritable
+    from ..writing import unwritable
 
     if options.export is None and (found := given(options, ("number", "out"))):
         raise KincheckError(
@@ -59,8 +59,8 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
     case = house.find_case(options.case, foreign.supplied(options))
     foreign.tell_left_out([case])
     found = survey(case, options.at, samples=options.samples, seed=options.seed)
-    _print(found, options.json)
     write_json(found.report(), options.json)
+    _print(found, options.json)
     if options.export is not None:
         number: int = options.number or 1
         texts = written(found, house.writer(options.export), number)

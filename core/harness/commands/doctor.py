@@ -32,8 +32,8 @@ def _doctor(options: argparse.Namespace, house: House) -> int:
     from ..printing import write_json
 
     found = examine(house.case(SAMPLE), house.engine("native"), TOL)
-    _print(found, options.json)
     write_json(found, options.json)
+    _print(found, options.json)
     return Status.WITHIN if found.able else Status.FAILED
 
 

@@ -41,6 +41,6 @@ def _explain(options: argparse.Namespace, house: House) -> int:
     case = house.find_case(options.case, foreign.supplied(options), driven=False)
     foreign.tell_left_out([case])
     found = diagnose(case, samples=options.samples, tol=options.tol)
-    print_diagnosis(found, page(options.json))
     write_json(found, options.json)
+    print_diagnosis(found, page(options.json))
     return Status.DEVIATES if found.findings else Status.WITHIN

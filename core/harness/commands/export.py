@@ -55,7 +55,7 @@ def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, json: str 
     Raises:
         KincheckError: a file cannot be written, would be over the JSON, or without `out` over what is there.
     """
-    from ..reporting.deliver import unwritable
+    from ..writing import unwritable, write
 
     first = next(iter(texts))
     main: Path = out or Path(file_name(name) + first)
@@ -66,8 +66,5 @@ def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, json: str 
     if json and (problems := unwritable([("--json", json), *(("--out", file) for file in files)])):
         raise KincheckError("\n".join(problems))
     for file, text in files.items():
-        try:
-            file.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise KincheckError(f"{file}: cannot be written ({error.strerror}); name another with --out") from error
+        write("--out", file, text.encode())
         print(file, file=sys.stderr if json == "-" else sys.stdout)

@@ -48,7 +48,7 @@ def _history(options: argparse.Namespace, house: House) -> int:
     """List the runs, the latest first; for a case or an engine, its errors and times in them and the steps in these."""
     from ..history.series import read
     from ..history.store import Store
-    from ..reporting.deliver import unwritable
+    from ..writing import unwritable
 
     if options.history is None:
         raise KincheckError(f"history: which file? give --history FILE, or set {HISTORY}")

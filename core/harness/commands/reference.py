@@ -51,6 +51,7 @@ def _prove(options: argparse.Namespace, house: House) -> int:
     """
     from ..proving import prove_case
     from ..record import to_json
+    from ..writing import write
 
     problems: list[str] = []
     cases = house.find_cases(options.case or [*house.cases()], problems)
@@ -68,15 +69,8 @@ def _prove(options: argparse.Namespace, house: House) -> int:
         complete &= found.proved == len(found.samples)
         print(*_lines(found, errors), sep="\n", flush=True)
         if options.out is not None:
-            _write(options.out / f"{file_name(case.name)}.reference.json", to_json(found))
+            write("--out", options.out / f"{file_name(case.name)}.reference.json", to_json(found))
     return Status.WITHIN if complete else Status.DEVIATES
-
-
-def _write(file: Path, text: bytes) -> None:
-    try:
-        file.write_bytes(text)
-    except OSError as error:
-        raise KincheckError(f"--out {file.parent}: {file.name} cannot be written ({error.strerror}); give another folder") from None
 
 
 def _lines(found: Reference, errors: list[NativeError]) -> list[str]:

@@ -83,8 +83,8 @@ def _write(options: argparse.Namespace, subject: Subject, found: Regressions, st
     from ..record import to_json
     from ..regression.junit import to_regression_junit
     from ..regression.summary import to_markdown, to_markup
-    from ..reporting.deliver import written
     from ..reporting.report import write_report
+    from ..writing import written
 
     def page(path: Path) -> None:
         past = trends(read(store, last=NIGHTS)) if store is not None else None

@@ -57,6 +57,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     from ..stress.families import Family
     from ..stress.outcomes import BAD
     from ..stress.report import markdown, report
+    from ..writing import write
 
     if options.list:
         if found := given(options, [name for name in vars(options) if name not in ("list", "command", "do")]):
@@ -87,7 +88,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     made = report(found)
     deliver(made, found, out=options.out, json=options.json)
     if options.out is not None:
-        (options.out / FILES[2]).write_text(markdown(made), encoding="utf-8")
+        write("--out", options.out / FILES[2], markdown(made).encode())
     if found.unfinished:
         raise KincheckError("\n".join(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()))
     bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)

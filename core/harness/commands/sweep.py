@@ -190,9 +190,9 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
 def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
     """Print the table and write what was asked for."""
     from ..record import to_json
-    from ..reporting.deliver import write_all
     from ..study.page import page
     from ..study.tables import envelope_csv, gradient_csv, print_sweep
+    from ..writing import write_all
 
     encoded = to_json(results)
     contents = {Path(options.json): encoded} if options.json not in (None, "-") else {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
@@ -48,6 +47,8 @@ def _trace(options: argparse.Namespace, house: House) -> int:
     Exit status: 0 the whole length was traced, or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
     """
     from ...analysis.singular.continuation import trace
+    from ..printing import write_json
+    from ..writing import unwritable
 
     case = house.find_case(options.case, foreign.supplied(options))
     foreign.tell_left_out([case])
@@ -55,17 +56,17 @@ def _trace(options: argparse.Namespace, house: House) -> int:
     driver = options.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])
     if driver not in drivers:
         raise KincheckError(unknown("driver", driver, drivers))
-    _check(options.json)
+    if problems := unwritable([("--json", options.json)]):
+        raise KincheckError("\n".join(problems))
     curves = [trace(case.mechanism, driver, length=options.length)]
     if not curves[0].closed:
         curves.append(trace(case.mechanism, driver, length=options.length, direction=-1))
     design = case.mechanism.design_value(driver)
     unit = "rad" if case.mechanism.driver(driver).turns else "m"
+    write_json(_facts(case.name, curves, design, unit), options.json)
     out = sys.stderr if options.json == "-" else sys.stdout
     for direction, curve in zip((1, -1), curves, strict=False):
         print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)
-    if options.json:
-        _write(options.json, _facts(case.name, curves, design, unit))
     return Status.DEVIATES if any(curve.message for curve in curves) else Status.WITHIN
 
 
@@ -103,20 +104,3 @@ def _facts(case: str, curves: list[Curve], design: float, unit: str) -> dict[str
         for curve in curves
     ]
     return {"schema": "kincheck-trace/1", "case": case, "driver": curves[0].driver, "unit": unit, "curves": found}
-
-
-def _check(json: str | None) -> None:
-    from ..reporting.deliver import Destinations
-
-    if problems := Destinations(json=json).problems():
-        raise KincheckError("\n".join(problems))
-
-
-def _write(file: str, facts: dict[str, Any]) -> None:
-    import msgspec
-
-    text = msgspec.json.format(msgspec.json.encode(facts), indent=2) + b"\n"
-    if file == "-":
-        sys.stdout.buffer.write(text)
-    else:
-        Path(file).write_bytes(text)

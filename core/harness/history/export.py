@@ -10,6 +10,7 @@ from typing import Any
 
 from ...errors import KincheckError
 from ..visible import cell
+from ..writing import write
 from .store import Store
 
 INTEGERS = ("run", "solved", "samples", "worst_step")
@@ -35,16 +36,14 @@ def export(store: Store, path: Path, *, cases: Sequence[str] = (), engines: Sequ
         HistoryError: the history cannot be read.
         KincheckError: the file cannot be written, its end says neither, or pyarrow is not installed.
     """
-    write = {".parquet": _parquet, ".csv": _csv}.get(path.suffix.lower())
-    if write is None:
+    kind = {".parquet": _parquet, ".csv": _csv}.get(path.suffix.lower())
+    if kind is None:
         raise KincheckError(
             f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in {' or '.join(SUFFIXES)}"
         )
-    try:
-        return write(path, _rows(store, cases, engines))
-    except OSError as error:
-        why = error.strerror or error
-        raise KincheckError(f"--export {path}: cannot be written ({why}); give a file in a writable folder") from None
+    counts = list[int]()
+    write("--export", path, lambda part: counts.append(kind(part, _rows(store, cases, engines))))
+    return counts[0]
 
 
 def _rows(store: Store, cases: Sequence[str], engines: Sequence[str]) -> Iterator[list[tuple[Any, ...]]]:

@@ -9,10 +9,10 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from ...errors import KincheckError
 from ..reporting.figures import Figure, Style
 from ..reporting.measures import trend_figures
 from ..reporting.report import packed
+from ..writing import write
 from .series import History
 from .trends import trends
 
@@ -26,10 +26,7 @@ def write_plot(history: History, path: Path, *, title: str) -> None:
     Raises:
         KincheckError: the file cannot be written.
     """
-    try:
-        path.write_text(page(history, title=title), "utf-8")
-    except OSError as error:
-        raise KincheckError(f"--plot {path}: cannot be written ({error.strerror}); give a file in a writable folder") from None
+    write("--plot", path, page(history, title=title).encode())
 
 
 def page(history: History, *, title: str) -> str:

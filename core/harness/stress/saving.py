@@ -13,6 +13,7 @@ from ..case import Case
 from ..case_writer import case_text
 from ..engine import Engine
 from ..reading.coordinates import with_all_coordinates
+from ..writing import write
 from .families import Specimen
 from .outcomes import Judgement, Verdict, judged
 from .reduce import fewer_samples, reduced
@@ -74,8 +75,5 @@ def save(example: Example, folder: Path) -> Finding:
         *words,
         *finding.message.splitlines(),
     ]
-    try:
-        (folder / name).write_text(case_text(case, comments), encoding="utf-8")
-    except OSError as error:
-        raise KincheckError(f"{folder / name}: cannot be written ({error.strerror}); give another folder") from None
+    write("--out", folder / name, case_text(case, comments).encode())
     return replace(finding, file=name, reduced=words)

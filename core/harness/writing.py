@@ -1,0 +1,91 @@
+"""Files written whole or not at all; what cannot be written is told, before the work where that can be seen."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeAlias
+from uuid import uuid4
+
+from ..errors import KincheckError
+
+Named: TypeAlias = tuple[str, Path | str | None]
+"""An option and the file that it names, "-" for standard output; None where it was not given."""
+
+Content: TypeAlias = bytes | Callable[[Path], object]
+"""What a file is to have, or what writes it to the path that it is given."""
+
+
+def written(path: Path, content: Content) -> list[str]:
+    """Write a file; or why it cannot be."""
+    try:
+        _put(path, content)
+    except OSError as error:
+        return [f"{path}: cannot be written ({error.strerror or error}); what else was asked for is tried"]
+    return []
+
+
+def write_all(contents: Mapping[Path, Content]) -> list[str]:
+    """Write files; why some could not be."""
+    return [problem for path, content in contents.items() for problem in written(path, content)]
+
+
+def write(option: str, path: Path, content: Content) -> None:
+    """Write the file that an option names.
+
+    Raises:
+        KincheckError: it cannot be written.
+    """
+    try:
+        _put(path, content)
+    except OSError as error:
+        why = error.strerror or error
+        raise KincheckError(
+            f"{option} {path}: cannot be written ({why}); give a file in a folder that exists and is writable"
+        ) from None
+
+
+def _put(path: Path, content: Content) -> None:
+    with _whole(path) as part:
+        if isinstance(content, bytes):
+            part.write_bytes(content)
+        else:
+            content(part)
+
+
+@contextmanager
+def _whole(path: Path) -> Generator[Path]:
+    """A path to write to, which becomes the file when all is written; until then, and if it fails, what stood there stays."""
+    file = path.resolve()  # what a link leads to
+    if file.exists() and not (file.is_file() and os.access(file.parent, os.W_OK)):  # a pipe, a device, or in a folder of others
+        yield path
+        return
+    part = file.with_name(f".{file.name}.{uuid4().hex}.part")  # another run may be writing the same file
+    try:
+        yield part
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]:
+    """What cannot be written of the files that options name, or would be written over by the next.
+
+    Args:
+        history: kept in a file of its own, which is none of these.
+    """
+    found = list[str]()
+    seen = {} if history is None else {history.resolve(): "--history"}
+    for option, name in files:
+        if name in (None, "-"):
+            continue
+        path = Path(name)
+        if path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+            found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
+        elif path.exists() and not path.is_file():
+            continue  # a pipe or a device takes what several have to say
+        elif (other := seen.setdefault(path.resolve(), option)) != option:
+            found.append(f"{option} {path}: found the file of {other}, expected one of its own; give another")
+    return found
