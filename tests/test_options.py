@@ -91,15 +91,11 @@ def test_a_limit_that_can_be_counted_is_one(capsys):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-@pytest.mark.parametrize(
-    "command", ["trace four_bar --length 1", "explain four_bar --samples 3", "assemblies four_bar --samples 3"]
-)
-def test_a_full_disk_is_one_message(command, capsys, tmp_path):
+@pytest.mark.parametrize("command", ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"])
+def test_a_full_disk_is_one_message(command, capsys):
     assert main([*command.split(), "--json", "/dev/full"]) == 2
-    err = capsys.readouterr().err
-    assert err.splitlines() == [
-        "kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a folder that exists and is writable"
-    ]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a folder that ")
 
 
 def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):
