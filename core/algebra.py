@@ -24,6 +24,11 @@ def root(a: Scalar) -> Scalar:
     return math.sqrt(a) if isinstance(a, int | float) else np.sqrt(a)
 
 
+def is_literal_zero(a: Scalar) -> bool:
+    """Whether it is a zero of Python's, known before anything is computed: what it multiplies vanishes from every program."""
+    return isinstance(a, int | float) and a == 0
+
+
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
     """p where |a| > |b|, else q; a number that is known only later decides then."""
     later = next((x for x in (a, b) if hasattr(x, "where_larger")), None)

@@ -89,7 +89,7 @@ def dot21(i, j, axes_i, s_i, s_j):
 
 
 def spherical(i, j, s_i, s_j):
-    """d."""
+    """(24)  d."""
     return line(i, j, s_i, s_j)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,11 @@ def require_positive(who: str, what: str, number: Any) -> None:
     """Raise SolveError unless a number is positive and finite."""
     if not (finite(number) and number > 0):
         raise SolveError(f"{who}: {what} is {number!r}, expected a positive number")
+
+
+def no_such(who: str, what: str, name: str, known: Sequence[str]) -> SolveError:
+    """The error that there is nothing of a name."""
+    return SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(known) or 'none'}")
 
 
 def real(who: str, what: str, given: Any, expected: str) -> Array:

@@ -13,7 +13,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion
 from ..trajectory import Array, PointMotion
-from .arguments import real
+from .arguments import no_such, real
 from .equations.geometry import places
 from .route import recent_route
 from .solve import asked
@@ -79,7 +79,7 @@ def solve_designs(
     numbers: list[Array] = []
     for place, given in geometry.items():
         if place not in known:
-            raise SolveError(f"solve_designs: there is no place {place!r} to vary; known: {', '.join(known)}")
+            raise no_such("solve_designs", "place to vary", place, [*known])
         numbers.append(_numbers(place, real("solve_designs", place, given, "a row for each design"), len(known[place])))
     counts = {found.shape[1] for found in numbers}
     if len(counts) != 1:

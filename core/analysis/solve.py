@@ -11,7 +11,7 @@ from ..joints.given import finite
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
-from .arguments import real
+from .arguments import no_such, real
 from .equations.constraints import Style
 from .prepare import prepare
 from .request import Request
@@ -107,7 +107,7 @@ def asked(
         for name in names:
             if name not in there:
                 require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
-                raise SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
+                raise no_such(who, what, name, there)
     design = {name: value for name in (driver, *motions) if (value := mechanism.design_value(name))}
     with np.errstate(over="ignore"):
         times = (values - design.get(driver, 0.0)) / rate

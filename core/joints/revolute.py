@@ -1,4 +1,4 @@
-"""Revolute joint: spherical + dot11. 5 rows, 1 freedom. Also known as hinge or pin."""
+"""Revolute joint: spherical + dot11, eq. (26). 5 rows, 1 freedom. Also known as hinge or pin."""
 
 from __future__ import annotations
 

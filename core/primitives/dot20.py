@@ -1,4 +1,4 @@
-"""Dot20: a on body i is perpendicular to the line from P_i to P_j (1 row).  Paper sec. 2.2.2, eq. (22); Table 2.
+"""Dot20: a on body i is perpendicular to the line from P_i to P_j (1 row).  Paper sec. 2.2.5, eq. (22); Table 2.
 
 In global axes, with a = A_i a0, S = A s, and d from P_i to P_j:
 

@@ -1,10 +1,10 @@
-"""Dot21: P_j stays on the line through P_i along h_i, for bodies that turn alike (2 rows).  Paper sec. 2.2.5, eqs (23)-(24).
+"""Dot21: P_j stays on the line through P_i along h_i, for bodies that turn alike (2 rows).  Paper sec. 2.2.6, eq. (23); Table 2.
 
 Const-C form (formulation section 3): where Dot12 holds, body j's arm can be carried by body i, so body j's rotation and its arm
 drop out. With e = r_j - r_i = e0 + u_j - u_i between the body origins, and a = A_i a0 for a0 = f, g:
 
     (23)  phi   = a . e - a0 . e0
-    (24)  rows  = [ -a | a x e | a | 0 ]        exact for this phi everywhere
+          rows  = [ -a | a x e | a | 0 ]        exact for this phi everywhere
           gamma = -( (w_i x (w_i x a)) . e + 2 (w_i x a) . (v_j - v_i) )
 
 Only together with Dot12 of the same joint: the rows of the line constraint alone (Dot20) differ from these by multiples of the

@@ -136,7 +136,7 @@ class PaperDot20(Dot20):
 
 @dataclass(frozen=True)
 class PaperDot21(Dot21):
-    """Eqs (23)-(24), const-C, with y0 = A_i^T (r_j - r_i): rows [ -(A_i a) | a x y0 | A_i a | 0 ] for a = f, g."""
+    """Eq. (23), const-C, with y0 = A_i^T (r_j - r_i): rows [ -(A_i a) | a x y0 | A_i a | 0 ] for a = f, g."""
 
     body_axes = True
 
@@ -239,7 +239,7 @@ def _along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> S
     return a @ (2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y)))
 
 
-def _as(paper: type[Primitive]) -> Callable[[Primitive], tuple[Primitive, ...]]:
+def _of_same_fields(paper: type[Primitive]) -> Callable[[Primitive], tuple[Primitive, ...]]:
     """The same fields in another class."""
 
     def twin(native: Primitive) -> tuple[Primitive, ...]:
@@ -249,7 +249,7 @@ def _as(paper: type[Primitive]) -> Callable[[Primitive], tuple[Primitive, ...]]:
 
 
 TWINS: Mapping[type[Primitive], Callable[[Any], tuple[Primitive, ...]]] = {
-    native: _as(paper)
+    native: _of_same_fields(paper)
     for native, paper in (
         (Spherical, PaperSpherical),
         (Dot10, PaperDot10),

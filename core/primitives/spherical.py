@@ -1,10 +1,10 @@
-"""Spherical: the points P_i and P_j coincide (3 rows).  Formulation section 2.
+"""Spherical: the points P_i and P_j coincide (3 rows).  Paper sec. 2.2.7, eq. (24).
 
 With d = d0 + u_j + A_j s_j - u_i - A_i s_i from P_i to P_j, written as the change since design so that nothing large cancels:
 
-    phi   = d0 + (u_j + (A_j - I) s_j) - (u_i + (A_i - I) s_i)
-    rows  = [ -I | skew(A_i s_i) | I | -skew(A_j s_j) ]        exact everywhere
-    gamma = w_i x (w_i x A_i s_i) - w_j x (w_j x A_j s_j)
+    (24)  phi   = d0 + (u_j + (A_j - I) s_j) - (u_i + (A_i - I) s_i)
+          rows  = [ -I | skew(A_i s_i) | I | -skew(A_j s_j) ]        exact everywhere
+          gamma = w_i x (w_i x A_i s_i) - w_j x (w_j x A_j s_j)
 """
 
 from __future__ import annotations

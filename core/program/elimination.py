@@ -16,7 +16,7 @@ from operator import add, mul
 
 import numpy as np
 
-from ..algebra import Scalar
+from ..algebra import Scalar, is_literal_zero
 from .trace import Traced, absolute, maximum, minimum, where_larger
 
 SAFE_LITERAL = 0.5
@@ -45,10 +45,6 @@ class _CoreStep:
 
 def _sign(x: Scalar) -> Scalar:
     return where_larger(x + absolute(x), 0.0, 1.0, -1.0)
-
-
-def _is_zero(a: Scalar) -> bool:
-    return not isinstance(a, Traced) and a == 0.0
 
 
 class Elimination:
@@ -124,7 +120,7 @@ class Elimination:
                 multipliers.append((x, factor))
                 for y, value in rest:
                     new = entries[x].get(y, 0.0) - factor * value
-                    if _is_zero(new):
+                    if is_literal_zero(new):
                         entries[x].pop(y, None)
                         columns[y].discard(x)
                     else:
@@ -140,7 +136,7 @@ class Elimination:
         """The solution x for right-hand side b; zeros of b cost nothing."""
         b, x = list(b), [0.0] * self.n
         for pivot in self._sparse:
-            if not _is_zero(b[pivot.row]):
+            if not is_literal_zero(b[pivot.row]):
                 for i, factor in pivot.multipliers:
                     b[i] = b[i] - factor * b[pivot.row]
         for core in self._cores:
@@ -172,18 +168,18 @@ class _Core:
         exchanges, multipliers = list[tuple[int, Scalar, Scalar]](), list[tuple[int, Scalar]]()
         for i in range(k + 1, size):
             x, y = matrix[i][k], matrix[k][k]
-            if _is_zero(x):
+            if is_literal_zero(x):
                 continue
             exchanges.append((i, x, y))
             upper, lower = matrix[k], matrix[i]
             matrix[k] = [*upper[:k], *(where_larger(x, y, b, a) for a, b in zip(upper[k:], lower[k:], strict=True))]
             matrix[i] = [*lower[:k], *(where_larger(x, y, a, b) for a, b in zip(upper[k:], lower[k:], strict=True))]
-        if _is_zero(matrix[k][k]):
+        if is_literal_zero(matrix[k][k]):
             raise ZeroDivisionError("the matrix is singular whatever the pose: a column of the core is empty")
         self.pivots.append(matrix[k][k])
         inverse = 1.0 / matrix[k][k]
         for i in range(k + 1, size):
-            if not _is_zero(matrix[i][k]):
+            if not is_literal_zero(matrix[i][k]):
                 factor = matrix[i][k] * inverse
                 multipliers.append((i, factor))
                 matrix[i] = [*matrix[i][: k + 1], *(matrix[i][c] - factor * matrix[k][c] for c in range(k + 1, size))]
@@ -201,7 +197,7 @@ class _Core:
     def _bounds_of_column_sums(self) -> list[Scalar]:
         reach = list[Scalar]()
         for k, inverse in enumerate(self.inverses):
-            above = (absolute(self.matrix[i][k]) * reach[i] for i in range(k) if not _is_zero(self.matrix[i][k]))
+            above = (absolute(self.matrix[i][k]) * reach[i] for i in range(k) if not is_literal_zero(self.matrix[i][k]))
             reach.append(sum(above, 1.0) * absolute(inverse))
         return reach
 
@@ -209,9 +205,9 @@ class _Core:
         for k, inverse in enumerate(self.inverses):
             column: dict[int, Scalar] = {k: inverse}
             for i in reversed(range(k)):
-                terms = (self.matrix[i][c] * x for c, x in column.items() if not _is_zero(self.matrix[i][c]))
+                terms = (self.matrix[i][c] * x for c, x in column.items() if not is_literal_zero(self.matrix[i][c]))
                 value = reduce(add, terms, 0.0) * self.inverses[i]
-                if not _is_zero(value):
+                if not is_literal_zero(value):
                     column[i] = -value
             yield reduce(add, map(absolute, column.values()))
 

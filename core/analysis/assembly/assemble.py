@@ -23,7 +23,7 @@ from ...mechanism import Mechanism
 from ...primitives.base import Pose
 from ...program import NumpyExecutor, Plan, Program, program
 from ...trajectory import Array, BodyMotion
-from ..arguments import real, require_positive
+from ..arguments import no_such, real, require_positive
 from ..equations.constraints import Style
 from ..equations.drives import standing_drives
 from ..equations.poses import displaced, state_of
@@ -94,7 +94,7 @@ def require_named(who: str, mechanism: Mechanism, bodies: Iterable[str], drivers
         there = [each.name for each in known]
         for name in names:
             if name not in there:
-                raise SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(there) or 'none'}")
+                raise no_such(who, what, name, there)
 
 
 def require_shapes(who: str, estimates: Mapping[str, tuple[Array, Array]], lanes: tuple[int, ...]) -> None:

@@ -12,7 +12,7 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any
 
-from ...algebra import Scalar, Vec3, quat, turned_by, vec
+from ...algebra import Scalar, Vec3, is_literal_zero, quat, turned_by, vec
 from ...mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Primitive, Row, Twist
 from ...program import cos, sin
@@ -142,7 +142,7 @@ class Cartesian:
             rows = [self._sparse(row, c) for row in bound.rows(*pair)]
             if c.coordinate:  # nu is linear in the drive's rate: what it is at rate one is minus the coordinate's column
                 for row, value in zip(rows, bound.nu(*pair), strict=True):
-                    if not _is_zero(value):
+                    if not is_literal_zero(value):
                         row[self.coordinates[c.coordinate]] = -value
             found += rows
         return found
@@ -208,7 +208,7 @@ class Cartesian:
             if body in self.columns:
                 first = self.columns[body]
                 values = [value for block in blocks for value in block]
-                entries |= {first + k: x for k, x in enumerate(values) if not _is_zero(x)}
+                entries |= {first + k: x for k, x in enumerate(values) if not is_literal_zero(x)}
         return entries
 
 
@@ -219,10 +219,6 @@ def _named(c: Constraint | Relation) -> tuple[str, str]:
 
 def _count(c: Constraint | Relation) -> int:
     return 1 if isinstance(c, Relation) else c.primitive.n
-
-
-def _is_zero(x: Scalar) -> bool:
-    return isinstance(x, int | float) and x == 0
 
 
 def _pair(c: Constraint, at: Configuration) -> tuple[Pose, Pose]:

@@ -156,19 +156,19 @@ def _axial(
 ) -> list[Constraint | Relation]:
     """An axial joint; its coordinates are named where they are coupled, related to each other, or the style names all."""
     related = {f"{original.name}.{freedom}" for relation in original.relations for freedom in relation}
-    named = [f for f in original.freedoms if mixed or (name := f"{original.name}.{f}") in coupled or name in related]
+    names = {freedom: f"{original.name}.{freedom}" for freedom in original.freedoms}
+    named = [freedom for freedom, name in names.items() if mixed or name in coupled or name in related]
     # the ground as body i: its rows are constant; but a named coordinate is that of body j relative to body i, in this order
     joint = original.reversed() if fixed_last and not named else original
     i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
     scaled = joint.scaled(1.0 / frame.unit)
     composed = [(primitive, "") for primitive in scaled.primitives(i, j)]
     if mixed:
-        composed = [(primitive, freedom * (freedom in joint.freedoms)) for primitive, freedom in scaled.mixed(i, j)]
+        composed = [(primitive, freedom if freedom in names else "") for primitive, freedom in scaled.mixed(i, j)]
     else:
         composed += [(scaled.measured(freedom, i, j), freedom) for freedom in named]
     found: list[Constraint | Relation] = [
-        Constraint(joint.name, primitive, joint.i, joint.j, f"{joint.name}.{freedom}" if freedom else "")
-        for primitive, freedom in composed
+        Constraint(joint.name, primitive, joint.i, joint.j, names.get(freedom, "")) for primitive, freedom in composed
     ]
     weights = ({f"{joint.name}.{freedom}": k for freedom, k in relation.items()} for relation in original.relations)
     return found + [_relation(joint.name, each, frame) for each in weights]

@@ -12,7 +12,7 @@ from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...motions import Path, Ramp
 from ...trajectory import Array
-from ..arguments import require_positive
+from ..arguments import no_such, require_positive
 from ..equations.constraints import Style
 from ..model import compile_model
 from ..request import Request
@@ -109,17 +109,18 @@ def trace(
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
             argument makes no sense.
     """
-    if driver not in [each.name for each in mechanism.drivers]:
+    if driver not in (drivers := [each.name for each in mechanism.drivers]):
         require_driven(mechanism)
-        raise SolveError(f"trace: there is no driver {driver!r}; known: {', '.join(each.name for each in mechanism.drivers)}")
+        raise no_such("trace", "driver", driver, drivers)
     if direction not in (1, -1):
         raise SolveError(f"trace: direction is {direction}, expected 1 (the driver's value grows) or -1 (it falls)")
     for name, given in (("length", length), ("longest", longest), ("tol", tol)):
         require_positive("trace", name, given)
-    wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
-    unknown = [name for name in wanted if name not in [point.name for point in mechanism.points]]
-    if unknown:
-        raise SolveError(f"trace: there is no point {unknown[0]!r}; known: {', '.join(p.name for p in mechanism.points) or 'none'}")
+    there = [point.name for point in mechanism.points]
+    wanted = tuple(there if points is None else points)
+    for name in wanted:
+        if name not in there:
+            raise no_such("trace", "point", name, there)
     request = Request((driver,), wanted, order=0, style=Style(style), compiled=False)
     model = compile_model(mechanism, request)
     system = System(model)

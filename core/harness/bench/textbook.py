@@ -157,7 +157,7 @@ class PrintedDot21:
     g: Vec3
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        """(24)."""
+        """Table 2."""
         e, found = j.u - i.u, list[Row]()
         for a in (self.f, self.g):
             along = chain(a, i.A.T)
