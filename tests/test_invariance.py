@@ -164,8 +164,9 @@ def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, j
 def test_the_points_of_a_joint_are_known_by_their_kind():
     """Whatever a joint calls them, they are what the mechanism is measured by: a metre would be a million times its size."""
 
-    @dataclass(frozen=True)
+    @dataclass(frozen=True, kw_only=True)
     class Pinned(Revolute):
+        point: None = None
         pin: tuple[float, float, float] = position()
 
         def primitives(self, i, j):
@@ -174,7 +175,7 @@ def test_the_points_of_a_joint_are_known_by_their_kind():
     size = 2.0**-20
     corners = [(0.0, 0.0, 0.0), (0.0, size, 0.0), (3.0 * size, 2.0 * size, 0.0), (2.0 * size, 0.0, 0.0)]
     links = ["ground", "crank", "coupler", "rocker", "ground"]
-    pins = [Pinned(f"pin {k}", *links[k : k + 2], point=None, axis=(0.0, 0.0, 1.0), pin=corner) for k, corner in enumerate(corners)]
+    pins = [Pinned(f"pin {k}", *links[k : k + 2], axis=(0.0, 0.0, 1.0), pin=corner) for k, corner in enumerate(corners)]
     mechanism = Mechanism("four-bar", [Body(name) for name in links[1:4]], pins)
     assert frames(mechanism).unit == 4.0 * size  # three wide, to a power of two
     assert [joint.points_on("coupler") for joint in pins] == [[each] for each in corners]

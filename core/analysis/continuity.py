@@ -37,8 +37,10 @@ SHARPER = 1e-2
 EPSILON = float(np.finfo(np.float64).eps)
 # A motion is followed towards a singular pose as long as rounding leaves its rates uncertain by less than the first part, estimated
 # from sigma: nearer it seems to turn any way, also into another motion that crosses it there. Away from one it is followed only
-# where they are surer than the second: what turns there may have been turned by rounding.
-FOLLOWED, TURNED = 1e-2, 1e-5
+# where they are surer than the second: what turns there may have been turned by rounding. The other motion is about sigma away, so
+# that rounding moves a pose by a ten-thousandth of the way there; by a hundredth where the estimate is four times too large. Of
+# pivots, which may be too large by much more, a parallelogram was found on its other motion.
+FOLLOWED, TURNED, TURNED_BY_PIVOTS = 1e-2, 1e-3, 1e-5
 
 
 def doubtful(sigma: float | Array, closure: float | Array, tol: float, order: int = 1) -> bool | NDArray[np.bool_]:

@@ -21,7 +21,7 @@ from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...motions import Path
 from ...trajectory import Array
-from ..continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE_BY_PIVOTS
+from ..continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED_BY_PIVOTS, WORSE_BY_PIVOTS
 from ..equations.constraints import constraints, measured
 from ..equations.drives import drive_numbers
 from ..model import CLOSED, MAX_ITERATIONS
@@ -243,7 +243,7 @@ class SparseModel:
         pivot, orientation = self._pivots()
         largest = max(pivot, here.largest_pivot)
         # where SuperLU exchanges rows its pivots jump tenfold: their change is not held to
-        limit = FOLLOWED if pivot < here.pivot else TURNED
+        limit = FOLLOWED if pivot < here.pivot else TURNED_BY_PIVOTS
         if orientation != here.orientation or limit * pivot**2 <= WORSE_BY_PIVOTS * largest * max(closure, EPSILON):
             raise FailedError(f"there is a singular pose ahead, smallest pivot {pivot:.3g}")
         tests = closure, leftover, branch, pivot, largest, orientation
