@@ -6,11 +6,13 @@ alone, joined   all that is tested, and the tolerance   -> margin    positive wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..algebra import Scalar
 from ..program import DONE, MARGIN, Program, absolute, before, maximum, minimum, program
 from ..trajectory import Array
 from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
@@ -53,34 +55,48 @@ def _gaps(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
 
 
 def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
-    """By how much a lane passes all tests of a solution: it has converged, closes, is on its branch, agrees with the
-    redundant rows, and continues the motion it is predicted from.
-
-    The last is seen from its gaps, and from sigma. No lane is taken that is far from there, nor one beyond a singular pose: whether
-    the motion passes it, or turns round a corner before it, is not seen from afar.
-    """
-    read = tracer.read
-    tol, consistent, crossing = (read(label) for label in ACCEPT)
-    closure, sigma, turned = (read(name) for name in ("closure", SIGMA, ORIENTATION))
-    sigma_before, turned_before, largest = (read(FROM + name) for name in (SIGMA, ORIENTATION, LARGEST_SIGMA))
+    """By how much a lane passes all tests of a solution."""
+    read, sigma, turned = tracer.read, tracer.read(SIGMA), tracer.read(ORIENTATION)
+    sigma_before, turned_before, largest = (read(FROM + label) for label in (SIGMA, ORIENTATION, LARGEST_SIGMA))
     largest = maximum(sigma, largest)
     if neighbours:
         sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
-    uncertain = (WORSE * largest) * maximum(closure, EPSILON)
-    margins = (
-        read(DONE) - 0.5,
-        tol - closure,
-        consistent - read("leftover"),
-        read("branch"),
-        LARGEST_CORRECTION * read(MOVED) + NEGLIGIBLE - read(GAP),
-        LONGEST_STEP - read(REACH),
-        (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
-        0.5 - absolute(turned - turned_before) + crossing,
-        FOLLOWED * sigma * sigma - uncertain,
-        maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
-    )
-    out = {tracer.layout.scalar(MARGIN): reduce(minimum, margins), tracer.layout.scalar(LARGEST_SIGMA): largest}
+    found = margins(read, sigma_before, turned_before, largest)
+    out = {tracer.layout.scalar(MARGIN): reduce(minimum, found.values()), tracer.layout.scalar(LARGEST_SIGMA): largest}
     return program(name, tracer.tape, out, tracer.prepared)
+
+
+def margins(read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar) -> dict[str, Scalar]:
+    """By how much a lane passes each test of a solution: it has converged, closes, agrees with the redundant rows, is on its
+    branch, and continues the motion it is predicted from.
+
+    The last is seen from its gaps, and from sigma. No lane is taken that is far from there, nor one beyond a singular pose: whether
+    the motion passes it, or turns round a corner before it, is not seen from afar.
+
+    Args:
+        read: a scalar of the lane by its name.
+        sigma_before, turned_before: of where it is predicted from.
+        largest: the largest estimate of sigma so far.
+    """
+    tol, consistent, crossing = (read(label) for label in ACCEPT)
+    closure, sigma, turned = (read(label) for label in ("closure", SIGMA, ORIENTATION))
+    uncertain = (WORSE * largest) * maximum(closure, EPSILON)
+    return {
+        "converged": read(DONE) - 0.5,
+        "closed": tol - closure,
+        "consistent": consistent - read("leftover"),
+        "on the branch": read("branch"),
+        "continued": LARGEST_CORRECTION * read(MOVED) + NEGLIGIBLE - read(GAP),
+        "near": LONGEST_STEP - read(REACH),
+        "as regular": (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
+        "on this side": 0.5 - absolute(turned - turned_before) + crossing,
+        "certain": FOLLOWED * sigma * sigma - uncertain,
+        "not turned by rounding": maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
+    }
+
+
+SINGULAR = ("as regular", "on this side", "certain", "not turned by rounding")
+"""The tests that a lane fails where a singular pose is ahead."""
 
 
 def why_refused(model: Model, lane: Array) -> str:
@@ -89,25 +105,24 @@ def why_refused(model: Model, lane: Array) -> str:
     Args:
         lane: all its slots.
     """
-    closure, branch, leftover, tol, consistent = (
-        lane[model.slots[name]] for name in ("closure", "branch", "leftover", "tolerance", "consistent")
-    )
+
+    def read(name: str) -> float:
+        return float(lane[model.slots[name]])
+
+    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA))
+    failed = [name for name, margin in found.items() if not margin > 0.0]
+    closure, leftover, tol = (read(name) for name in ("closure", "leftover", "tolerance"))
     if not np.isfinite(closure):
         return "Newton diverges to numbers that are not finite"
-    if not branch > 0.0:
-        return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
-    if closure <= tol and leftover > consistent:
+    if "on the branch" in failed:
+        return f"Newton reaches a wrong branch (axes turned over, cosine {read('branch'):.3g})"
+    if "closed" in failed and closure <= ROUNDING:
+        return f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance {tol:.3g} is less; allow more"
+    if "closed" in failed:
+        return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
+    if "consistent" in failed:
         names = ", ".join(model.selection.account.redundant_rows)
         return f"the redundant rows ({names}) contradict the others by {leftover:.3g}"
-    if tol < closure <= ROUNDING:
-        return f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance {tol:.3g} is less; allow more"
-    if closure > tol:
-        return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
-    sigma, before, largest, *turned = (
-        float(lane[model.slots[name]]) for name in (SIGMA, FROM + SIGMA, LARGEST_SIGMA, ORIENTATION, FROM + ORIENTATION)
-    )
-    uncertain = WORSE * largest * max(closure, EPSILON) / sigma**2 if sigma else np.inf
-    lost = uncertain >= FOLLOWED or (uncertain >= TURNED and sigma >= before)
-    if lost or not 1.0 / LARGEST_RATIO < sigma / before < LARGEST_RATIO or turned[0] != turned[1]:
+    if any(name in failed for name in SINGULAR):
         return "there is a singular pose ahead"
     return "Newton jumps to another assembly"
