@@ -214,7 +214,7 @@ def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys):
         ["free", "consensus", "only", "made", "up"],
     ]
     assert any(line.startswith("  native     1.2  projection, loop: python") for line in lines)
-    assert any(line.startswith("  pinocchio  not installed: pip install 'pin>=") for line in lines)
+    assert any(line.startswith("  pinocchio  not installed, or cannot be imported: pip install 'pin>=") for line in lines)
 
 
 def test_the_start_is_quick_and_loads_nothing_that_is_not_needed():

@@ -37,6 +37,7 @@ def _list(options: argparse.Namespace, house: House) -> int:
     for engine in engines:
         name = engine.name
         version = engine.version()
-        state = f"not installed: {how_to_install(name)}" if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
+        missing = f"not installed, or cannot be imported: {how_to_install(name)}; kincheck doctor says which"
+        state = missing if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
         print(f"  {name:{width}}  {state}")
     return Status.WITHIN
