@@ -5,14 +5,17 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from kincheck import cases
 from kincheck.core.drivers import PointCoordinate
 from kincheck.core.errors import CaseError
-from kincheck.core.harness.case import Output, Series
+from kincheck.core.harness.case import ORDERS, Output, Series
 from kincheck.core.harness.compare import NO_SIZE, as_numbers, describe, deviation, deviations, output_series, pace, size
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.reporting.junit import to_junit
+from kincheck.core.harness.reporting.report import headline
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism import Mechanism
+from msgspec import UNSET
 
 from .fakes import RADIUS, SAMPLES, Fake, crank, exact, partial, solution
 
@@ -184,10 +187,20 @@ class Undefined(Output):
         return replace(super().of(at, design), x=np.full(SAMPLES, np.nan))
 
 
-class Derivative(Undefined):
-    """Made of velocities."""
+class Rate(Output):
+    """The derivative of an output, made of velocities."""
 
     orders = 2
+
+    def of(self, at, design):
+        return super().of(at, design).dot
+
+
+class UndefinedRate(Rate):
+    """Nor has it a value."""
+
+    def of(self, at, design):
+        return replace(super().of(at, design), x=np.full(SAMPLES, np.nan))
 
 
 @pytest.mark.parametrize("complete", [True, False])
@@ -198,15 +211,31 @@ def test_an_output_without_any_value_fails_where_all_samples_were_solved(complet
     (record,) = results.records
     assert record.outcome is Outcome.FAIL
     assert record.errors["x"].position is None
-    assert record.errors["x"].lost is complete
+    assert record.errors["x"].lost == (SAMPLES if complete else UNSET)
+    assert headline(results) == f"1 of 1 comparisons {'has outputs without a value' if complete else 'lacks samples'}"
     assert (f"x: position: {SAMPLES} samples without a value where closed_form has one" in record.message) is complete
     failed = ElementTree.fromstring(to_junit(results)).findall(".//testcase[failure]")
     assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
 
 
-def test_a_derivative_of_an_engine_without_velocities_is_not_lost():
-    case, right = crank(), crank().reference["x"]
-    rate = Derivative(**vars(case.outputs[0]))
-    for velocity, lost in ((None, False), (exact(case)[1], True)):
-        found = output_series(case, rate, solution(case, velocity=velocity, acceleration=None))
-        assert deviations(case, rate, found, [("closed_form", right)], complete=True).lost is lost
+@pytest.mark.parametrize("rates", [(), ("velocity",), ("velocity", "acceleration")], ids=["positions", "velocities", "all"])
+def test_a_derivative_has_one_less_of_what_the_engine_gives(rates):
+    case = crank()
+    right, missing = case.reference["x"], {name: None for name in ("velocity", "acceleration") if name not in rates}
+    standards = [("closed_form", Series(right.velocity, right.acceleration))]
+    known, lost = (
+        deviations(case, output, output_series(case, output, solution(case, **missing)), standards, complete=True)
+        for output in (kind(**vars(case.outputs[0])) for kind in (Rate, UndefinedRate))
+    )
+    assert [quantity for quantity, _ in known.items()] == ["position", "velocity"][: len(rates)]
+    assert not known.lost
+    # with velocities alone it cannot be told from one that lacks them
+    assert lost.lost == (SAMPLES if len(rates) == 2 else UNSET)
+
+
+def test_a_reference_of_all_there_is_needs_no_native_engine():
+    """Of outputs that are derivatives there is no acceleration."""
+    case, native = cases.load("mcpherson_suspension"), Fake("native")
+    assert any(output.orders < ORDERS for output in case.outputs)
+    run([case], [Fake("mujoco", refusal="no")], tol=1e-12, baseline=native)
+    assert native.solves == 0

@@ -31,7 +31,7 @@ from ..jet import Jet
 from ..mechanism import Vector
 from ..trajectory import Array, PointMotion, Trajectory
 from .case import MARKER, ORDERS, Case, Quantity, Series
-from .record import LOST, Deviation, Deviations, OutputSeries
+from .record import Deviation, Deviations, OutputSeries
 
 # D of a mechanism whose points all coincide, to rounding, [m]: keeps the pace finite.
 NO_SIZE = 1e-3
@@ -77,9 +77,9 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
     solved = trajectory.solved
     position, *rates = (np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a))
     motions = [trajectory.points[name] for name in output.points]
-    given = [all(getattr(each, quantity) is not None for each in motions) for quantity in ("velocity", "acceleration")]
-    known = [rate if order < output.orders and given[order - 1] else None for order, rate in enumerate(rates, 1)]
-    return Series(position, *known)
+    given = 1 + sum(all(getattr(each, quantity) is not None for each in motions) for quantity in ("velocity", "acceleration"))
+    known = given - (ORDERS - output.orders)  # the value of a derivative takes what the engine gives as a rate
+    return Series(position, *(rate if order < known else None for order, rate in enumerate(rates, 1)))
 
 
 def _moving(motion: PointMotion) -> Vec3:
@@ -124,6 +124,7 @@ def deviations(
     beat = pace(case)
     compared: dict[str, Deviation | None] = {}
     reasons: list[str] = []
+    losses = 0
     for order, quantity in enumerate(("position", "velocity", "acceleration")):
         values: Array | None = getattr(found, quantity)
         known: list[tuple[str, Array]] = [
@@ -141,15 +142,16 @@ def deviations(
             name, reference = known[0]
             compared[quantity] = off = deviation(values, reference, output.atol * beat**order, output.rtol, name)
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
-            # an output that is a derivative has none either where the engine gives no velocities to make it of
-            if lost and (off is not None or found.velocity is not None or output.orders == ORDERS):
+            # the value of a derivative is nowhere known either where the engine gives no velocities to make it of
+            if lost and (off is not None or order or found.velocity is not None or output.orders == ORDERS):
                 compared[quantity] = off and msgspec.structs.replace(off, within=False)
-                reasons.append(f"{quantity}: {lost} {LOST} {name} has one")
+                reasons.append(f"{quantity}: {lost} samples without a value where {name} has one")
+                losses += lost
             elif off is None:
                 reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
             if off is not None and (alone := int((np.isfinite(values) & ~np.isfinite(reference)).sum())):
                 reasons.append(f"{quantity}: {name} has no value at {alone} of {len(values)} samples: {NOTHING}")
-    return Deviations(**compared, reason="; ".join(reasons) or None)
+    return Deviations(**compared, reason="; ".join(reasons) or None, lost=losses or msgspec.UNSET)
 
 
 def deviation(values: Array, reference: Array, atol: float, rtol: float, against: str) -> Deviation | None:

@@ -44,10 +44,6 @@ class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
     reason: str | None = None
 
 
-LOST = "samples without a value where"
-"""Said of samples that the standard has a value at, and the engine should."""
-
-
 class Deviation(msgspec.Struct, frozen=True, kw_only=True):
     """How far an output is from what it is compared with, over the samples both have.
 
@@ -65,17 +61,23 @@ class Deviation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deviations(msgspec.Struct, frozen=True, kw_only=True):
-    """Deviations of one output; null where there is nothing to compare, and `reason` says why."""
+    """Deviations of one output; null where there is nothing to compare, and `reason` says why.
+
+    Attributes:
+        lost: how many values there are none of where what they are compared with has one, all samples being solved; absent where
+            none are. Where all are there is no deviation either.
+    """
 
     position: Deviation | None
     velocity: Deviation | None
     acceleration: Deviation | None
     reason: str | None = None
+    lost: int | msgspec.UnsetType = msgspec.UNSET
 
     @property
-    def lost(self) -> bool:
-        """Whether samples have no value where what they are compared with has one; maybe none has, and nothing is compared."""
-        return LOST in (self.reason or "")
+    def within(self) -> bool:
+        """Whether all that was compared is within tolerance."""
+        return all(each.within for _, each in self.items())
 
     def items(self) -> list[tuple[str, Deviation]]:
         """Quantity and deviation of what was compared."""

@@ -155,9 +155,8 @@ def _standard_known(
 def _referenced(case: Case) -> bool:
     """Whether the case's reference has everything there is to compare."""
     return all(
-        output.name in case.reference
-        and case.reference[output.name].velocity is not None
-        and case.reference[output.name].acceleration is not None
+        (series := case.reference.get(output.name)) is not None
+        and all(each is not None for each in (series.position, series.velocity, series.acceleration)[: output.orders])
         for output in case.outputs
     )
 
@@ -219,8 +218,7 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
         unit = next(each.unit for each in case.outputs if each.name == output)
         messages.append(describe(output, quantity, deviation, case.sweep.driver, values, unit) + more)
     # with no value at all there is nothing to be out of tolerance
-    within = {name: each for name, each in errors.items() if all(off.within for _, off in each.items())}
-    messages += [f"{name}: {each.reason}" for name, each in within.items() if each.lost]
+    messages += [f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within]
     outcome = Outcome.FAIL if messages else Outcome.PASS
     if outcome is Outcome.PASS:
         messages += _not_compared(errors)

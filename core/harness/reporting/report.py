@@ -122,12 +122,16 @@ def packed(text: str) -> str:
 def headline(results: Results) -> str:
     """The run in one sentence."""
     records, missing = results.records, len(results.missing)
-    compared, broken = [record for record in records if judged([record])], _count(records, *BROKEN)
+    compared, broken = [record for record in records if judged([record]) or _lost(record)], _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
-    outside = sum(any(not each.within for found in record.errors.values() for _, each in found.items()) for record in failed)
-    short = len(failed) - outside  # within tolerance where there is something to compare
-    counts = [f"{outside} of {len(compared)} comparisons {'is' if outside == 1 else 'are'} outside tolerance"] if outside else []
-    counts += [f"{short} of {len(compared)} comparisons {'lacks' if short == 1 else 'lack'} samples"] if short else []
+    within = [record for record in failed if all(each.within for each in record.errors.values())]  # where there is a deviation
+    outside, without = len(failed) - len(within), sum(map(_lost, within))
+    parts = (
+        (outside, "is", "are", "outside tolerance"),
+        (without, "has", "have", "outputs without a value"),
+        (len(within) - without, "lacks", "lack", "samples"),
+    )
+    counts = [f"{n} of {len(compared)} comparisons {one if n == 1 else more} {what}" for n, one, more, what in parts if n]
     if not compared:
         said = "Nothing was compared"
     elif failed:
@@ -140,6 +144,11 @@ def headline(results: Results) -> str:
         )
     said += f", {broken} could not be completed" if broken else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
+
+
+def _lost(record: Record) -> bool:
+    """Whether an output has no value where it should."""
+    return any(each.lost for each in record.errors.values())
 
 
 def _worst_of(record: Record, motion: str | None = None) -> Judged | None:
