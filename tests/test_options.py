@@ -1,10 +1,8 @@
 """Options that would be ignored, destroy each other's files or be no limits are refused, before anything is computed."""
 
-from pathlib import Path
-
 import pytest
 from kincheck.core.harness.cli import main
-from kincheck.core.harness.writing import unwritable, written
+from kincheck.core.harness.writing import unwritable
 
 VARY = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.ball]\nat = "ball"\nsigma = 1.0\n'
 
@@ -88,27 +86,3 @@ def test_what_is_no_file_takes_what_several_options_write():
 def test_a_limit_that_can_be_counted_is_one(capsys):
     assert main(["run", "rssr", "--engine", "native", "--jobs", "1", "--memory", "1e9", "--timeout", "1e9"]) == 0
     assert "1 pass" in capsys.readouterr().out
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-@pytest.mark.parametrize("command", ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"])
-def test_a_full_disk_is_one_message(command, capsys):
-    assert main([*command.split(), "--json", "/dev/full"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a folder that ")
-
-
-def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):
-    """One begins while the other is at it: what is there in the end is the whole of the one that ended last."""
-    file = tmp_path / "results.json"
-
-    def first(part):
-        part.write_bytes(10 * b"A")
-        assert written(file, lambda part: part.write_bytes(4 * b"B")) == []
-        assert file.read_bytes() == 4 * b"B"
-        with part.open("ab") as more:
-            more.write(10 * b"A")
-
-    assert written(file, first) == []
-    assert file.read_bytes() == 20 * b"A"
-    assert [each.name for each in tmp_path.iterdir()] == ["results.json"]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator, Iterable, Mapping
+import shutil
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeAlias
@@ -27,9 +28,9 @@ def written(path: Path, content: Content) -> list[str]:
     return []
 
 
-def write_all(contents: Mapping[Path, Content]) -> list[str]:
+def write_all(contents: Iterable[tuple[Path, Content]]) -> list[str]:
     """Write files; why some could not be."""
-    return [problem for path, content in contents.items() for problem in written(path, content)]
+    return [problem for path, content in contents for problem in written(path, content)]
 
 
 def write(option: str, path: Path, content: Content) -> None:
@@ -58,13 +59,15 @@ def _put(path: Path, content: Content) -> None:
 @contextmanager
 def _whole(path: Path) -> Generator[Path]:
     """A path to write to, which becomes the file when all is written; until then, and if it fails, what stood there stays."""
-    file = path.resolve()  # what a link leads to
-    if file.exists() and not (file.is_file() and os.access(file.parent, os.W_OK)):  # a pipe, a device, or in a folder of others
+    there, file = path.exists(), path.resolve()  # what a link leads to; a pipe without a name is nowhere
+    if there and not (path.is_file() and os.access(file.parent, os.W_OK)):  # a pipe, a device, or in a folder of others
         yield path
         return
-    part = file.with_name(f".{file.name}.{uuid4().hex}.part")  # another run may be writing the same file
+    part = file.with_name(f".{uuid4().hex}.part")  # another run may be writing the same file
     try:
         yield part
+        if there:
+            shutil.copymode(file, part)
         part.replace(file)
     finally:
         part.unlink(missing_ok=True)

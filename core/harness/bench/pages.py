@@ -66,9 +66,9 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
     Raises:
         KincheckError: a file cannot be written.
     """
-    contents = {Path(json): to_json(results)} if json not in (None, "-") else {}
+    contents = [(Path(json), to_json(results))] if json not in (None, "-") else []
     if out is not None:
-        contents |= {out / f"{report.name}.json": to_json(results), out / f"{report.name}.html": page(report).encode()}
+        contents += [(out / f"{report.name}.json", to_json(results)), (out / f"{report.name}.html", page(report).encode())]
     problems = write_all(contents)  # before anything is printed: who reads it may have gone
     print_report(report, sys.stderr if json == "-" else sys.stdout)
     if json == "-":

@@ -195,10 +195,10 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
     from ..writing import write_all
 
     encoded = to_json(results)
-    contents = {Path(options.json): encoded} if options.json not in (None, "-") else {}
+    contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
     if options.out is not None:
         texts = (encoded, page(results).encode(), envelope_csv(results).encode(), gradient_csv(results).encode())
-        contents |= {options.out / name: text for name, text in zip(FILES, texts, strict=True)}
+        contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
     problems = write_all(contents)  # before anything is printed: who reads it may have gone
     print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
     if options.json == "-":

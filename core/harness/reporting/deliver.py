@@ -95,21 +95,21 @@ def deliver(
     from .matrix import print_matrix, to_markdown
     from .table import print_table
 
-    encoded = to_json(results)
-    contents: dict[Path, Content] = {}
+    encoded = to_json(results) if to.out is not None or to.json is not None else b""
+    contents = list[tuple[Path, Content]]()  # several may be for one pipe
     if to.junit is not None:
         from .junit import to_junit
 
-        contents[to.junit] = lambda path: path.write_bytes(to_junit(results))
+        contents.append((to.junit, lambda path: path.write_bytes(to_junit(results))))
     if to.markdown is not None:
-        contents[to.markdown] = lambda path: path.write_text(to_markdown(results), "utf-8")
+        contents.append((to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
     if to.json not in (None, "-"):
-        contents[Path(to.json)] = encoded
+        contents.append((Path(to.json), encoded))
     if to.out is not None:
         from .report import write_report
 
-        contents[to.out / "results.json"] = encoded
-        contents[to.out / "report.html"] = lambda path: write_report(results, path, history=history, precision=precision)
+        contents.append((to.out / "results.json", encoded))
+        contents.append((to.out / "report.html", lambda path: write_report(results, path, history=history, precision=precision)))
     problems += write_all(contents)
     # last: who reads it may have gone
     (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
