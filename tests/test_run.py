@@ -273,26 +273,6 @@ def test_a_reference_that_does_not_fit_is_an_error_not_a_pass():
     assert "closed_form has shape (1,), expected (9,)" in record_of(Fake(), case).message
 
 
-def test_times_are_of_warm_solves_and_the_answer_is_the_timed_one():
-    engine = Fake()
-    record = record_of(engine)
-    assert engine.solves == 6  # one cold, five warm: they take no time
-    assert record.us_per_step == pytest.approx(1e6 * record.seconds.warm / SAMPLES)
-    assert record.seconds.build is not None
-    stale = Fake()
-    stale.answer = lambda case: (solution if stale.solves == 1 else off("position", lambda p: p + 1.0))(case)
-    assert record_of(stale).outcome is Outcome.FAIL
-
-
-def test_slow_engines_are_solved_twice(monkeypatch):
-    clock = iter(np.arange(0.0, 1000.0, 10.0))  # every look at the clock is ten seconds later
-    monkeypatch.setattr("kincheck.core.harness.attempt.perf_counter", lambda: float(next(clock)))
-    engine = Fake()
-    record = record_of(engine)
-    assert engine.solves == 2
-    assert (record.seconds.build, record.seconds.first, record.seconds.warm) == (10.0, 10.0, 10.0)
-
-
 def test_progress_hears_of_every_record():
     heard = []
     results = run([crank("a"), crank("b")], [Fake()], tol=TOL, progress=lambda *news: heard.append(news))

@@ -19,9 +19,11 @@ from .record import Outcome, Seconds
 from .waiting import waited
 from .workers.limits import memory_limit
 
-# Enough solves for a median that one interruption cannot move; slow engines stop after the budget [s].
+# Enough solves for a median that one interruption cannot move; slow engines stop after the budget [s], but not between two of
+# which one took so many times as long as the other: in it something was compiled.
 WARM_SOLVES = 5
 WARM_BUDGET = 0.5
+UNLIKE = 2.0
 
 # Of a message, in characters: a page. An engine may put all its data into one.
 LONGEST_MESSAGE = 2000
@@ -165,7 +167,7 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
     if pair.timed:
         trajectory, last, own = solve()
         warm, undisturbed = [last], [own]
-        while len(warm) < WARM_SOLVES and sum(warm) + warm[-1] <= WARM_BUDGET:
+        while _more(seconds["first"], warm):
             trajectory, last, own = solve()
             warm.append(last)
             undisturbed.append(own)
@@ -180,6 +182,12 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
         message=bounded(trajectory.message),
         details=plain(trajectory.details),
     )
+
+
+def _more(first: float, warm: Sequence[float]) -> bool:
+    """Whether to solve again for a time to go by."""
+    unlike = len(warm) < 3 and max(warm) > UNLIKE * min(first, *warm)
+    return len(warm) < WARM_SOLVES and (unlike or sum(warm) + min(warm) <= WARM_BUDGET)
 
 
 def check(case: Case, engine: str, trajectory: Trajectory) -> None:
