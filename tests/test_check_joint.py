@@ -19,7 +19,8 @@ from kincheck.core.joints import AxialJoint
 from .test_check_joint_mistakes import mistaken
 
 BUILT_IN = sorted(name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck."))
-USERS = {"pin_in_slot": "PinInSlot", "rzeppa": "Rzeppa", "point_on_parabola": "PointOnParabola"}
+USERS = {"pin_in_slot": "PinInSlot", "rzeppa": "Rzeppa", "point_on_parabola": "PointOnParabola", "line_no_twist": "LineNoTwist"}
+WITHOUT_EQUIVALENT = ("point_on_parabola", "line_no_twist")
 
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
@@ -38,7 +39,7 @@ def test_joints_of_users_pass(in_folder, module):
     report = check_joint(load_joint(f"{module}:{USERS[module]}"), engines=engines)
     assert report.passed, report
     verdicts = {engine.name: report[f"loop: {engine.name}"] for engine in engines if engine.name != "native"}
-    if module == "point_on_parabola":
+    if module in WITHOUT_EQUIVALENT:
         assert all("no equivalent() to solve" in each.message or "not installed" in each.message for each in verdicts.values())
         assert {each.verdict for each in verdicts.values()} == {Verdict.SKIP}
     else:

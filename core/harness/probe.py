@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, replace
+from itertools import combinations
 from typing import Any, TypeVar
 
 import numpy as np
@@ -64,8 +65,13 @@ def probe(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Case:
     Raises:
         MechanismError: no specimen of the type can be made.
     """
+    return next(alternatives(tested))
+
+
+def alternatives(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Iterator[Case]:
+    """The same with others of the rods, which may not lock the joint where the first do; those that are chosen first are first."""
     one = specimen(tested) if isinstance(tested, type) else tested
-    return _of_joint(one) if isinstance(one, Joint) else _of_coupler(one)
+    return _of_joint(one) if isinstance(one, Joint) else iter([_of_coupler(one)])
 
 
 def probes() -> list[Case]:
@@ -109,22 +115,23 @@ def _geometry(of: type[Joint] | type[Coupler], pair: Any) -> Iterator[tuple[str,
             yield each.name, values[each.metadata.get("kind")]
 
 
-def _of_joint(joint: Joint) -> Case:
+def _of_joint(joint: Joint) -> Iterator[Case]:
     freedoms = 6 - joint.rows
     if freedoms > len(RODS):
         raise MechanismError(f"{joint}: has {joint.rows} rows, expected one or more; return its primitives")
-    return _case(joint.type, [replace(joint, i="a", j="b")], _rods("b", freedoms))
+    for rods in combinations(range(len(RODS)), freedoms):
+        yield _case(joint.type, [replace(joint, i="a", j="b")], _rods("b", rods))
 
 
 def _of_coupler(coupler: Coupler) -> Case:
     kinds: dict[str, type[AxialJoint]] = {"rotation": Revolute, "translation": Translational}
     first, second = (kinds[freedom] for freedom in coupler.freedoms)
     joints = [first("first", "a", "b", POINT, AXIS), second("second", "a", "c", LINK, PAIRS[0][1])]
-    return _case(coupler.type, joints, _rods("b", 1), [replace(coupler, joints=("first", "second"))])
+    return _case(coupler.type, joints, _rods("b", [0]), [replace(coupler, joints=("first", "second"))])
 
 
-def _rods(body: str, count: int) -> list[Joint]:
-    return [Distance(f"rod_{k}", body, GROUND, ends) for k, ends in enumerate(RODS[:count], 1)]
+def _rods(body: str, chosen: Sequence[int]) -> list[Joint]:
+    return [Distance(f"rod_{k + 1}", body, GROUND, RODS[k]) for k in chosen]
 
 
 def _case(type_: str, tested: Sequence[Joint], rods: Sequence[Joint], couplers: Sequence[Coupler] = ()) -> Case:

@@ -14,7 +14,7 @@ from ..attempt import check
 from ..case import Case, Series
 from ..compare import describe, deviations, output_series
 from ..engine import Engine
-from ..probe import probe
+from ..probe import alternatives
 from ..record import Deviation
 from ..run import NATIVE
 from .checks import ROUND_OFF
@@ -22,7 +22,8 @@ from .findings import Finding, Verdict, judged
 
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates, x1000.
 TOL = 1e-12
-# The probe's rods may lock a joint that they were not chosen for before the end of its sweep; so often that is halved.
+# The probe's rods may lock a joint that they were not chosen for before the end of its sweep: others are tried, and where all do
+# it is halved, so often.
 HALVINGS = 3
 # Weights of sixth-order differences over seven samples.
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
@@ -35,13 +36,7 @@ AGREE_WHY = "error over the tolerance of the probe's outputs"
 def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Finding]:
     """The probe of a joint, or of a type, in the native engine and in the others."""
     try:
-        case = probe(tested)
-        native = _solved(case)
-        for _ in range(HALVINGS):
-            if native.solved.all():
-                break
-            case = replace(case, sweep=replace(case.sweep, values=0.5 * case.sweep.values))
-            native = _solved(case)
+        case, native = _unlocked(tested)
     except Exception as error:  # whatever the joint's own code raises
         yield Finding("loop", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
         return
@@ -65,6 +60,18 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
     for engine in engines:
         if engine.name != NATIVE:
             yield _simulated(engine, case, other, reference)
+
+
+def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
+    """The first probe that is solved whole; the last that was tried, if none is."""
+    first, *others = alternatives(tested)
+    shorter = [replace(first, sweep=replace(first.sweep, values=0.5**k * first.sweep.values)) for k in range(1, HALVINGS + 1)]
+    case, native = first, _solved(first)
+    for other in (*others, *shorter):
+        if native.solved.all():
+            break
+        case, native = other, _solved(other)
+    return case, native
 
 
 def _solved(case: Case) -> Trajectory:
