@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from .errors import MechanismError
+from .given import require_direction, require_finite, triple
 from .joints.base import Joint, Kind
-from .joints.given import require_direction, require_finite, triple
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
 from .errors import MechanismError
+from .given import held, require_finite, triple
 from .joints.base import Joint, Kind, unit
 from .joints.coupler import Coupler
-from .joints.given import held, require_finite, triple
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import MechanismError
+from .given import finite, held
 from .trajectory import Array
 
 
@@ -101,13 +102,14 @@ class Table(Motion):
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):  # lists and arrays may change, motions do not
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+            given = getattr(self, name)
+            object.__setattr__(self, name, held(f"table motion: {name}", given, None, "as many numbers as samples"))
         if len(self.times) != len(self.values) or len(self.times) < 2:
             raise MechanismError(
                 f"table motion: {len(self.times)} times and {len(self.values)} values, expected as many of each, two or more; "
                 "give a value for each time"
             )
-        if not all(map(math.isfinite, (*self.times, *self.values))):
+        if not all(map(finite, (*self.times, *self.values))):
             raise MechanismError("table motion: a time or value is not finite; give numbers")
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
             raise MechanismError("table motion: times do not increase; sort them and remove repeats")
@@ -233,9 +235,5 @@ def outwards(times: Array, start: float) -> tuple[NDArray[np.intp], NDArray[np.i
 
 def _finite(who: str, **numbers: Any) -> None:
     for name, value in numbers.items():
-        try:
-            right = math.isfinite(value)  # also of an array that is one number
-        except TypeError:
-            right = False
-        if not right:
+        if not finite(value):
             raise MechanismError(f"{who} motion: {name} is {value!r}; give a finite number")

@@ -73,6 +73,16 @@ WRONG = {
     "no lead": (lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None), "joint 'a' (screw): lead is None, expected a length"),
     "no ratio": (lambda: Gear("g", ("a", "b"), ratio=None), "joint 'g' (gear): ratio = None is not finite; give a finite number"),
     "a radius of words": (lambda: RackPinion("r", ("a", "b"), radius="2"), "joint 'r' (rack_pinion): radius = 2 is not finite"),
+    "a column": (lambda: Body("b", np.zeros((3, 1))), "body 'b': origin = ([0.0], [0.0], [0.0]) is not finite"),
+    "a joint at a column": (lambda: Revolute("a", "b", "c", np.zeros((3, 1)), (0, 0, 1)), "point = ([0.0], [0.0], [0.0]) is not"),
+    "columns": (lambda: Distance("a", "b", "c", np.zeros((2, 3, 1))), "points = ([0.0], [0.0], [0.0]) is not finite"),
+    "a lead in a list": (lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), [1.0]), "lead = [1.0] is not finite; give a length"),
+    "a ratio in a list": (lambda: Gear("g", ("a", "b"), ratio=[1.0]), "ratio = [1.0] is not finite; give a finite number"),
+    "a complex ratio": (lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)), "ratio = (1+2j) is not finite"),
+    "a complex rate": (lambda: Ramp(np.complex128(0.1 + 5j)), "ramp motion: rate is np.complex128(0.1+5j); give a finite number"),
+    "a table of words": (lambda: Table((0.0, 1.0), ("a", 1.0)), "table motion: a time or value is not finite; give numbers"),
+    "a complex table": (lambda: Table((0.0, 1.0), (0.0, np.complex128(1 + 2j))), "table motion: a time or value is not finite"),
+    "half a table": (lambda: Table((0.0, 1.0), None), "table motion: values is None, expected as many numbers as samples"),
     "one joint for two": (lambda: Gear("g", "ab", ratio=1.0), "joints is 'ab', expected two names"),
 }
 
@@ -89,3 +99,12 @@ def test_what_is_no_point_is_told_so(name):
 def test_euler_parameters_that_are_none_are_told(given):
     with pytest.raises(MechanismError, match="body 'a': euler_parameters"):
         Body("a", euler_parameters=given)
+
+
+def test_an_array_that_is_a_number_is_one():
+    """It may change, and has no hash."""
+    lead, ratio = np.array(0.5), np.array([2.0])
+    screw, gear = Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), lead), Gear("g", ("a", "b"), ratio=ratio)
+    lead[...] = ratio[...] = 7.0
+    assert (screw.lead, gear.ratio) == (0.5, 2.0)
+    assert hash(screw) == hash(Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), 0.5))

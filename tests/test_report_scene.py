@@ -96,6 +96,11 @@ def test_few_hardpoints_are_joined_each_with_each_and_many_with_a_hub(count: int
     assert place(drawn, 0, 0) == pytest.approx([6.0, 0.0, 0.0], abs=1e-12)
 
 
+def test_a_single_hardpoint_is_joined_with_no_origin_that_was_not_given():
+    body = SceneBody(name="plate", fixed=False, origin=[0, 0, 0], euler_parameters=[1, 0, 0, 0])
+    assert drawing(msgspec.structs.replace(star(1), bodies=[body]), AXIS).links == []
+
+
 def test_axes_are_drawn_amid_the_hardpoints_of_a_body_whose_origin_is_far():
     near, far = (
         drawing(star(4), AXIS),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SolveError
-from ..joints.given import finite
+from ..given import finite
 from ..trajectory import Array
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import SolveError
-from ..joints.given import finite
+from ..given import finite
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory

@@ -16,9 +16,9 @@ from typing import Any, ClassVar, Self
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
 from ..errors import MechanismError
+from ..given import held, plain, require_direction, require_finite, triple
 from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
-from .given import held, require_direction, require_finite, triple
 
 
 class Kind(Enum):
@@ -117,6 +117,7 @@ class Joint(ABC):
         for name, kind, value in self.geometry():
             who, expected = f"{self}: {name}", kind.value
             if kind is Kind.LENGTH:
+                value = plain(value)
                 parts = [(value,)]
             elif kind.pair:
                 value = parts = tuple(triple(who, numbers, expected) for numbers in held(who, value, 2, expected))

@@ -8,8 +8,11 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
 from ..errors import MechanismError
+from ..given import held, plain, require_finite
 from .base import Kind
-from .given import held, require_finite
+
+NUMBERS = (float, int, "float", "int")
+"""What fields that are numbers are annotated with."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,8 @@ class Coupler(ABC):
         if self.joints[0] == self.joints[1]:
             raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
         for each in fields(self):
-            if each.type in (float, "float"):
+            if each.type in NUMBERS:
+                object.__setattr__(self, each.name, plain(getattr(self, each.name)))
                 require_finite(f"{self}: {each.name}", (getattr(self, each.name),), "a finite number other than zero")
         if not all(weight and math.isfinite(weight) for weight in self.coefficients):
             given = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ("name", "joints")}

@@ -135,11 +135,11 @@ class _Draughtsman:
         self.drawn.labels.append((a, b, text))
 
     def _body(self, number: int) -> dict[str, Any]:
-        """A body for the page; joins its hardpoints if it moves, a single one with its origin."""
+        """A body for the page; joins its hardpoints if it moves, a single one with its origin, if that was chosen."""
         body = self.bodies[number]
         if not body.fixed:
             mine = [k for k, (other, *_) in enumerate(self.drawn.nodes) if other == number]
-            if len(mine) == 1:
+            if len(mine) == 1 and any(body.origin):  # the global origin is that of bodies which were given none
                 mine = sorted({*mine, self._node(body.name, body.origin)})
             self._link(number, mine)
         frame = self._frame([vec(place) for other, *place in self.drawn.nodes if other == number])

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Complex
-from types import NoneType
 from typing import Any
 
 import numpy as np
 
-from ..errors import MechanismError
+from .errors import MechanismError
 
 SHORTEST = 1e-150
 """Of a direction: the square of a shorter one has fewer digits than others, or none."""
@@ -38,9 +37,18 @@ def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
 
 
 def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
-    """Raise MechanismError unless all are finite numbers, or known only later (traced)."""
-    if any(isinstance(number, str | NoneType | Complex) and not finite(number) for number in numbers):
+    """Raise MechanismError unless all are finite numbers, or of a kind that is computed with later (traced, balls)."""
+    if not all(finite(number) or _of_later(number) for number in numbers):
         raise MechanismError(f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}")
+
+
+def _of_later(number: Any) -> bool:
+    return hasattr(number, "__neg__") and not isinstance(number, Complex | np.ndarray)
+
+
+def plain(number: Any) -> Any:
+    """A number as Python's own, where it is one of numpy's or an array that is one: arrays may change, and have no hash."""
+    return number.item() if type(number).__module__ == "numpy" and np.size(number) == 1 else number
 
 
 def require_direction(who: str, numbers: Sequence[float]) -> None:
@@ -52,12 +60,12 @@ def require_direction(who: str, numbers: Sequence[float]) -> None:
         raise MechanismError(f"{who} has length {length:.3g}, whose square is no number; give a direction of another length")
 
 
-def held(who: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
-    """A value as a tuple of so many items, or an error that names what was expected."""
+def held(who: str, value: Any, count: int | None, expected: str) -> tuple[Any, ...]:
+    """A value as a tuple of so many items, or of any number, or an error that names what was expected."""
     try:
         found = tuple(value.tolist() if hasattr(value, "tolist") else value)
     except TypeError:  # a number, or nothing
-        found = ()
-    if len(found) != count or isinstance(value, str):
+        found = None
+    if found is None or count not in (None, len(found)) or isinstance(value, str):
         raise MechanismError(f"{who} is {value!r}, expected {expected}")
     return found
