@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.analysis.continuity import EPSILON, continuous
+from ..core.analysis.continuity import ROUNDING, continuous
 from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
@@ -37,8 +37,6 @@ RANK_TOLERANCE = 1e-9
 # A few times the smallest step: a pose that fails there can still be come nearer to. Nearer than the root of round-off to where it
 # passes zero, rounding would choose the assembly.
 FOLD = 8.0 * SMALLEST_STEP
-# Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
-ROUNDING = 64.0 * EPSILON
 # Least squares have arrived where a step is this short: no more is to be gained, and what is left are rows that contradict others.
 ARRIVED = 1e-6
 

@@ -99,13 +99,14 @@ class Trajectory:
         solved: NDArray[np.bool_],
         iterations: NDArray[np.int64],
         residual: float,
-        message: str,
-        details: Mapping[str, Any],
+        message: str = "",
+        details: Mapping[str, Any] | None = None,
         bodies: Mapping[str, BodyMotion] | None = None,
     ) -> None:
         known = self.__dict__
         known["points"], known["solved"], known["iterations"] = points, solved, iterations
-        known["residual"], known["message"], known["details"] = residual, message, details
+        known["residual"], known["message"] = residual, message
+        known["details"] = {} if details is None else details
         known["bodies"] = {} if bodies is None else bodies
 
 

@@ -157,3 +157,10 @@ def test_a_reference_stays_in_its_folder(kincheck_main, tmp_path):
     case = replace(crank(reference=False), name="../escaped")
     assert kincheck_main("reference", "crank", "--digits", 20, "--out", tmp_path / "proofs", cases={"crank": case}) == 0
     assert [each.relative_to(tmp_path) for each in tmp_path.rglob("*.json")] == [Path("proofs/.._escaped.reference.json")]
+
+
+def test_two_names_of_one_file_are_refused_before_the_work(kincheck_main, tmp_path, capsys):
+    cases = {name: replace(crank(reference=False), name=name) for name in ("a/b", "a:b")}
+    assert kincheck_main("reference", *cases, "--out", tmp_path, cases=cases) == 2
+    assert "a_b.reference.json: found the file of a/b, expected one of its own" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -15,7 +15,7 @@ import numpy as np
 from ..algebra import Scalar
 from ..program import DONE, MARGIN, Program, absolute, before, maximum, minimum, program
 from ..trajectory import Array
-from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, TURNED, WORSE
+from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, ROUNDING, TURNED, WORSE
 from .request import ACCEPT, BLOCKS, FROM, LARGEST_SIGMA, ORIENTATION, SIGMA
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ ALONE, JOINED = ("alone_gaps", "alone"), ("joined_gaps", "joined")
 """The programs of the two tests: of lanes that know nothing of each other, and of neighbours on one way."""
 GAPS = GAP, MOVED, REACH = "gap", "moved", "reach"
 """Slots of the largest change of a correction, of a component of the state, and of its distance from the start."""
-# Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
-ROUNDING = 64.0 * EPSILON
 
 
 def tests(tracer: Tracer, *, neighbours: bool) -> list[Program]:
@@ -125,4 +123,8 @@ def why_refused(model: Model, lane: Array) -> str:
         return f"the redundant rows ({names}) contradict the others by {leftover:.3g}"
     if any(name in failed for name in SINGULAR):
         return "there is a singular pose ahead"
+    if failed == ["converged"]:
+        return f"Newton does not settle, residual {closure:.3g} of the mechanism's size"
+    if failed == ["near"]:
+        return "the step to it is too long to be believed"
     return "Newton jumps to another assembly"

@@ -35,10 +35,12 @@ LOW = 0.1
 # So much less is allowed of errors that other rows may not have.
 SHARPER = 1e-2
 EPSILON = float(np.finfo(np.float64).eps)
+# Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
+ROUNDING = 64.0 * EPSILON
 # A motion is followed towards a singular pose as long as rounding leaves its rates uncertain by less than the first part, estimated
 # from sigma: nearer it seems to turn any way, also into another motion that crosses it there. Away from one it is followed only
 # where they are surer than the second: what turns there may have been turned by rounding. The other motion is about sigma away, so
-# that rounding moves a pose by a ten-thousandth of the way there; by a hundredth where the estimate is four times too large. Of
+# that rounding moves a pose by a ten-thousandth of the way there, by a six-hundredth where the estimate is four times too large. Of
 # pivots, which may be too large by much more, a parallelogram was found on its other motion.
 FOLLOWED, TURNED, TURNED_BY_PIVOTS = 1e-2, 1e-3, 1e-5
 

@@ -111,7 +111,7 @@ class Tracer:
         return Elimination(self._kept(self.formulation.rows(self.at)))
 
     def newton(self) -> Program:
-        """One Newton-Raphson iteration of (28): (29)."""
+        """One Newton-Raphson iteration of (28), Phi = 0: (29) Phi_Pi dPi = -Phi."""
         phi = self._kept(self.formulation.phi(self.at))
         out: dict[int, Scalar] = {
             self.layout.scalar("residual"): largest(phi),
@@ -130,7 +130,7 @@ class Tracer:
         """v and a as far as an order wants them, else zero, and by slot: one factorisation for both."""
         out: dict[int, Scalar] = {}
         v = a = list[Scalar]([0.0] * self.unknowns)
-        # (30) and (32) are linear: one factor at the pose for both, where the paper iterates with a constant one, (31)
+        # (30) Phi_Pi v = nu and (32) Phi_Pi a = gamma are linear: one factor at the pose serves both; the paper iterates, (31)
         if order:
             v = self._factor.solve(self._kept(self.formulation.nu(self.at)))
             self.store(out, RATE, v)

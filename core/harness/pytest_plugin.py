@@ -56,11 +56,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Take what is a case file."""
-    if (
-        parent.config.getoption("--kincheck")
-        and file_path.suffix.lower() in (".toml", ".json")
-        and SCHEMA.search(file_path.read_bytes())
-    ):
+    if parent.config.getoption("--kincheck") and file_path.suffix.lower() in SUFFIXES and SCHEMA.search(file_path.read_bytes()):
         return CaseFile.from_parent(parent, path=file_path)  # pyright: ignore[reportUnknownMemberType]
     return None
 

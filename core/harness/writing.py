@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 from uuid import uuid4
 
 from ..errors import KincheckError
@@ -33,14 +33,14 @@ def write_all(contents: Iterable[tuple[Path, Content]]) -> list[str]:
     return [problem for path, content in contents for problem in written(path, content)]
 
 
-def write(option: str, path: Path, content: Content) -> None:
-    """Write the file that an option names.
+def write(option: str, path: Path, content: Content) -> Any:
+    """Write the file that an option names, and give what writing it gives.
 
     Raises:
         KincheckError: it cannot be written.
     """
     try:
-        _put(path, content)
+        return _put(path, content)
     except OSError as error:
         why = error.strerror or error
         raise KincheckError(
@@ -48,12 +48,9 @@ def write(option: str, path: Path, content: Content) -> None:
         ) from None
 
 
-def _put(path: Path, content: Content) -> None:
+def _put(path: Path, content: Content) -> Any:
     with _whole(path) as part:
-        if isinstance(content, bytes):
-            part.write_bytes(content)
-        else:
-            content(part)
+        return part.write_bytes(content) if isinstance(content, bytes) else content(part)
 
 
 @contextmanager

@@ -218,6 +218,7 @@ class AxialJoint(Joint):
 
     @property
     def rows(self) -> int:
+        """Number of constraint equations, of relations between its own coordinates too."""
         return super().rows + len(self.relations)
 
     @property

@@ -232,7 +232,8 @@ def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str
     phi = formulation.phi(at)
     lengths = [0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0) for q in (quat(p) for n, p in parts.items() if n[0] == "q")]
     residuals = [*(phi[k] for k in kept), *lengths]
-    left_out = [phi[k] for k in range(len(phi)) if k not in set(kept)]
+    taken = set(kept)
+    left_out = [each for k, each in enumerate(phi) if k not in taken]
     moved: list[Scalar] = []
     for name in points:
         point = mechanism.point(name)

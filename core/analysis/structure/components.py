@@ -216,7 +216,8 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
             f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can still move at the design "
             f"position (rank {len(kept)} of {formulation.unknowns}): lock-up, dead centre or too few drivers; shift the design"
         )
-    dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))
+    taken = set(kept)
+    dropped = tuple(k for k in range(len(matrix)) if k not in taken)
     found = FreedomAccount(
         bodies=len(frame.moving),
         coordinates=COORDINATES * len(frame.moving),

@@ -109,7 +109,8 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation, w
     kept = wanted or independent_rows(matrix, drivers, formulation.conditions)
     if len(kept) < formulation.unknowns:
         raise SolveError(_locked(mechanism, formulation, matrix))
-    dropped = tuple(k for k in range(len(matrix)) if k not in set(kept))
+    taken = set(kept)
+    dropped = tuple(k for k in range(len(matrix)) if k not in taken)
     names = row_names(formulation)
     # taken with the drivers first, and in this formulation, the rows that are left out may be others
     found = replace(found, redundant_rows=tuple(names[k] for k in dropped))

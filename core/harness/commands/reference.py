@@ -51,7 +51,7 @@ def _prove(options: argparse.Namespace, house: House) -> int:
     """
     from ..proving import prove_case
     from ..record import to_json
-    from ..writing import write
+    from ..writing import unwritable, write
 
     problems: list[str] = []
     cases = house.find_cases(options.case or [*house.cases()], problems)
@@ -60,16 +60,19 @@ def _prove(options: argparse.Namespace, house: House) -> int:
             options.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             problems.append(f"--out {options.out}: cannot be made a folder ({error.strerror}); give another one")
+    names = [f"{file_name(case.name)}.reference.json" for case in cases]
+    if options.out is not None:
+        problems += unwritable((case.name, options.out / name) for case, name in zip(cases, names, strict=True))
     if problems:
         raise KincheckError("\n".join(problems))
     complete = True
-    for case in cases:
+    for case, name in zip(cases, names, strict=True):
         numbers = "decimal" if options.decimal else "double"
         found, errors = prove_case(case, digits=options.digits, numbers=numbers, tol=TOL)
         complete &= found.proved == len(found.samples)
         print(*_lines(found, errors), sep="\n", flush=True)
         if options.out is not None:
-            write("--out", options.out / f"{file_name(case.name)}.reference.json", to_json(found))
+            write("--out", options.out / name, to_json(found))
     return Status.WITHIN if complete else Status.DEVIATES
 
 

@@ -41,9 +41,7 @@ def export(store: Store, path: Path, *, cases: Sequence[str] = (), engines: Sequ
         raise KincheckError(
             f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in {' or '.join(SUFFIXES)}"
         )
-    counts = list[int]()
-    write("--export", path, lambda part: counts.append(kind(part, _rows(store, cases, engines))))
-    return counts[0]
+    return write("--export", path, lambda part: kind(part, _rows(store, cases, engines)))
 
 
 def _rows(store: Store, cases: Sequence[str], engines: Sequence[str]) -> Iterator[list[tuple[Any, ...]]]:

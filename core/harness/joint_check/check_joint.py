@@ -132,7 +132,7 @@ def _made(examine: Check, one: Specimen) -> list[Finding]:
     """The findings of a check; where the joint's own code raises, that is the finding."""
     try:
         return list(examine(one))
-    except Exception as error:
+    except Exception as error:  # whatever the joint's own code raises
         return [Finding(examine.__name__.replace("_", " "), Verdict.FAIL, message=_told(error))]
 
 
