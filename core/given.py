@@ -18,8 +18,8 @@ SHORTEST = 1e-150
 def finite(number: Any) -> bool:
     """Whether it is a finite number, or an array that is one."""
     try:
-        # numpy's complex numbers would be taken by their real part
-        return not np.iscomplexobj(number) and math.isfinite(number)
+        # numpy's complex numbers would be taken by their real part; most are floats, of which large mechanisms have ten thousands
+        return (isinstance(number, float) or not np.iscomplexobj(number)) and math.isfinite(number)
     except (TypeError, ValueError):  # of no number, or several
         return False
 
