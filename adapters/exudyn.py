@@ -21,7 +21,7 @@ from ..core.trajectory import Array, Trajectory
 from .exudyn_rows import DRIVERS, JOINTS, NO_ROTATION, Rows, turned
 from .floors import floor_of
 from .own_frame import in_own_frame, own_frame
-from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
+from .projection import EFFORTS, settings_of_newton, solve_by_projection, without_counterpart
 
 # Largest change of a coordinate per step of the differences of the Jacobian [units of length or -]. Round-off, 1e-16 / 1e-3, and
 # truncation, (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
@@ -46,9 +46,8 @@ class Exudyn:
             "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
             "residual": "ComputeAlgebraicEquations",
             "jacobian": "ComputeNewtonJacobian, constraint rows",
-            "linear solver": "numpy solve, or least squares where rows are redundant",
             "acceleration": f"Jacobian differentiated along the velocity, sixth order, coordinates changed by {DIFFERENCE:g}",
-            **corrected(self.corrections),
+            **settings_of_newton(self.corrections),
         }
 
     def version(self) -> str | None:

@@ -25,7 +25,7 @@ from ..core.trajectory import Array, Trajectory
 from .floors import floor_of
 from .mujoco_spec import JOINTS, Closure, Sketch, coordinate
 from .own_frame import in_own_frame, own_frame
-from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
+from .projection import EFFORTS, settings_of_newton, solve_by_projection, without_counterpart
 
 DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 ROWS = {"connect": 3, "weld": 6, "tendon": 1, "joint": 1}
@@ -46,11 +46,10 @@ class MuJoCo:
         return {
             "residual": "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers: units or rad",
             "jacobian": "efc_J, dense",
-            "linear_solver": "LU where the rows are square and of full rank at design, else least squares",
             "options": "no gravity, no contact, no autoreset; equalities without spring and damper",
             "cut_joints": "tendon; or connect or weld, to an auxiliary body where the joint has slides or hinges",
             "relations": "joint equalities",
-            **corrected(self.corrections),
+            **settings_of_newton(self.corrections),
         }
 
     def version(self) -> str | None:

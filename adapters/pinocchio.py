@@ -41,7 +41,7 @@ from .conditions import Condition
 from .floors import floor_of
 from .own_frame import in_own_frame, own_frame
 from .pinocchio_rows import DrivenPoint, Frame, Linear
-from .projection import EFFORTS, corrected, solve_by_projection, without_counterpart
+from .projection import EFFORTS, settings_of_newton, solve_by_projection, without_counterpart
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,7 @@ class Pinocchio:
         return {
             "coordinates": "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer",
             "closures": "conditions on frame placements, Jacobians and classical accelerations",
-            "linear solve": "numpy LU where the rows are square and independent, else least squares",
-            **corrected(self.corrections),
+            **settings_of_newton(self.corrections),
         }
 
     def version(self) -> str | None:
