@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, solve
+from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, Universal, solve
 
 Z, ORIGIN, ROD = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.8
 
@@ -74,3 +74,74 @@ def test_a_gap_is_the_end(short, count, loops):
     end = np.pi - 2.0 * np.arcsin(1.0 - 0.5 * short)  # by the triangle, from where all is in line
     assert (found.solved == (turn < 1.0 - end)).all()
     assert f"the limit of travel is turn = {1.0 - end:.6g}"[:-1] in found.message
+
+
+def universal_loop(pin, meet, rest):
+    """A four-bar with its rod on two universals, one row more than is needed. Its crank's pivot is the origin."""
+    hinges = [Revolute("pivot", "ground", "crank", ORIGIN, Z), Revolute("rest", "ground", "rocker", rest, Z)]
+    ends = [
+        Universal("pin", "crank", "rod", pin, ((1.0, 0.0, 0.0), Z)),
+        Universal("end", "rod", "rocker", meet, (Z, (1.0, 0.0, 0.0))),
+    ]
+    bodies = [Body("crank"), Body("rod"), Body("rocker")]
+    return Mechanism("loop", bodies, [*hinges, *ends], [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")])
+
+
+def revolute_loop(pin, meet, rest):
+    """All on hinges, three rows more than are needed."""
+    at = {"pivot": ORIGIN, "pin": pin, "end": meet, "rest": rest}
+    pairs = zip(("ground", "crank", "rod", "ground"), ("crank", "rod", "rocker", "rocker"), strict=True)
+    hinges = [Revolute(name, *pair, at[name], Z) for name, pair in zip(at, pairs, strict=True)]
+    bodies = [Body("crank"), Body("rod"), Body("rocker")]
+    return Mechanism("loop", bodies, hinges, [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")])
+
+
+NEARLY_KITES = {  # and nearly parallelograms: pin, end of the rod, rest of the rocker, last turn, samples
+    "kite": (
+        (0.4260866094025061, 0.09610141632702796),
+        (0.05330114251731225, 0.32373794595045846),
+        1.0098026454771485,
+        -5.6167,
+        73,
+    ),
+    "kite that folds": (
+        (-0.9963803731629649, -0.5891443362735412),
+        (0.061853652076719, 0.016510422670654),
+        1.2192612306465147,
+        4.1357,
+        25,
+    ),
+    "never locks": (
+        (0.9697033471070498, -0.3443453141456345),
+        (0.6073751573486417, -1.3075254632217728),
+        1.7110737849494355,
+        -6.2769,
+        19,
+    ),
+    "locks": ((0.407187255644269, -0.06317054565251659), (1.4280674729874876, -0.0631734360870428), 1.0208806657722926, 3.2062, 13),
+    "turns unseen": (
+        (-0.8114361531517722, 0.4497902962488659),
+        (0.11192415924912638, 0.5400567995235857),
+        1.3589039496745472,
+        3.4404473351597655,
+        7,
+    ),
+    "twisted": ((0.6286049409194256, -0.008145844979201), (2.1516027678897336, -0.008643655436957), 1.5230044750512732, -4.8815, 7),
+}
+
+
+@pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
+@pytest.mark.parametrize("made", [universal_loop, revolute_loop])
+@pytest.mark.parametrize("name", NEARLY_KITES)
+def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
+    """A determinant of rows chosen from more changes its sign by a singular pose, and by one of the choice; not by both."""
+    (x, y), meet, rest, last, count = NEARLY_KITES[name]
+    turn = np.linspace(0.0, last, count)
+    found = solve(made((x, y, 0.0), (*meet, 0.0), (rest, 0.0, 0.0)), "turn", turn, order=0, style=style)
+    cos, sin = np.cos(turn), np.sin(turn)
+    across = np.stack([rest - (x * cos - y * sin), -(x * sin + y * cos)], axis=-1)
+    d = found.points["meet"].position[:, :2] - (np.array([rest, 0.0]) - across)
+    side = across[:, 0] * d[:, 1] - across[:, 1] * d[:, 0]  # of the line from pin to rest, on which the rod's end stays
+    assert (side[found.solved] * side[0] > 0.0).all()
+    assert found.solved.all() or "there is a singular pose ahead" in found.message
+    assert found.solved.sum() >= 3

@@ -13,10 +13,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..algebra import Scalar
-from ..program import DONE, MARGIN, Program, absolute, before, maximum, minimum, program
+from ..program import DONE, MARGIN, Program, absolute, before, maximum, minimum, program, where_larger
 from ..trajectory import Array
-from .continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LARGEST_RATIO, LONGEST_STEP, NEGLIGIBLE, ROUNDING, TURNED, WORSE
-from .request import ACCEPT, BLOCKS, FROM, LARGEST_SIGMA, ORIENTATION, SIGMA
+from .continuity import (
+    EPSILON,
+    FALLS,
+    FOLLOWED,
+    LARGEST_CORRECTION,
+    LARGEST_RATIO,
+    LONGEST_STEP,
+    NEGLIGIBLE,
+    ROUNDING,
+    STEEPER,
+    STEEPEST,
+    TURNED,
+    WORSE,
+)
+from .request import ACCEPT, BLOCKS, FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, SLOPE
 
 if TYPE_CHECKING:
     from .model import Model
@@ -56,15 +69,24 @@ def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
     """By how much a lane passes all tests of a solution."""
     read, sigma, turned = tracer.read, tracer.read(SIGMA), tracer.read(ORIENTATION)
     sigma_before, turned_before, largest = (read(FROM + label) for label in (SIGMA, ORIENTATION, LARGEST_SIGMA))
-    largest = maximum(sigma, largest)
+    largest, chosen = maximum(sigma, largest), bool(tracer.selection.dropped)
     if neighbours:
         sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
-    found = margins(read, sigma_before, turned_before, largest)
-    out = {tracer.layout.scalar(MARGIN): reduce(minimum, found.values()), tracer.layout.scalar(LARGEST_SIGMA): largest}
+    slope, out = None, dict[int, Scalar]()
+    if chosen:
+        moved, slope = read(MOVED), _slope(read)
+        found = where_larger(moved, NEGLIGIBLE, absolute(sigma - sigma_before) / moved, 0.0)
+        least = maximum(FALLS * slope, EPSILON)
+        out[tracer.layout.scalar(SLOPE)] = maximum(found, least)
+        slope = maximum(before(found, slope), least) if neighbours else slope
+    passed = margins(read, sigma_before, turned_before, largest, slope)
+    out |= {tracer.layout.scalar(MARGIN): reduce(minimum, passed.values()), tracer.layout.scalar(LARGEST_SIGMA): largest}
     return program(name, tracer.tape, out, tracer.prepared)
 
 
-def margins(read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar) -> dict[str, Scalar]:
+def margins(
+    read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar, slope: Scalar | None
+) -> dict[str, Scalar]:
     """By how much a lane passes each test of a solution: it has converged, closes, agrees with the redundant rows, is on its
     branch, and continues the motion it is predicted from.
 
@@ -75,11 +97,14 @@ def margins(read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: 
         read: a scalar of the lane by its name.
         sigma_before, turned_before: of where it is predicted from.
         largest: the largest estimate of sigma so far.
+        slope: how steeply sigma changes, as far as known. None where all rows are solved. Where they are chosen from more, the sign
+            of a determinant says less: it changes where the mechanism is singular, and where the choice is, and not where both are
+            within a step. No step is taken then in which sigma could have been zero.
     """
     tol, consistent, crossing = (read(label) for label in ACCEPT)
     closure, sigma, turned = (read(label) for label in ("closure", SIGMA, ORIENTATION))
     uncertain = (WORSE * largest) * maximum(closure, EPSILON)
-    return {
+    found = {
         "converged": read(DONE) - 0.5,
         "closed": tol - closure,
         "consistent": consistent - read("leftover"),
@@ -91,9 +116,18 @@ def margins(read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: 
         "certain": FOLLOWED * sigma * sigma - uncertain,
         "not turned by rounding": maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
     }
+    if slope is not None:
+        found["regular between"] = sigma + sigma_before - minimum(STEEPER * slope, STEEPEST) * read(MOVED) + crossing
+    return found
 
 
-SINGULAR = ("as regular", "on this side", "certain", "not turned by rounding")
+def _slope(read: Callable[[str], Scalar]) -> Scalar:
+    """How steeply sigma changed so far; as much as may be, where nothing is known of that."""
+    found = read(FROM + SLOPE)
+    return where_larger(found, 0.0, found, STEEPEST)
+
+
+SINGULAR = ("as regular", "on this side", "regular between", "certain", "not turned by rounding")
 """The tests that a lane fails where a singular pose is ahead."""
 
 
@@ -107,7 +141,8 @@ def why_refused(model: Model, lane: Array) -> str:
     def read(name: str) -> float:
         return float(lane[model.slots[name]])
 
-    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA))
+    slope = _slope(read) if model.selection.dropped else None
+    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), slope)
     failed = [name for name, margin in found.items() if not margin > 0.0]
     closure, leftover, tol = (read(name) for name in ("closure", "leftover", "tolerance"))
     if not np.isfinite(closure):

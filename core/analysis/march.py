@@ -18,16 +18,16 @@ from ..program import MARGIN, Side
 from ..trajectory import Array
 from .acceptance import why_refused
 from .model import Model
-from .request import FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, TIME, accept_by
+from .request import FROM, LARGEST_SIGMA, SIGMA, TIME, accept_by, remembered
 from .route import AS_THEY_ARE, Route
 
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
 # passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
 HALVINGS = 40
-# A step that is divided so often, and comes by less than this part of it nearer to its sample, makes no headway.
-# Of a slider-crank a part is 0.7 rad: a step of 1,000 rad is gone to its end, one of 1,500 is not. A fiftieth of what was left
-# allowed 3,000 rad, and had broken equations go on for minutes, by parts of millionths.
-MAX_ROUNDS, HEADWAY = 200, 0.1
+# A step is gone in at most so many parts. Of a slider-crank a part is 0.7 rad: a step of 1,000 rad is gone to its end, one of 1,500
+# is not.
+MOST_PARTS = 2000
+TOO_MANY = f"{MOST_PARTS} parts of the step were taken, and the next sample was not reached; give samples in between"
 
 
 class March(NamedTuple):
@@ -107,7 +107,7 @@ def arrived(model: Model, lane: Array) -> Array:
     found = lane.copy()
     for name in model.state:
         found[model.vectors[name]] = lane[model.vectors[FROM + name]]
-    for name in (SIGMA, ORIENTATION, LARGEST_SIGMA):
+    for name in remembered(chosen=bool(model.selection.dropped)):
         found[model.slots[name]] = lane[model.slots[FROM + name]]
     return found
 
@@ -119,33 +119,6 @@ def longest(margins: Array) -> int | None:
     """
     good = np.flatnonzero((margins[:-1] > 0.0) & (margins[1:] > 0.0))
     return int(good[0]) if len(good) else None
-
-
-@dataclass
-class Headway:
-    """How a step that is divided gets on.
-
-    Attributes:
-        start: the time where it began.
-        rounds: parts that were gone.
-    """
-
-    start: float
-    rounds: int = 0
-
-    def __post_init__(self) -> None:
-        self._since = self.start  # where it stood when that was looked at last
-
-    def stopped(self, here: float, wanted: float) -> str:
-        """Count a part, that ended here; empty, or why not to go on."""
-        self.rounds += 1
-        if self.rounds % MAX_ROUNDS:
-            return ""
-        gone, self._since = abs(here - self._since), here
-        # of the whole step, not of what is left: parts that become ever smaller would be gone by the hundred thousand
-        if gone >= HEADWAY * abs(wanted - self.start):
-            return ""
-        return f"{self.rounds} parts of the step were taken, and the next sample is hardly nearer; give samples in between"
 
 
 class Marcher:
@@ -184,21 +157,19 @@ class Marcher:
         for stop in self._stops(side) if self.visit else [side.count]:
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
-            headway = Headway(self._stands(self._anchor(number)))
+            parts = 0
             while at < stop:
                 anchor, wanted = self._anchor(number), float(side.samples[0, at])
                 early = bool(anchor[self.slots[FROM + SIGMA]] < self.low * anchor[self.slots[FROM + LARGEST_SIGMA]])
                 further, reason = (None, "") if early else self._divide(anchor, wanted)
-                stopped = headway.stopped(self._stands(anchor), wanted)
-                if further is None or stopped:
+                if further is None or parts == MOST_PARTS:
                     columns = side.first + side.step * np.arange(at, side.count)
                     self.kept[:, columns], self.solved[columns] = np.nan, False
-                    said = self._end(side, at, anchor, stopped or reason)
-                    return End(said, self.route, anchor, wanted, early, divided=bool(stopped))
+                    said = self._end(side, at, anchor, reason if further is None else TOO_MANY)
+                    return End(said, self.route, anchor, wanted, early, divided=further is not None)
                 self.track.anchors[number] = further[self.model.ahead]
                 came, at = at, self.track.follow(number, at, stop, anew=False)
-                if at > came:
-                    headway = Headway(float(side.samples[0, at - 1]))
+                parts = 0 if at > came else parts + 1
             if self.visit:
                 self._stand(number, at)
         return None

@@ -16,7 +16,7 @@ from ..program.llvm.compiler import available
 from ..trajectory import Array
 from . import acceptance, prediction
 from .equations.drives import drive_numbers
-from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request
+from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request, remembered
 from .structure.components import Section
 from .thread_cache import ThreadCache
 from .tracing import Tracing, ours, traced
@@ -31,8 +31,6 @@ TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITE
 """Scalars that are kept of every sample, after the motions."""
 TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
 """Those kept of variants: where there is a solution, how sure, and what it took. Few, because variants are many."""
-TESTS_OF_PARTS = ("closure", SIGMA, ORIENTATION, LARGEST_SIGMA)
-"""Those kept of parts of a large mechanism: what the next sample is accepted by, and whose fault it is if it is not."""
 LARGEST, SMALLEST = ("closure", "leftover"), (SIGMA,)
 """Tests of which the worst is found over all samples."""
 LARGEST_OF_PARTS, SMALLEST_OF_PARTS = (*LARGEST, ITERATIONS), (*SMALLEST, MARGIN)
@@ -130,7 +128,9 @@ class Model:
 
     @property
     def _tests(self) -> Sequence[str]:
-        return TESTS_OF_PARTS if self.request.state else TESTS_OF_VARIANTS if self.request.varied else TESTS
+        if self.request.state:  # a part of a large mechanism: whose fault it is, and what the next sample is accepted by
+            return ("closure", *remembered(chosen=bool(self.selection.dropped)))
+        return TESTS_OF_VARIANTS if self.request.varied else TESTS
 
     def _rows(self) -> dict[str, slice]:
         rows: dict[str, slice] = {}

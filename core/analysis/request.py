@@ -57,6 +57,19 @@ SIGMA, ORIENTATION = "sigma", "orientation"
 """The slots of an estimate of the smallest singular value of the rows, and of the signs of their determinants (`Elimination`)."""
 LARGEST_SIGMA = "largest sigma"
 """The slot of the largest that estimate has been so far: the scale on which it is small."""
+SLOPE = "slope"
+"""The slot of how steeply that estimate changes, by what the pose does; zero where nothing is known of that."""
+
+
+def remembered(*, chosen: bool) -> tuple[str, ...]:
+    """The slots that tests know of what a lane is predicted from.
+
+    Args:
+        chosen: there are more rows than are solved.
+    """
+    return (SIGMA, ORIENTATION, LARGEST_SIGMA, *((SLOPE,) if chosen else ()))
+
+
 ACCEPT = ("tolerance", "consistent", "crossing")
 """The slots that a lane is accepted by."""
 # Redundant rows may be violated by this much [units of the mechanism's size]: hardpoint tables carry at most about nine digits.

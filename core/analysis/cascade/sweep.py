@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...motions import Path, outwards
 from ...program import ITERATIONS
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
-from ..march import HALVINGS, Headway, longest
+from ..march import HALVINGS, MOST_PARTS, TOO_MANY, longest
 from ..model import CLOSED
 from ..request import SIGMA, accept_by
 from ..singular.singularity import CONTINUED, listed
@@ -113,7 +113,7 @@ class CascadeSweep:
 
     def _follow(self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float) -> str:
         """Follow the samples outwards, with what is given there; empty, or why they end."""
-        lanes, at, headway, refused = self._lanes, 0, Headway(here), list[int]()
+        lanes, at, parts, refused = self._lanes, 0, 0, list[int]()
         sound, start = lanes.anchor, here
         while at < len(times):
             ahead = times[at : at + LANES]
@@ -125,18 +125,18 @@ class CascadeSweep:
                     lanes.go_on()
                 else:
                     lanes.carry(accepted - 1)
-                here, at = float(ahead[accepted - 1]), at + accepted
-                headway = Headway(here)
+                here, at, parts = float(ahead[accepted - 1]), at + accepted, 0
                 continue
             if lanes.sound:
                 sound, start = lanes.anchor, here
             last = float(times[at - 1]) if at else None
-            if stopped := headway.stopped(here, float(times[at])):
-                return path.ended(here, float(times[at]), last, stopped)
+            if parts == MOST_PARTS:
+                return path.ended(here, float(times[at]), last, TOO_MANY)
             reached = self._divide(here, float(times[at]), path)
             if reached is not None:
                 lane, here = reached
                 lanes.carry(lane)
+                parts += 1
                 continue
             message = path.ended(here, float(times[at]), last, self._why_ended(tol))
             beyond = cross(lanes, path, sound, start, here, float(times[at]), tol)
@@ -148,8 +148,7 @@ class CascadeSweep:
                 good = lanes.attempt(times[chunk], path) > 0.0
                 keep(chunk[good], np.flatnonzero(good))
                 refused += chunk[~good].tolist()
-            here, at = beyond, at + len(beside)
-            headway = Headway(here)
+            here, at, parts = beyond, at + len(beside), 0
         if refused:
             places = listed([path.where(float(times[k])) for k in refused])
             return f"refused at {places}: so near a singular pose that neither side reaches it; keep away from it"

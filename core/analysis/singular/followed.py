@@ -160,6 +160,9 @@ class Followed:
         missing = self._missing(number, side, end.wanted)
         ends = self._follow(onward(end.route, passed.beyond, self.times[missing]), missing)
         beyond = _time(end.route, passed.beyond)
+        back = [each for each in ends if side * (each.wanted - beyond) < 0.0]
+        while back and back[0].early:  # a sample right beyond the pose is not given up for want of better rows
+            back = self._further(back[0], len(self.parts) - 1, -side)
         short = {k for k in missing.tolist() if not self.found.solved[k] and side * (self.times[k] - beyond) < 0.0}
         self.stuck += [Stuck(k, end.route, lane, end.lane) for k in sorted(short)] if lane is not None else []
         return [each for each in ends if side * (each.wanted - beyond) >= 0.0]

@@ -17,7 +17,7 @@ from ...primitives.base import Pose, Twist
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
 from ..equations.carried import motion_of_frame, motion_of_point
 from ..equations.formulation import Acceleration
-from ..march import HALVINGS, Headway
+from ..march import HALVINGS, MOST_PARTS, TOO_MANY
 from .batch import REMEMBERED
 from .model import FailedError, SparseModel, Stand
 
@@ -179,8 +179,7 @@ class _Sweep:
 
     def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> tuple[Stand, str]:
         """Go to a time, in parts where need be: where that ends, and why before that time."""
-        headway = Headway(here.time)
-        while not (stopped := headway.stopped(here.time, time)):
+        for _ in range(MOST_PARTS):
             try:
                 return self.model.reach(here, time, drives, self.tol), ""
             except FailedError:
@@ -188,7 +187,7 @@ class _Sweep:
                     here = self._part(here, path, time)
                 except FailedError as error:
                     return here, str(error)
-        return here, stopped
+        return here, TOO_MANY
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
         """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).
