@@ -54,7 +54,7 @@ class Exudyn:
         """Version of Exudyn, or None where it cannot be imported, for whatever reason."""
         try:
             return str(importlib.import_module("exudyn").__version__)
-        except Exception:
+        except (Exception, SystemExit):
             return None
 
     def unsupported(self, case: Case) -> str | None:

@@ -56,7 +56,10 @@ class MuJoCo:
         """MuJoCo's version, or None where it cannot be imported."""
         try:
             return str(mujoco().__version__)
-        except Exception:  # a broken binary raises whatever its loader likes; to the harness all of it means "not here"
+        except (
+            Exception,
+            SystemExit,
+        ):  # a broken binary raises what its loader likes; to the harness it all means "not here"
             return None
 
     def unsupported(self, case: Case) -> str | None:

@@ -68,7 +68,7 @@ class Pinocchio:
             pin: Any = importlib.import_module("pinocchio")
             # PyPI's package "pinocchio" is something else and has no Model; the simulator's is "pin"
             return str(pin.__version__) if hasattr(pin, "Model") else None
-        except Exception:  # a broken installation fails in many ways: a missing shared library, another numpy ABI
+        except (Exception, SystemExit):  # a broken installation fails in many ways: a missing shared library, another numpy ABI
             return None
 
     def unsupported(self, case: Case) -> str | None:

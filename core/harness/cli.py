@@ -30,6 +30,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         complain(str(error).splitlines())
     except KeyboardInterrupt:
         complain(["interrupted"])
+    except SystemExit as end:  # an engine's, or a module's that was named: ours come from the parser alone
+        where = traceback.extract_tb(end.__traceback__)[-1]
+        complain([f"{where.filename}, line {where.lineno}, ended the program with status {end.code!r}; mend it, or leave it out"])
     except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception:  # a defect of ours: shown in full, and never taken for a deviation (Python's own status would be 1)

@@ -16,6 +16,7 @@ import msgspec
 
 from ..program import disk_cache
 from ..program.llvm import compiler
+from .apart import PATIENCE
 from .case import Case
 from .circumstances import circumstances
 from .console import how_to_install
@@ -37,8 +38,6 @@ PURPOSES = {
 # What is imported of distributions that are not imported by their own name.
 MODULES = {"pin": "pinocchio", "python-flint": "flint", "llvmlite": "llvmlite.binding"}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-# An import that takes longer than this hangs; the slowest needs some seconds on a cold disk.
-PATIENCE = 60.0
 
 
 class Part(msgspec.Struct, frozen=True):

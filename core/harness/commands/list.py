@@ -19,6 +19,7 @@ def add(commands: Any) -> None:
 
 def _list(options: argparse.Namespace, house: House) -> int:
     """List the built-in cases with truth and source, and the engines with their versions; or the types of joints or of outputs."""
+    from ..apart import versions
     from ..catalogue import catalogue, output_catalogue
     from ..circumstances import truth_of
 
@@ -34,9 +35,8 @@ def _list(options: argparse.Namespace, house: House) -> int:
     print("engines:")
     engines = [*map(house.engine, house.engines), *(house.engine(name, "simulate") for name in house.simulations)]
     width = max(len(engine.name) for engine in engines)
-    for engine in engines:
+    for engine, version in zip(engines, versions(engines), strict=True):
         name = engine.name
-        version = engine.version()
         missing = f"not installed, or cannot be imported: {how_to_install(name)}; kincheck doctor says which"
         state = missing if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
         print(f"  {name:{width}}  {state}")

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from ..apart import PATIENCE, versions
 from ..case import Case
 from ..circumstances import circumstances, conditions, plain, references
 from ..engine import Engine
@@ -80,7 +81,9 @@ def keep(
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
     git: Mapping[str, Any] = facts["git"] or {}
     code = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed", "edits")]
-    machine = [facts[name] for name in ("host", "processor")] + [(each.name, each.mode, each.version()) for each in engines]
+    found = versions(engines, min(settings.get("timeout", PATIENCE), PATIENCE))
+    versioned = [(each.name, each.mode, version) for each, version in zip(engines, found, strict=True)]
+    machine = [*(facts[name] for name in ("host", "processor")), *versioned]
     identity = digest(cases, plan, tol, limits, code, machine)
     store = Store(path)
     try:

@@ -1,0 +1,49 @@
+"""Versions of engines, asked in processes of their own: a broken library ends, blocks or kills the process that loads it."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+from .engine import Engine
+from .run import NATIVE
+
+# A library may print too, and end its process as if all were well: what is told has these words before it.
+TOLD = "its version is "
+COMMAND = f"""
+import pickle, sys
+sys.path[:] = pickle.load(sys.stdin.buffer)
+version = pickle.load(sys.stdin.buffer).version()
+print({TOLD!r}, version or "", sep="")
+"""
+
+# An import that takes longer than this hangs [s]; the slowest needs some seconds on a cold disk.
+PATIENCE = 60.0
+
+
+def versions(engines: Sequence[Engine], patience: float = PATIENCE) -> list[str | None]:
+    """The version of each engine, in their order; None where it is not installed, or where its process has no answer.
+
+    Args:
+        patience: for an answer [s].
+    """
+    with ThreadPoolExecutor(max(1, len(engines))) as threads:
+        return list(threads.map(partial(_version, patience=patience), engines))
+
+
+def _version(engine: Engine, patience: float) -> str | None:
+    if engine.name == NATIVE:  # it has no foreign code to be kept apart
+        return engine.version()
+    ask = partial(subprocess.run, [sys.executable, "-P", "-c", COMMAND], capture_output=True, check=True)
+    try:
+        ended = ask(input=pickle.dumps(sys.path) + pickle.dumps(engine), timeout=patience)
+    except (subprocess.TimeoutExpired, subprocess.CalledProcessError):
+        return None
+    except (pickle.PicklingError, AttributeError, TypeError):  # its pairs cannot be sent either, and will say so
+        return None
+    _, told, version = ended.stdout.decode("utf-8", "replace").rpartition(TOLD)
+    return version.strip() or None if told else None
