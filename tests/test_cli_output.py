@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import pytest
 from kincheck.core.harness.case import Truth
@@ -116,3 +117,40 @@ def test_a_defect_of_ours_is_shown_and_is_no_deviation(kincheck_main, capsys, mo
     monkeypatch.setattr("kincheck.core.harness.run.run", lambda *_, **__: 1 / 0)
     assert kincheck_main("run") == 2
     assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+KINCHECK = "import sys; from kincheck.core.harness import cli; sys.exit(cli.main())"
+
+
+def kincheck(*arguments, out=subprocess.PIPE, **env):
+    arguments = [sys.executable, "-c", KINCHECK, *arguments]
+    return subprocess.run(arguments, stdout=out, stderr=subprocess.PIPE, env=os.environ | env, check=False)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-16"])
+def test_an_encoding_that_lacks_letters_ends_no_finished_run(encoding):
+    done = kincheck("run", "rssr", "--engine", "native", PYTHONIOENCODING=encoding)
+    assert done.returncode == 0, done.stderr
+    assert "1 pass" in done.stdout.decode(encoding)
+    done = kincheck("run", "rssr", "--engine", "native", "--json", "-", PYTHONIOENCODING=encoding)
+    assert done.returncode == 0, done.stderr
+    assert len(from_json(done.stdout).records) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize("asked", [["list"], ["run", "rssr", "--engine", "native"], ["explain", "rssr", "--json", "-"]])
+def test_a_full_standard_output_is_one_message(asked):
+    with open("/dev/full", "wb") as full:
+        done = kincheck(*asked, out=full)
+    assert done.returncode == 2
+    assert done.stderr.decode().splitlines()[-1].startswith("kincheck: standard output cannot be written (No space left")
+    assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes a stream as a POSIX shell does")
+def test_a_closed_standard_output_has_nobody_to_read_it(tmp_path):
+    code = f"import os, sys; os.close(1); os.execv(sys.executable, [sys.executable, '-c', {KINCHECK!r}, *sys.argv[1:]])"
+    file = tmp_path / "r.json"
+    done = subprocess.run([sys.executable, "-c", code, "run", "rssr", "--engine", "native", "--json", str(file)], check=False)
+    assert done.returncode == 0
+    assert len(from_json(file.read_bytes()).records) == 1

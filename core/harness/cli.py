@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import os
 import shlex
 import sys
 import traceback
 from collections.abc import Sequence
+from io import TextIOWrapper
 
 from ..errors import KincheckError
 from ..version import VERSION
@@ -16,16 +18,22 @@ from .commands import COMMANDS
 from .commands.house import House, Status
 from .console import complain
 
+FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
+"""What a standard output that takes no more says: files that an option names have messages of their own."""
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
     argv = sys.argv[1:] if argv is None else list(argv)
+    _be_able_to_print()
     try:
         options = _parser(argv).parse_args(argv, argparse.Namespace(command=shlex.join(["kincheck", *argv])))
     except SystemExit as end:  # argparse has said why
         return int(end.code or 0)
     try:
-        return int(options.do(options, house()))
+        status = int(options.do(options, house()))
+        sys.stdout.flush()
+        return status
     except KincheckError as error:
         complain(str(error).splitlines())
     except KeyboardInterrupt:
@@ -34,10 +42,31 @@ def main(argv: Sequence[str] | None = None) -> int:
         where = traceback.extract_tb(end.__traceback__)[-1]
         complain([f"{where.filename}, line {where.lineno}, ended the program with status {end.code!r}; mend it, or leave it out"])
     except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
+    except OSError as error:
+        if error.errno in FULL and error.filename is None:
+            complain([f"standard output cannot be written ({error.strerror}); files that were asked for are"])
+            _print_no_more()
+        else:
+            traceback.print_exc()
     except Exception:  # a defect of ours: shown in full, and never taken for a deviation (Python's own status would be 1)
         traceback.print_exc()
     return Status.FAILED
+
+
+def _be_able_to_print() -> None:
+    """Print what an encoding lacks as question marks: no finished run shall end at a dash. What is closed has nobody to read it."""
+    for name in ("stdout", "stderr"):
+        stream: TextIOWrapper | None = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+        else:
+            stream.reconfigure(errors="replace")
+
+
+def _print_no_more() -> None:
+    """Let what is left for standard output go to nowhere: the interpreter would complain of it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def house() -> House:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .record import to_json
-from .writing import write
+from .writing import to_standard_output, write
 
 # Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
 LOG_WIDTH = 200
@@ -44,8 +44,7 @@ def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> N
         KincheckError: the file cannot be written.
     """
     if json == "-":
-        sys.stdout.write(to_json(found).decode())
-        sys.stdout.flush()
+        to_standard_output(to_json(found))
     elif json is not None:
         write("--json", Path(json), to_json(found))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
@@ -89,3 +90,10 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
         elif (other := seen.setdefault(path.resolve(), option)) != option:
             found.append(f"{option} {path}: found the file of {other}, expected one of its own; give another")
     return found
+
+
+def to_standard_output(encoded: bytes) -> None:
+    """Write a JSON document to standard output: in UTF-8, as it has to be, whatever the encoding of texts is there."""
+    sys.stdout.flush()
+    sys.stdout.buffer.write(encoded)
+    sys.stdout.buffer.flush()

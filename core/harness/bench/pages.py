@@ -20,7 +20,7 @@ from .. import printing
 from ..record import to_json
 from ..reporting.report import packed
 from ..reporting.wording import known, number
-from ..writing import write_all
+from ..writing import to_standard_output, write_all
 
 if TYPE_CHECKING:
     from .diagrams import Diagram
@@ -72,7 +72,7 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
     problems = write_all(contents)  # before anything is printed: who reads it may have gone
     print_report(report, sys.stderr if json == "-" else sys.stdout)
     if json == "-":
-        sys.stdout.write(to_json(results).decode())
+        to_standard_output(to_json(results))
     if problems:
         raise KincheckError("\n".join(problems))
 

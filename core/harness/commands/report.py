@@ -84,7 +84,7 @@ def _write(options: argparse.Namespace, subject: Subject, found: Regressions, st
     from ..regression.junit import to_regression_junit
     from ..regression.summary import to_markdown, to_markup
     from ..reporting.report import write_report
-    from ..writing import written
+    from ..writing import to_standard_output, written
 
     def page(path: Path) -> None:
         past = trends(read(store, last=NIGHTS)) if store is not None else None
@@ -102,5 +102,4 @@ def _write(options: argparse.Namespace, subject: Subject, found: Regressions, st
     for path, write in wanted:
         problems += written(path, write)
     if options.json == "-":
-        sys.stdout.write(to_json(found).decode())
-        sys.stdout.flush()
+        to_standard_output(to_json(found))

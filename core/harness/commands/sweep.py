@@ -192,7 +192,7 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
     from ..record import to_json
     from ..study.page import page
     from ..study.tables import envelope_csv, gradient_csv, print_sweep
-    from ..writing import write_all
+    from ..writing import to_standard_output, write_all
 
     encoded = to_json(results)
     contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
@@ -202,7 +202,7 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
     problems = write_all(contents)  # before anything is printed: who reads it may have gone
     print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
     if options.json == "-":
-        sys.stdout.write(encoded.decode())
+        to_standard_output(encoded)
     if problems:
         raise KincheckError("\n".join(problems))
 

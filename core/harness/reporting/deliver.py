@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..record import Results, to_json
-from ..writing import Content, Named, unwritable, write_all
+from ..writing import Content, Named, to_standard_output, unwritable, write_all
 
 if TYPE_CHECKING:  # what draws is imported where a report is asked for
     from .measures import Effort, Past
@@ -114,5 +114,4 @@ def deliver(
     # last: who reads it may have gone
     (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
     if to.json == "-":
-        sys.stdout.write(encoded.decode())
-        sys.stdout.flush()
+        to_standard_output(encoded)
