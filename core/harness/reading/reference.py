@@ -177,10 +177,12 @@ def _beside(case_file: Path, name: str) -> Path:
     folder = case_file.parent.resolve()
     try:
         file = (folder / name).resolve()
-        inside = not Path(name).is_absolute() and file.is_relative_to(folder)
+        inside, there = not Path(name).is_absolute() and file.is_relative_to(folder), file.is_file()
     except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
-        inside = False
+        inside = there = False
         file = folder
+    if inside and not there:
+        raise fault(case_file, "reference.file", f"found {shown(name)}, and there is no such file beside the case file; check the name")
     if not inside:
         raise fault(
             case_file,
