@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from kincheck.core.harness import cli
@@ -33,7 +34,8 @@ class Loading(Fake):
         return DEEDS[self.name]()
 
 
-def test_versions_are_told_in_the_order_of_the_engines():
+def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1]))  # where the processes find the engines
     found = versions([*map(Loading, DEEDS), Unloadable("gone", "no module", "projection")], patience=10.0)
     assert found == ["1.2", "3", *[None] * 6]
 

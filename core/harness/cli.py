@@ -11,6 +11,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from io import TextIOWrapper
+from typing import TextIO
 
 from ..errors import KincheckError
 from ..version import VERSION
@@ -57,10 +58,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _be_able_to_print() -> None:
     """Print what an encoding lacks as question marks: no finished run shall end at a dash. What is closed has nobody to read it."""
     for name in ("stdout", "stderr"):
-        stream: TextIOWrapper | None = getattr(sys, name)
+        stream: TextIO | None = getattr(sys, name)
         if stream is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
-        else:
+        elif isinstance(stream, TextIOWrapper):  # and not what a caller has put in its place
             stream.reconfigure(errors="replace")
 
 

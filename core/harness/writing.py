@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, BinaryIO, TypeAlias
 from uuid import uuid4
 
 from ..errors import KincheckError
@@ -95,5 +95,9 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
 def to_standard_output(encoded: bytes) -> None:
     """Write a JSON document to standard output: in UTF-8, as it has to be, whatever the encoding of texts is there."""
     sys.stdout.flush()
-    sys.stdout.buffer.write(encoded)
-    sys.stdout.buffer.flush()
+    binary: BinaryIO | None = getattr(sys.stdout, "buffer", None)
+    if binary is None:  # a caller has put something in its place that takes texts alone
+        sys.stdout.write(encoded.decode())
+    else:
+        binary.write(encoded)
+    sys.stdout.flush()

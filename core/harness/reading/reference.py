@@ -16,6 +16,7 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -177,18 +178,19 @@ def _beside(case_file: Path, name: str) -> Path:
     folder = case_file.parent.resolve()
     try:
         file = (folder / name).resolve()
-        inside, there = not Path(name).is_absolute() and file.is_relative_to(folder), file.is_file()
+        inside = not Path(name).is_absolute() and file.is_relative_to(folder)
     except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
-        inside = there = False
+        inside = False
         file = folder
-    if inside and not there:
-        raise fault(case_file, "reference.file", f"found {shown(name)}, and there is no such file beside the case file; check the name")
     if not inside:
         raise fault(
             case_file,
             "reference.file",
             f"found {shown(name)}, expected a file in the folder of the case file or below; put it there and give its name",
         )
+    with suppress(OSError):  # what cannot be asked for is told where it is read
+        if not file.exists():
+            raise fault(case_file, "reference.file", f"found {shown(name)}, but there is no such file; check the name")
     return file
 
 

@@ -107,6 +107,7 @@ def coupled(
     joints: Mapping[str, Sequence[Joint]] = {
         "revolutes": (Revolute(pin_1, first, coupler, start, n), Revolute(pin_2, coupler, second, end, n)),
         "balls": (Universal(pin_1, first, coupler, start, (n, across)), Spherical(pin_2, coupler, second, end)),
+        "universals": (Universal(pin_1, first, coupler, start, (across, n)), Universal(pin_2, coupler, second, end, (n, along))),
         "cylinders": (Cylindrical(pin_1, first, coupler, start, n), Spherical(pin_2, coupler, second, end)),
     }
     return [Body(coupler)], list(joints[way])

@@ -1,0 +1,67 @@
+"""Four-bars near their change points, in coarse steps: sharp corners that more rows than are solved must not hide."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from ..extended import extended
+from ..truth import closed
+from .base import Family, Rng, Specimen, as_case, power
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion, meet
+
+# The design is not to be near a corner itself: of what is folded more, coordinates hold too few digits of the shape.
+FOLDED = 0.05
+
+# Crank, ground, coupler and rocker, of three sizes and by how much they are off.
+SHAPES: Mapping[str, Callable[[float, float, float, float], tuple[float, float, float, float]]] = {
+    "kite": lambda a, g, x, off: (g + off, g, x, x),
+    "kite on its side": lambda a, g, x, off: (a, g, a + off, g),
+    "parallelogram": lambda a, g, x, off: (a, g, g + off, a),
+    "stretched four-bar": lambda a, g, x, off: (a, g, x, a + g - x + off),
+    "folded four-bar": lambda a, g, x, off: (a, g, x, x + abs(g - a) + off),
+}
+
+
+class Corners(Family):
+    """What turns round sharply, or cannot pass by a little, anywhere along a step."""
+
+    name = "corners"
+    about = (
+        "four-bars of any sizes, off by 1e-7 to 0.1 from kites, parallelograms and others that can lie flat, from anywhere in "
+        "coarse steps: rods on hinges (three redundant rows), on two universals (one), and on what leaves none"
+    )
+
+    samples = 31
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """One of them."""
+        plane, way = any_plane(rng), str(rng.choice(["universals", "revolutes", *JOINTS_OF_A_LOOP]))
+        off = power(rng, -7.0, -1.0) * float(rng.choice([-1.0, 1.0]))
+        kind = tuple(SHAPES)[int(rng.integers(len(SHAPES)))]
+        b, d, c = _loop(rng, kind, off)
+        last = float(rng.uniform(2.0, 6.2) * rng.choice([-1.0, 1.0]))
+        return Specimen(
+            f"{kind} with {way}, off by {off:.2g}",
+            partial(as_case, four_bar(plane, b, d, c, way), "turn", np.linspace(0.0, last, samples)),
+            partial(closed, motion=four_bar_motion(plane, b, d, c)),
+            facts=(("off", off),),
+        )
+
+
+def _loop(rng: Rng, kind: str, off: float) -> tuple[Plan, Plan, Plan]:
+    """B, D and C of such a four-bar, at any pose that is not folded."""
+    while True:
+        a, g, x = (float(each) for each in rng.uniform(0.3, 1.5, 3))
+        crank, ground, coupler, rocker = SHAPES[kind](a, g, x, off)
+        turn, side = float(rng.uniform(-np.pi, np.pi)), float(rng.choice([-1.0, 1.0]))
+        b: Plan = (float(crank * np.cos(turn)), float(crank * np.sin(turn)))
+        d: Plan = (ground, 0.0)
+        pin, rest = (extended(each)[:, None] for each in (b, d))
+        met = meet(pin, extended([coupler]) ** 2, rest, extended([rocker]) ** 2, side)
+        c: Plan = (float(met[0, 0]), float(met[1, 0]))
+        twice = (c[0] - b[0]) * (d[1] - b[1]) - (c[1] - b[1]) * (d[0] - b[0])  # the area; not a number where they do not meet
+        if min(coupler, rocker) > 0.1 and abs(twice) > FOLDED * float(np.hypot(d[0] - b[0], d[1] - b[1])):
+            return b, d, c
