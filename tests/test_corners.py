@@ -76,6 +76,18 @@ def test_a_gap_is_the_end(short, count, loops):
     assert f"the limit of travel is turn = {1.0 - end:.6g}"[:-1] in found.message
 
 
+@pytest.mark.parametrize("start", [-0.2, -0.4, -0.7])
+@pytest.mark.parametrize("short", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("ground", [1.1, 1.4, 2.0])
+@pytest.mark.parametrize("count", [2, 3, 5, 9, 300])
+def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, start, count):
+    """A kite that lies on its side: the rod is shorter than the crank, and cannot fold. Beyond, what crosses there is as near."""
+    turn = np.linspace(0.0, -2.0 * start, count)
+    found = solve(loop(start, 1.0 - ground, rod=1.0 - short, rocker=ground), "turn", turn, order=0)
+    end = np.arccos((1.0 + ground**2 - (ground - 1.0 + short) ** 2) / (2.0 * ground))  # where rod and rocker are in line
+    assert (found.solved == (turn < -start - end)).all()
+
+
 def universal_loop(pin, meet, rest):
     """A four-bar with its rod on two universals, one row more than is needed. Its crank's pivot is the origin."""
     hinges = [Revolute("pivot", "ground", "crank", ORIGIN, Z), Revolute("rest", "ground", "rocker", rest, Z)]

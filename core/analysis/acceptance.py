@@ -69,23 +69,20 @@ def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
     """By how much a lane passes all tests of a solution."""
     read, sigma, turned = tracer.read, tracer.read(SIGMA), tracer.read(ORIENTATION)
     sigma_before, turned_before, largest = (read(FROM + label) for label in (SIGMA, ORIENTATION, LARGEST_SIGMA))
-    largest, chosen = maximum(sigma, largest), bool(tracer.selection.dropped)
+    largest = maximum(sigma, largest)
     if neighbours:
         sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
-    slope, out = None, dict[int, Scalar]()
-    if chosen:
-        moved, slope = read(MOVED), _slope(read)
-        found = where_larger(moved, NEGLIGIBLE, absolute(sigma - sigma_before) / moved, 0.0)
-        least = maximum(FALLS * slope, EPSILON)
-        out[tracer.layout.scalar(SLOPE)] = maximum(found, least)
-        slope = maximum(before(found, slope), least) if neighbours else slope
-    passed = margins(read, sigma_before, turned_before, largest, slope)
-    out |= {tracer.layout.scalar(MARGIN): reduce(minimum, passed.values()), tracer.layout.scalar(LARGEST_SIGMA): largest}
+    moved, slope = read(MOVED), _slope(read)
+    found = where_larger(moved, NEGLIGIBLE, absolute(sigma - sigma_before) / moved, 0.0)
+    least = maximum(FALLS * slope, EPSILON)
+    passed = margins(read, sigma_before, turned_before, largest, maximum(before(found, slope), least) if neighbours else slope)
+    out = {MARGIN: reduce(minimum, passed.values()), LARGEST_SIGMA: largest, SLOPE: maximum(found, least)}
+    out = {tracer.layout.scalar(label): value for label, value in out.items()}
     return program(name, tracer.tape, out, tracer.prepared)
 
 
 def margins(
-    read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar, slope: Scalar | None
+    read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar, slope: Scalar
 ) -> dict[str, Scalar]:
     """By how much a lane passes each test of a solution: it has converged, closes, agrees with the redundant rows, is on its
     branch, and continues the motion it is predicted from.
@@ -97,14 +94,12 @@ def margins(
         read: a scalar of the lane by its name.
         sigma_before, turned_before: of where it is predicted from.
         largest: the largest estimate of sigma so far.
-        slope: how steeply sigma changes, as far as known. None where all rows are solved. Where they are chosen from more, the sign
-            of a determinant says less: it changes where the mechanism is singular, and where the choice is, and not where both are
-            within a step. No step is taken then in which sigma could have been zero.
+        slope: how steeply sigma changes, as far as known.
     """
     tol, consistent, crossing = (read(label) for label in ACCEPT)
     closure, sigma, turned = (read(label) for label in ("closure", SIGMA, ORIENTATION))
     uncertain = (WORSE * largest) * maximum(closure, EPSILON)
-    found = {
+    return {
         "converged": read(DONE) - 0.5,
         "closed": tol - closure,
         "consistent": consistent - read("leftover"),
@@ -113,12 +108,10 @@ def margins(
         "near": LONGEST_STEP - read(REACH),
         "as regular": (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
         "on this side": 0.5 - absolute(turned - turned_before) + crossing,
+        "regular between": sigma + sigma_before - minimum(STEEPER * slope, STEEPEST) * read(MOVED) + crossing,
         "certain": FOLLOWED * sigma * sigma - uncertain,
         "not turned by rounding": maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
     }
-    if slope is not None:
-        found["regular between"] = sigma + sigma_before - minimum(STEEPER * slope, STEEPEST) * read(MOVED) + crossing
-    return found
 
 
 def _slope(read: Callable[[str], Scalar]) -> Scalar:
@@ -141,8 +134,7 @@ def why_refused(model: Model, lane: Array) -> str:
     def read(name: str) -> float:
         return float(lane[model.slots[name]])
 
-    slope = _slope(read) if model.selection.dropped else None
-    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), slope)
+    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), _slope(read))
     failed = [name for name, margin in found.items() if not margin > 0.0]
     closure, leftover, tol = (read(name) for name in ("closure", "leftover", "tolerance"))
     if not np.isfinite(closure):

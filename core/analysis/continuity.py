@@ -23,12 +23,13 @@ LONGEST_STEP = 0.5
 # change as fast. Steps towards it get shorter and shorter, and nothing there is stepped over. Where rows are exchanged the estimate
 # of sigma jumps, over the case library by up to 3.6 times.
 LARGEST_RATIO = 16.0
-# Where there are more rows than are solved sigma is taken to change, by what the pose does [Euler parameters, parts of the
+# Nor one in which sigma could have been zero: it is taken to change, by what the pose does [Euler parameters, parts of the
 # mechanism's size], by no more than the first times what it did, which is forgotten by the second from step to step, and never by
-# more than the third. Of 600 coarse sweeps of kites with redundant rows that are off by less than 1e-4, 79 were found on their
-# other assembly without this, four where all was forgotten at once, none of 4,600 so. The third alone gives thousands of parts to
-# a screw so fine that sigma is 0.002 everywhere. (Comparing the frames of all rows of two poses, as one sign of a determinant,
-# leaves 0.5 %: there both may turn over within a step too.)
+# more than the third. The sign of a determinant says nothing of a gap behind which the motion seems to go on; and where there are
+# more rows than are solved it changes by their choice too, and not where both are within a step. Of 600 coarse sweeps of kites with
+# redundant rows that are off by less than 1e-4, 79 were found on their other assembly without this, four where all was forgotten at
+# once, none of 4,600 so. The third alone gives thousands of parts to a screw so fine that sigma is 0.002 everywhere. (Comparing the
+# frames of all rows of two poses, as one sign of a determinant, leaves 0.5 %: there both may turn over within a step too.)
 STEEPER, FALLS, STEEPEST = 4.0, 0.5, 2.0
 # Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9
 # m that outputs are held to.

@@ -16,7 +16,7 @@ from ..program.llvm.compiler import available
 from ..trajectory import Array
 from . import acceptance, prediction
 from .equations.drives import drive_numbers
-from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request, remembered
+from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, REMEMBERED, SIGMA, TIME, Request
 from .structure.components import Section
 from .thread_cache import ThreadCache
 from .tracing import Tracing, ours, traced
@@ -129,7 +129,7 @@ class Model:
     @property
     def _tests(self) -> Sequence[str]:
         if self.request.state:  # a part of a large mechanism: whose fault it is, and what the next sample is accepted by
-            return ("closure", *remembered(chosen=bool(self.selection.dropped)))
+            return ("closure", *REMEMBERED)
         return TESTS_OF_VARIANTS if self.request.varied else TESTS
 
     def _rows(self) -> dict[str, slice]:

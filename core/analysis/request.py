@@ -61,14 +61,8 @@ SLOPE = "slope"
 """The slot of how steeply that estimate changes, by what the pose does; zero where nothing is known of that."""
 
 
-def remembered(*, chosen: bool) -> tuple[str, ...]:
-    """The slots that tests know of what a lane is predicted from.
-
-    Args:
-        chosen: there are more rows than are solved.
-    """
-    return (SIGMA, ORIENTATION, LARGEST_SIGMA, *((SLOPE,) if chosen else ()))
-
+REMEMBERED = SIGMA, ORIENTATION, LARGEST_SIGMA, SLOPE
+"""The slots that tests know of what a lane is predicted from."""
 
 ACCEPT = ("tolerance", "consistent", "crossing")
 """The slots that a lane is accepted by."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,8 +29,26 @@ STILL = 0.0, 0.0, 0.0
 
 
 Indices = NDArray[np.intp]
-Keep = Callable[[Indices | slice, Indices | slice], None]
-"""Takes samples, by their number outwards, from lanes."""
+Keep = Callable[[Indices], None]
+"""Takes samples, by their number outwards, from as many lanes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Halt:
+    """Where samples were followed to.
+
+    Attributes:
+        count: how many of them.
+        here: the time that the lanes are predicted from.
+        sound, start: what they were predicted from where all was sound, and its time.
+        reason: why they were not followed on, where it is not that no part of a step was accepted.
+    """
+
+    count: int
+    here: float
+    sound: Sequence[Array]
+    start: float
+    reason: str = ""
 
 
 class CascadeSweep:
@@ -74,10 +93,10 @@ class CascadeSweep:
         messages = [message] if message else []
         for order, given in self._sides if not messages else ():
 
-            def keep(samples: Indices | slice, lane: Indices | slice, order: Indices = order) -> None:
+            def keep(samples: Indices, order: Indices = order) -> None:
                 at = order[samples]
-                table[:, at] = lanes.world[rows][:, lane]
-                worst[:, at] = lanes.worst[:, lane]
+                table[:, at] = lanes.world[rows][:, : len(at)]
+                worst[:, at] = lanes.worst[:, : len(at)]
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
@@ -112,47 +131,57 @@ class CascadeSweep:
         return lanes.anchor, message, tuple(self._notes)
 
     def _follow(self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float) -> str:
-        """Follow the samples outwards, with what is given there; empty, or why they end."""
-        lanes, at, parts, refused = self._lanes, 0, 0, list[int]()
-        sound, start = lanes.anchor, here
-        while at < len(times):
-            ahead = times[at : at + LANES]
-            good = lanes.attempt_at([each[:, at : at + LANES] for each in given]) > 0.0
-            accepted = len(ahead) if good.all() else int(good.argmin())
-            if accepted:
-                keep(slice(at, at + accepted), slice(accepted))
-                if accepted == len(ahead):
-                    lanes.go_on()
-                else:
-                    lanes.carry(accepted - 1)
-                here, at, parts = float(ahead[accepted - 1]), at + accepted, 0
-                continue
-            if lanes.sound:
-                sound, start = lanes.anchor, here
-            last = float(times[at - 1]) if at else None
-            if parts == MOST_PARTS:
-                return path.ended(here, float(times[at]), last, TOO_MANY)
-            reached = self._divide(here, float(times[at]), path)
-            if reached is not None:
-                lane, here = reached
-                lanes.carry(lane)
-                parts += 1
-                continue
-            message = path.ended(here, float(times[at]), last, self._why_ended(tol))
-            beyond = cross(lanes, path, sound, start, here, float(times[at]), tol)
+        """Follow the samples outwards, with what is given there, over singular poses too; empty, or why they end."""
+        lanes, left, refused = self._lanes, np.arange(len(times)), list[int]()
+        while len(left):
+            halt = self._along(left, times, given, here, path, keep)
+            left = left[halt.count :]
+            if not len(left):
+                break
+            at = int(left[0])
+            wanted, last = float(times[at]), float(times[at - 1]) if at else None
+            message = path.ended(halt.here, wanted, last, halt.reason or self._why_ended(tol))
+            beyond = None if halt.reason else cross(lanes, path, halt.sound, halt.start, halt.here, wanted, tol)
             if beyond is None:
                 return message
-            self._notes.append(f"crosses a singular pose near {path.where(here)}; {CONTINUED}")
-            beside = at + np.flatnonzero(np.abs(times[at:] - here) <= abs(beyond - here))
-            for chunk in np.split(beside, range(lanes.lanes, len(beside), lanes.lanes)) if len(beside) else ():
-                good = lanes.attempt(times[chunk], path) > 0.0
-                keep(chunk[good], np.flatnonzero(good))
-                refused += chunk[~good].tolist()
-            here, at, parts = beyond, at + len(beside), 0
+            self._notes.append(f"crosses a singular pose near {path.where(halt.here)}; {CONTINUED}")
+            beside = left[np.abs(times[left] - halt.here) <= abs(beyond - halt.here)]
+            here, anchor, left = beyond, lanes.anchor, left[len(beside) :]
+            back = self._along(beside[::-1], times, given, here, path, keep)
+            refused += beside[: len(beside) - back.count].tolist()
+            lanes.anchor = anchor
         if refused:
             places = listed([path.where(float(times[k])) for k in refused])
             return f"refused at {places}: so near a singular pose that neither side reaches it; keep away from it"
         return ""
+
+    def _along(self, samples: Indices, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep) -> Halt:
+        """Follow samples in their order, in parts of steps where need be, to the last or to where no part is accepted."""
+        lanes, at, parts = self._lanes, 0, 0
+        sound, start = lanes.anchor, here
+        while at < len(samples):
+            ahead = samples[at : at + LANES]
+            good = lanes.attempt_at([each[:, ahead] for each in given]) > 0.0
+            accepted = len(ahead) if good.all() else int(good.argmin())
+            if accepted:
+                keep(ahead[:accepted])
+                if accepted == len(ahead):
+                    lanes.go_on()
+                else:
+                    lanes.carry(accepted - 1)
+                here, at, parts = float(times[ahead[accepted - 1]]), at + accepted, 0
+                continue
+            if lanes.sound:
+                sound, start = lanes.anchor, here
+            if parts == MOST_PARTS:
+                return Halt(at, here, sound, start, TOO_MANY)
+            reached = self._divide(here, float(times[samples[at]]), path)
+            if reached is None:
+                break
+            lane, here = reached
+            lanes.carry(lane)
+            parts += 1
+        return Halt(at, here, sound, start)
 
     def _divide(self, here: float, wanted: float, path: Path) -> tuple[int, float] | None:
         """Go a part of a step: the lane there and its time. As many parts as there are lanes are tried at once, longest first."""
@@ -210,5 +239,5 @@ class CascadeSweep:
         )
 
 
-def _nothing(samples: Indices | slice, lane: Indices | slice) -> None:
+def _nothing(samples: Indices) -> None:
     """Keep none of the samples."""
