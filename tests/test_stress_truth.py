@@ -12,7 +12,14 @@ from kincheck.core.harness.stress.conditions import NotStatedError, conditions
 from kincheck.core.harness.stress.evaluation import Evaluator, Poses
 from kincheck.core.harness.stress.extended import extended
 from kincheck.core.harness.stress.families.base import as_case
-from kincheck.core.harness.stress.families.planar import any_plane, four_bar, four_bar_motion, slider_crank, slider_crank_motion
+from kincheck.core.harness.stress.families.planar import (
+    any_plane,
+    flats,
+    four_bar,
+    four_bar_motion,
+    slider_crank,
+    slider_crank_motion,
+)
 from kincheck.core.harness.stress.proofs import distance_from_proof
 from kincheck.core.harness.stress.truth import ROUND_OFF, DefectError, Reach, closed, followed
 from kincheck.core.joints import Spherical
@@ -138,6 +145,18 @@ def test_the_end_of_a_stroke_is_found_to_the_last_digits():
         case = as_case(slider_crank(plane, b, c, "rod", "slide"), "slide", np.array([part * left]))
         assert followed(case).reach[0] == reach
         assert closed(case, slider_crank_motion(plane, b, c, "slide")).reach[0] == reach
+
+
+@pytest.mark.parametrize(("off", "told"), [(1e-8, True), (1e-3, False)])
+def test_an_engine_may_give_up_behind_what_is_singular_to_rounding_only(off, told):
+    """A kite's crank passes the rocker's pivot by a little, between two samples."""
+    plane, b, d = any_plane(np.random.default_rng(1)), (0.0, 0.4 * (1.0 - off)), (0.4, 0.0)
+    c = (0.2 + 0.9 / 2**0.5, 0.2 + 0.9 / 2**0.5)
+    case = as_case(four_bar(plane, b, d, c, "rod"), "turn", np.linspace(-2.5, 2.5, 4))
+    truth = closed(case, four_bar_motion(plane, b, d, c), nearest=flats(b, d))
+    assert min(flats(b, d), key=abs) == pytest.approx(-np.pi / 2.0)
+    assert (truth.reach == Reach.REACHED).all()
+    assert truth.singular.tolist() == [told, False, False, False]
 
 
 def test_what_is_round_off_grows_with_size_and_condition():

@@ -65,8 +65,8 @@ class Solved:
 
     @property
     def condition(self) -> Array:
-        """How far all unknowns together move [units, rad] for rows that are off by one each, shape (n,)."""
-        return np.maximum(1.0, np.abs(self.inverse).sum(axis=2).max(axis=1))
+        """That of the inverse, shape (n,)."""
+        return condition(self.inverse)
 
     def at(self, k: int) -> Solved:
         """One sample."""
@@ -129,7 +129,7 @@ class System:
             # a step that turns a body over is no correction of a nearby pose
             good = np.isfinite(size) & (size < 1.0)
             step[~good] = 0.0
-            last = np.where(good, size / np.maximum(1.0, np.abs(inverse).sum(axis=2).max(axis=1)), np.inf)
+            last = np.where(good, size / condition(inverse), np.inf)
             poses = poses.moved(extended(step).T.reshape(-1, 6, len(step)))
             if (last[good] <= 1e-3 * POLISHED).all() or not good.any():
                 break
@@ -211,6 +211,11 @@ class System:
             found.a,
             np.where(changed <= LARGEST_CHANGE, found.step, np.inf),
         )
+
+
+def condition(inverse: Array) -> Array:
+    """How far all unknowns together move [units, rad] for rows that are off by one each, shape (n,)."""
+    return np.maximum(1.0, np.abs(inverse).sum(axis=2).max(axis=1))
 
 
 def inverted(jacobian: Array) -> Array:

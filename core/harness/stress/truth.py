@@ -28,7 +28,7 @@ from ...trajectory import Array
 from ..case import Case
 from .evaluation import Poses, cross
 from .extended import Real, extended
-from .system import LANES, POLISHED, Solved, System
+from .system import LANES, POLISHED, Solved, System, condition, inverted
 
 ROUND_OFF = 1e-14
 AT_A_FOLD = ROUND_OFF**0.5
@@ -119,8 +119,12 @@ def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
         found.reach[past[np.abs(system.path.times[past]) > abs(fold) + abs(abs(fold) - at[-1])]] = Reach.BEYOND
 
 
-def closed(case: Case, motion: Motion) -> Truth:
+def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
     """The truth by a closed form, polished to the last digit of the mechanism as it is written down.
+
+    Args:
+        nearest: values of the swept driver, from the design, at which it comes nearest to singular. Samples may lie on both sides,
+            and behind such a pose that double precision cannot tell from a singular one an engine may give up.
 
     Raises:
         DefectError: the closed form is not a solution of the case.
@@ -128,7 +132,7 @@ def closed(case: Case, motion: Motion) -> Truth:
     system = System(case)
     found, n = _Gathered(system, Reach.BEYOND), len(case.sweep.values)
     for chunk in np.split(np.arange(n), range(LANES, n, LANES)):
-        poses = closed_poses(system, motion, chunk)
+        poses = closed_poses(system, motion, system.sampled(chunk)[0])
         known = np.isfinite(poses.u).all(axis=(0, 1)) & np.isfinite(poses.q).all(axis=(0, 1))
         if not known.any():
             continue
@@ -148,6 +152,10 @@ def closed(case: Case, motion: Motion) -> Truth:
         # in a singular pose Newton's iteration cannot polish, and need not
         found.add(chunk, _replaced(solved, poses, solved.condition >= UNPOLISHED), keep=False)
     found.singular |= bool(system.design().condition[0] >= SINGULAR)
+    for time in np.divide(nearest, case.sweep.rate):
+        poses = closed_poses(system, motion, system.drives(np.array([time]))[0])
+        if not condition(inverted(system.rows.jacobian(poses)))[0] < UNPOLISHED:
+            found.singular |= system.path.times * time > time * time
     for side in outwards(system.path.times, 0.0):
         # a formula may have values again behind a gap, but no motion leads there
         gone = np.logical_or.accumulate(found.reach[side] == Reach.BEYOND)
@@ -161,9 +169,9 @@ def _replaced(found: Solved, poses: Poses, where: NDArray[np.bool_]) -> Solved:
     return Solved(found.times, Poses(u, q), found.angles, found.jacobian, found.inverse, found.v, found.a, found.step)
 
 
-def closed_poses(system: System, motion: Motion, samples: NDArray[np.intp]) -> Poses:
-    """Poses of the bodies about their centres at samples, from those about the points that a closed form is about."""
-    stated, moved = system.rows.stated, motion(system.sampled(samples)[0])
+def closed_poses(system: System, motion: Motion, values: Real) -> Poses:
+    """Poses of the bodies about their centres at values of the drivers, from those about the points that a closed form is about."""
+    stated, moved = system.rows.stated, motion(values)
     n = next(iter(moved.values()))[0].shape[-1]
     found = Poses.design(len(stated.bodies), n)
     for k, name in enumerate(stated.bodies, 1):

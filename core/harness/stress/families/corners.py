@@ -10,7 +10,7 @@ import numpy as np
 from ..extended import extended
 from ..truth import closed
 from .base import Family, Rng, Specimen, as_case, power
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion, meet
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, meet
 
 # The design is not to be near a corner itself: of what is folded more, coordinates hold too few digits of the shape.
 FOLDED = 0.05
@@ -46,7 +46,7 @@ class Corners(Family):
         return Specimen(
             f"{kind} with {way}, off by {off:.2g}",
             partial(as_case, four_bar(plane, b, d, c, way), "turn", np.linspace(0.0, last, samples)),
-            partial(closed, motion=four_bar_motion(plane, b, d, c)),
+            partial(closed, motion=four_bar_motion(plane, b, d, c), nearest=flats(b, d)),
             facts=(("off", off),),
         )
 

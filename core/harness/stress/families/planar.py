@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -213,6 +214,12 @@ def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
     stops = [k * 2.0 * np.pi + sign * stop for stop in (low, high) if stop is not None for sign in (-1.0, 1.0) for k in (-1, 0, 1)]
     ahead, behind = [stop - at for stop in stops if stop > at], [stop - at for stop in stops if stop < at]
     return float(max(behind, default=-np.inf)), float(min(ahead, default=np.inf))
+
+
+def flats(b: Plan, d: Plan) -> list[float]:
+    """Turns of a crank at b by which it lies along the ground, toward the pivot at d or away from it, within two turns of there."""
+    at = float(heading(extended(b)) - heading(extended(d)))
+    return [k * math.pi - at for k in range(-4, 5)]
 
 
 def slider_crank(plane: Plane, b: Plan, c: Plan, way: str, drive: str, guide: Plan = (1.0, 0.0)) -> Mechanism:

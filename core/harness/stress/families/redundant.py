@@ -56,7 +56,7 @@ def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
     violated = np.zeros(len(case.sweep.values))
     size = system.rows.stated.unit
     for sample in np.split(np.arange(len(violated)), range(LANES, len(violated), LANES)):
-        poses = closed_poses(exact, motion, sample)
+        poses = closed_poses(exact, motion, exact.sampled(sample)[0])
         drives = system.sampled(sample)
         at = system.solved(poses, drives, system.path.times[sample], system.rows.angles(poses))
         violated[sample] = np.abs(system.rows.residual(at.poses, drives[0], at.angles)).max(axis=0)

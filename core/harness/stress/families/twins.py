@@ -8,7 +8,7 @@ import numpy as np
 
 from ..truth import closed
 from .base import Family, Rng, Specimen, as_case
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar_motion, nearly_kite, nearly_parallel, rockers, twins
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar_motion, nearly_kite, nearly_parallel, rockers, twins
 
 TURN = 0.97 * np.pi
 
@@ -41,6 +41,6 @@ class Twins(Family):
         return Specimen(
             f"{kind} with {first} and {second}, off by {off:.2g}",
             partial(as_case, twins(plane, b, d, c, (first, second)), "turn", np.linspace(-TURN, TURN, samples)),
-            partial(closed, motion=motion),
+            partial(closed, motion=motion, nearest=flats(b, d)),
             facts=(("off", off),),
         )
