@@ -13,6 +13,8 @@ from .planar import JOINTS_OF_A_LOOP, any_plane, crank_rocker, four_bar, four_ba
 from .sizes import linkage
 
 TURNS = 1000
+# From one sample to the next: a step is gone in 2,000 parts at most, of which a turn takes some twelve.
+MOST_BETWEEN = 100
 
 
 class Drift(Family):
@@ -26,10 +28,10 @@ class Drift(Family):
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """The closed form knows nothing of the turns before."""
         plane, points, way = any_plane(rng), crank_rocker(rng), str(rng.choice(JOINTS_OF_A_LOOP))
-        turns = np.linspace(0.0, 2.0 * np.pi * TURNS, samples)
+        turns = min(TURNS, MOST_BETWEEN * (samples - 1))
         return Specimen(
-            f"four_bar with {way}, {TURNS} turns",
-            partial(as_case, four_bar(plane, *points, way), "turn", turns),
+            f"four_bar with {way}, {turns} turns",
+            partial(as_case, four_bar(plane, *points, way), "turn", np.linspace(0.0, 2.0 * np.pi * turns, samples)),
             partial(closed, motion=four_bar_motion(plane, *points)),
         )
 
