@@ -13,12 +13,15 @@ from typing import Any
 
 import msgspec
 import pytest
+from kincheck.core import solve
+from kincheck.core.harness.bench.ring import ring
 from kincheck.core.harness.record import Deviation, Deviations, Results
 from kincheck.core.harness.reporting.axis import SAMPLES
 from kincheck.core.harness.reporting.report import headline, write_report
 from kincheck.core.harness.reporting.wording import number
 
 from .made_up import CRANK, GRID, distances, judged, record, results, series
+from .test_chain import chain
 
 HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"
 
@@ -62,6 +65,18 @@ def report(run: Results, folder: Path) -> Page:
 
 def traces(page: Page, figure: str, name: str, mode: str) -> list[Any]:
     return [trace for trace in page.data["figures"][figure]["data"] if trace["meta"] == name and trace["mode"] == mode]
+
+
+@pytest.mark.parametrize("mechanism", [chain(12), ring(24)], ids=["components", "sparse"])
+def test_large_mechanisms_have_their_programs_and_their_freedoms_on_the_page(mechanism, tmp_path):
+    """What the native engine really tells of them."""
+    details = solve(mechanism, "turn", [0.0], points=()).details
+    assert ("components" in details) != ("factor_entries" in details)
+    page = report(Results(run={}, records=[record("large", "consensus_only", "native", 0.0, [0.0], details=details)]), tmp_path)
+    for name, size in details["program"].items():
+        assert name in page.text
+        assert str(size["flops"]) in page.text
+    assert details["dof_account"]["paper"].replace("-", "−") in page.text
 
 
 def test_figures_hold_the_outputs_in_millimetres_with_the_travel_upwards(tmp_path: Path) -> None:

@@ -172,7 +172,7 @@ def test_redundant_rows_of_many_loops_are_found_where_they_are():
     driven = Mechanism("planar", bodies, planar.joints, planar.points, [JointAngle("turn", "pivot0")])
     found = solve_sparse(driven, turning(-0.5, 0.5), ["end"])
     assert found.solved.all(), found.message
-    assert len(found.details["redundant_rows"]) == 3 * loops
+    assert len(found.details["dof_account"]["redundant_rows"]) == 3 * loops
     assert found.details["redundant_residual"] <= 1e-15
     expected = [[loops + np.sin(0.3 - turn), np.cos(0.3 - turn), 0.0] for turn in (-0.5, 0.5)]
     assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
@@ -210,16 +210,14 @@ def without_driver(mechanism):
 
 def test_what_cannot_be_solved_is_refused_by_name():
     whole = chain(40)
-    with pytest.raises(
-        SolveError, match="1 or more degrees of freedom without a driver; what can still move is most of all 'crank0', "
-    ):
+    with pytest.raises(SolveError, match=r"1 degree of freedom .* but 0 drivers; what can still move is most of all 'crank0', "):
         SparseModel(without_driver(whole), compiled=False)
     second = JointAngle("second", "pivot20")
-    with pytest.raises(SolveError, match="driver 'second' prescribes what"):
+    with pytest.raises(SolveError, match=r"1 degree of freedom .* but 2 drivers; not independent are .*'second'"):
         SparseModel(Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]), compiled=False)
     stretched = slider_crank()
     push = [PointCoordinate("push", "end", X)]
-    with pytest.raises(SolveError, match=r"driven by 'push' it does not move .*dead centre.* most of all 'crank'; "):
+    with pytest.raises(SolveError, match=r"driven by 'push' it does not move .*dead centre"):
         SparseModel(Mechanism("stuck", stretched.bodies, stretched.joints, stretched.points, push), compiled=False)
     m = mcpherson()
     joints = [joint.changed(length=3.0) if isinstance(joint, Distance) else joint for joint in m.joints]
@@ -236,8 +234,32 @@ def test_a_rod_that_spins_freely_is_named():
         Spherical("outer", "knuckle", "rod", (1.115, 0.665, 0.118)),
     ]
     joints = [*(joint for joint in mechanism.joints if not isinstance(joint, Distance)), *rod]
-    with pytest.raises(SolveError, match=r"without a driver; what can still move is most of all 'rod'; .*use distance"):
+    with pytest.raises(SolveError, match=r"but 1 driver; 'rod' can turn; .*use distance"):
         SparseModel(Mechanism("spinning", [*mechanism.bodies, Body("rod")], joints, mechanism.points, mechanism.drivers))
+
+
+@pytest.mark.parametrize("cranks", [12, 24])
+def test_a_large_mechanism_that_is_not_driven_is_told_what_can_move(cranks):
+    with pytest.raises(SolveError, match=r"1 degree of freedom .* but 0 drivers; .*crank"):
+        solve(replace(ring(cranks), drivers=()), "turn", [0.0])
+
+
+def test_a_gear_leaves_a_large_mechanism_a_sparse_system():
+    """As one program 47 bodies take seventeen seconds to be made ready."""
+    whole, cranks = ring(24), 24
+    at = (-2.0, 0.0, 0.0)
+    joints = [*whole.joints, Revolute("shaft", "ground", "wheel", at, Z)]
+    points = [*whole.points, Point("rim", "wheel", (-1.0, 0.0, 0.0))]
+    gear = Gear("gear", ("shaft", f"pivot{cranks // 2}"), ratio=-2.0)
+    turn = np.linspace(-0.4, 0.4, 9)
+    found = solve(
+        replace(whole, bodies=[*whole.bodies, Body("wheel")], joints=joints, points=points, couplers=[gear]), "turn", turn
+    )
+    assert found.solved.all(), found.message
+    assert "factor_entries" in found.details
+    s, c, o = np.sin(-2.0 * turn), np.cos(-2.0 * turn), 0.0 * turn
+    assert np.abs(found.points["rim"].position - np.column_stack([c - 2.0, s, o])).max() <= 1e-14
+    assert np.abs(found.points["rim"].velocity - -2.0 * np.column_stack([-s, c, o])).max() <= 1e-13
 
 
 def test_costs_are_measured_with_residuals_and_errors():

@@ -165,28 +165,12 @@ class Model:
     @cached_property
     def details(self) -> dict[str, Any]:
         """What the record of every solution says of the model."""
-        account = self.selection.account
-        return {
-            "rank": account.rank,
-            "dof": account.dof,
-            "dof_account": {
-                "bodies": account.bodies,
-                "coordinates": account.coordinates,
-                "equations": account.equations,
-                "paper": account.counted,
-                "moving_coordinates": account.moving_coordinates,
-                "rows": account.rows,
-                "rank": account.rank,
-                "dof": account.dof,
-                "redundant_rows": list(account.redundant_rows),
-            },
-            "program": self.sizes,
-        }
+        return {**self.selection.account.details, "program": self.sizes}
 
     @property
     def sizes(self) -> dict[str, dict[str, int]]:
         """Operations and flops per lane of each program."""
-        return {name: {"operations": len(each.nodes), "flops": each.flops} for name, each in self.programs.items()}
+        return {name: each.size for name, each in self.programs.items()}
 
     def executor(self, lanes: int) -> Executor:
         """The programs bound to that many lanes of this thread; kept, because binding costs as much as running.

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 from threading import local
 
+from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Path
 from ..trajectory import Trajectory
@@ -40,7 +41,7 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
-    if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE and not mechanism.couplers:
+    if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
         known = ours(mechanism) and path.ours
         make = (_OF_THREAD.large if known else _large)(mechanism, request)
         if make:
@@ -54,9 +55,14 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     from .cascade.cascade import Cascade
     from .cascade.sweep import CascadeSweep
     from .structure.components import components
+    from .structure.driven import require_driven
 
-    parts = components(mechanism, frames(mechanism))
-    if max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
+    try:
+        parts = [] if mechanism.couplers else components(mechanism, frames(mechanism))  # couplers tie components together
+    except SolveError:
+        require_driven(mechanism)  # which names what can still move
+        raise
+    if parts and max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
         cascade = Cascade(mechanism, request, parts)
 
         def along(path: Path) -> Solver:

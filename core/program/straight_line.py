@@ -40,6 +40,11 @@ class Program:
         """Arithmetic operations of one lane: everything but reading inputs and constants."""
         return sum(count for op, count in self.operations.items() if op in FLOPS)
 
+    @property
+    def size(self) -> dict[str, int]:
+        """Operations, inputs and constants among them, and flops of one lane."""
+        return {"operations": len(self.nodes), "flops": self.flops}
+
 
 def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prepared | None = None, times: int = 1) -> Program:
     """The part of the tape that the outputs (slot -> scalar) need; what is prepared is read from its slot."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from ..march import HALVINGS, MOST_PARTS, TOO_MANY, longest
 from ..model import CLOSED
 from ..request import SIGMA, accept_by
 from ..singular.singularity import CONTINUED, listed
+from ..structure.freedom import counted
 from .bridge import cross
 from .cascade import WORST, Cascade, Lanes
 
@@ -113,6 +115,27 @@ class CascadeSweep:
         """Of each side of the start the samples outwards, and what is given there."""
         times = self.path.times
         return [(side, self._lanes.sampled(times[side], self.path)) for side in outwards(times, self.path.start)]
+
+    @cached_property
+    def _details(self) -> dict[str, Any]:
+        """What the record of every solution says of the cascade."""
+        cascade, unknowns, rows, redundant, sizes = self.cascade, 0, 0, list[str](), dict[str, dict[str, int]]()
+        for kind in cascade.kinds:
+            account, like = kind.model.selection.account, cascade.parts[kind.members[0]].bodies[0]
+            unknowns += account.moving_coordinates * len(kind.members)
+            rows += account.rows * len(kind.members)
+            for part in (cascade.parts[k] for k in kind.members):
+                joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}  # as they are called in a section
+                named = (name.partition(":") for name in account.redundant_rows)
+                redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
+            which = f"{len(kind.members)} components like that of {like}"
+            sizes |= {f"{name}, {which}": size for name, size in kind.model.sizes.items()}
+        return {
+            **counted(cascade.mechanism, unknowns, rows, redundant).details,
+            "components": len(cascade.parts),
+            "largest_component": cascade.largest,
+            "program": sizes,
+        }
 
     @cached_property
     def _departure(self) -> tuple[list[Array], str, Sequence[str]]:
@@ -217,8 +240,6 @@ class CascadeSweep:
             v, a = (np.hstack([found[f"{label} {name}"] for label in pair]) for pair in (("rdot", "omega"), ("rddot", "omega_t")))
             return BodyMotion(found[f"r {name}"], found[f"p {name}"], v if order > 1 else None, a if order > 2 else None)
 
-        sizes = {f"{len(kind.members)} components": kind.model.sizes for kind in self.cascade.kinds}
-        accounts = [(len(kind.members), kind.model.selection.account) for kind in self.cascade.kinds]
         return Trajectory(
             points={name: motion(name) for name in request.points},
             solved=solved,
@@ -226,11 +247,7 @@ class CascadeSweep:
             residual=largest_found(tests["closure"][solved]) * unit,
             message="; ".join(messages),
             details={
-                "rank": sum(members * account.rank for members, account in accounts),
-                "dof": sum(members * account.dof for members, account in accounts),
-                "components": len(self.cascade.parts),
-                "largest_component": self.cascade.largest,
-                "programs": sizes,
+                **self._details,
                 "redundant_residual": largest_found(tests["leftover"][solved]) * unit,
                 "smallest_singular_value": min(-largest_found(-tests[SIGMA][solved]), 1.0),
             }

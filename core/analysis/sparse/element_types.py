@@ -60,6 +60,12 @@ class Member:
     driver: int | None
 
     @property
+    def what(self) -> str:
+        """Its type."""
+        c = self.constraint
+        return type(c if isinstance(c, Relation) else c.primitive).__name__
+
+    @property
     def coordinates(self) -> tuple[str, ...]:
         """The coordinates it reads."""
         c = self.constraint
@@ -96,6 +102,7 @@ class ElementType:
 
     def __init__(self, members: Sequence[Member], numbering: Numbering) -> None:
         first, self.lanes, self._tape, moving = members[0], len(members), Tape(), numbering.bodies
+        self.label = f"{first.what} like row {first.row} of {first.constraint.owner}"
         sides = [(member.bodies(moving).values(), member.coordinates) for member in members]
         where = [numbering.places(7, *each) for each in sides]
         if first.driver is not None:
@@ -193,6 +200,6 @@ class ElementType:
                 yield starts[quantity] + rows, value
 
     @property
-    def sizes(self) -> dict[str, int]:
-        """How many constraints there are, and the flops of one."""
-        return {"constraints": self.lanes} | {f"flops {name}": each.flops for name, each in self.plan.programs.items()}
+    def sizes(self) -> dict[str, dict[str, int]]:
+        """Operations and flops of one constraint, by program."""
+        return {f"{name}, {self.lanes} {self.label}": each.size for name, each in self.plan.programs.items()}

@@ -42,8 +42,7 @@ class Elements:
         self.owners: list[tuple[str, str]] = []
         for k, c in enumerate(constraints, drivers - len(constraints)):  # the drivers come last
             members.append(Member(c, len(self.owners), k if k >= 0 else None))
-            relation = isinstance(c, Relation)
-            self.owners += [(c.owner, "Relation")] if relation else [(c.owner, type(c.primitive).__name__)] * c.primitive.n
+            self.owners += [(c.owner, members[-1].what)] * (1 if isinstance(c, Relation) else c.primitive.n)
         coordinates = dict.fromkeys(name for member in members for name in member.coordinates)
         self.numbering = Numbering(*({name: k for k, name in enumerate(names)} for names in (bodies, coordinates)))
         kinds: dict[Any, list[Member]] = {}
@@ -71,9 +70,9 @@ class Elements:
         ]
 
     @property
-    def sizes(self) -> list[dict[str, int]]:
-        """Of each kind: how many constraints there are, and the flops of one."""
-        return [kind.sizes for kind in self.kinds]
+    def sizes(self) -> dict[str, dict[str, int]]:
+        """Operations and flops of the programs of all kinds, for one constraint each."""
+        return {name: size for kind in self.kinds for name, size in kind.sizes.items()}
 
     def evaluate(self, state: Array, drives: Array) -> None:
         """Update phi, nu, branch and entries.

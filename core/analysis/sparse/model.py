@@ -27,8 +27,9 @@ from ..equations.drives import drive_numbers
 from ..model import CLOSED, MAX_ITERATIONS
 from ..prediction import ABOUT
 from ..request import CONSISTENT
-from ..structure.driven import locked_drivers
+from ..structure.driven import locked_drivers, require_driven
 from ..structure.factors import Factors, Indices, SingularError
+from ..structure.freedom import counted
 from ..structure.redundancy import RANK_TOLERANCE
 from .batch import Batch
 from .elements import Elements
@@ -37,8 +38,6 @@ from .row_selection import Jacobian
 from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
 from .turning import Turn
 
-MOVES = 1e-6
-"""A body that moves at least this much, in a motion whose largest component is one, is free."""
 FEW = 5
 """Names listed in a message, at most."""
 
@@ -63,7 +62,7 @@ class SparseModel:
 
     def __init__(self, mechanism: Mechanism, *, compiled: bool = True) -> None:
         if not mechanism.moving:
-            raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
+            require_driven(mechanism)
         self.mechanism = mechanism
         self.extent, self.frame = measured(mechanism)
         self.elements = Elements(
@@ -88,14 +87,9 @@ class SparseModel:
         jacobian, drivers = Jacobian.of(self.elements), len(self.mechanism.drivers)
         rows, unknowns = jacobian.shape
         if rows < unknowns:
-            self._refuse(f"{unknowns - rows} or more degrees of freedom without a driver", jacobian)
+            require_driven(self.mechanism)
         self.kept: Indices = jacobian.independent(drivers)
         self.dropped: Indices = np.setdiff1d(np.arange(rows), self.kept)
-        for row in self.dropped[self.dropped >= rows - drivers].tolist():
-            raise SolveError(
-                f"mechanism {self.mechanism.name!r}: driver {self.elements.owners[row][0]!r} prescribes what the joints "
-                "and the other drivers do already; remove it or free the mechanism"
-            )
         among = jacobian.among(self.kept)
         self.solved = np.flatnonzero(among >= 0)
         try:
@@ -104,26 +98,19 @@ class SparseModel:
             pivot = abs(self.factors.signed_pivot)
         except SingularError:
             pivot = 0.0
-        if not pivot > RANK_TOLERANCE:
-            locked = locked_drivers(self.mechanism)
-            how = f"driven by {locked} it does not move at the design position (lock-up or dead centre)"
-            self._refuse(how if locked else "it has too few drivers", jacobian)
+        if not pivot > RANK_TOLERANCE or (self.dropped >= rows - drivers).any():
+            require_driven(self.mechanism)
+            raise SolveError(
+                f"mechanism {self.mechanism.name!r}: driven by {locked_drivers(self.mechanism)} it does not move at the design "
+                "position (lock-up or dead centre); give the design in another pose, some degrees on, and sweep from there, "
+                "or drive another coordinate"
+            )
 
     @property
     def redundant(self) -> list[str]:
         """The rows that are left out, as "joint: primitive"."""
         rows: list[int] = self.dropped.tolist()
         return [": ".join(self.elements.owners[row]) for row in rows]
-
-    def _refuse(self, why: str, jacobian: Jacobian) -> None:
-        motion: Array = np.abs(jacobian.free()[: 6 * self.bodies]).reshape(6, self.bodies).max(axis=0)
-        most: list[int] = np.argsort(-motion, kind="stable")[:FEW].tolist()
-        free = ", ".join(repr(self.frame.moving[k]) for k in most if motion[k] > MOVES)
-        raise SolveError(
-            f"mechanism {self.mechanism.name!r}: {why}; what can still move is most of all {free or 'a joint coordinate'}; "
-            "add a driver, drive another coordinate, shift the design, or join what spins freely (a rod between two balls: use "
-            "distance)"
-        )
 
     def drives(self, path: Path, times: Array) -> Array:
         """What `Elements.evaluate` wants of all drivers at the times, shape (5 * drivers, n)."""
@@ -192,11 +179,10 @@ class SparseModel:
     @property
     def details(self) -> dict[str, Any]:
         """What the record of every solution says of the model."""
+        rows = len(self.elements.owners) - len(self.mechanism.drivers)
         return {
-            "rank": len(self.kept) - len(self.mechanism.drivers),
-            "dof": len(self.mechanism.drivers),
+            **counted(self.mechanism, len(self.kept), rows, self.redundant).details,
             "unknowns": len(self.kept),
-            "redundant_rows": self.redundant,
             "program": self.elements.sizes,
             "factor_entries": self.factors.entries,
         }

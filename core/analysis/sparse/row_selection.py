@@ -21,8 +21,6 @@ from .elements import Elements
 # Added to the squared length, one, of every row. A repeated row keeps this times the number of rows it repeats, well below the
 # pivots of independent ones, and far above round-off.
 LIFT = 1e-13
-# Motions of a null space are found by this much of a spring to the ground at every coordinate.
-SPRING = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +65,6 @@ class Jacobian:
         # the order may still be changed to an equivalent one, rows and columns alike
         distance[order] = np.abs(factors.U.diagonal())[factors.perm_c]
         return np.sort(np.argsort(-distance, kind="stable")[:wanted])
-
-    def free(self) -> Array:
-        """The motion that the rows resist least, largest component one, shape (columns,)."""
-        sparse, linear = _modules()
-        J = sparse.csr_matrix((self.values, (self.rows, self.columns)), shape=self.shape)
-        held = linear.splu((J.T @ J + SPRING * sparse.identity(self.shape[1])).tocsc(), permc_spec="COLAMD")
-        motion: Array = np.random.default_rng(0).normal(size=self.shape[1])
-        for _ in range(3):
-            motion = held.solve(motion)
-            motion /= np.abs(motion).max()
-        return motion
 
 
 def _modules() -> tuple[Any, Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -56,6 +57,22 @@ class FreedomAccount:
         """The paper's count (Table 5)."""
         return f"{self.coordinates} - {self.equations} = {self.coordinates - self.equations}"
 
+    @property
+    def details(self) -> dict[str, Any]:
+        """What the record of a solution says of it."""
+        account = {
+            "bodies": self.bodies,
+            "coordinates": self.coordinates,
+            "equations": self.equations,
+            "paper": self.counted,
+            "moving_coordinates": self.moving_coordinates,
+            "rows": self.rows,
+            "rank": self.rank,
+            "dof": self.dof,
+            "redundant_rows": list(self.redundant_rows),
+        }
+        return {"rank": self.rank, "dof": self.dof, "dof_account": account}
+
 
 @dataclass(frozen=True, eq=False)
 class Selection:
@@ -71,16 +88,22 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     formulation, matrix = _matrix(mechanism, frame)
     joint_rows = len(matrix) - len(mechanism.drivers)
     kept = set(independent_joint_rows(formulation, matrix[:joint_rows]))
-    fixed = len(mechanism.bodies) - len(mechanism.moving)
     names = row_names(formulation)
+    redundant = [names[k] for k in range(joint_rows) if k not in kept]
+    return counted(mechanism, formulation.unknowns, joint_rows, redundant)
+
+
+def counted(mechanism: Mechanism, unknowns: int, rows: int, redundant_rows: Sequence[str]) -> FreedomAccount:
+    """The account of a mechanism of which so many unknowns and joint rows are known, and which rows are redundant."""
+    bodies, fixed = len(mechanism.bodies), len(mechanism.bodies) - len(mechanism.moving)
     return FreedomAccount(
-        bodies=len(mechanism.bodies),
-        coordinates=COORDINATES * len(mechanism.bodies),
-        equations=sum(joint.rows for joint in mechanism.joints) + len(mechanism.couplers) + COLUMNS * fixed + len(mechanism.bodies),
-        moving_coordinates=formulation.unknowns,
-        rows=joint_rows,
-        rank=len(kept),
-        redundant_rows=tuple(names[k] for k in range(joint_rows) if k not in kept),
+        bodies=bodies,
+        coordinates=COORDINATES * bodies,
+        equations=sum(joint.rows for joint in mechanism.joints) + len(mechanism.couplers) + COLUMNS * fixed + bodies,
+        moving_coordinates=unknowns,
+        rows=rows,
+        rank=rows - len(redundant_rows),
+        redundant_rows=tuple(redundant_rows),
     )
 
 
