@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -17,11 +16,11 @@ import numpy as np
 from ..core.errors import SolveError
 from ..core.harness.case import Case
 from ..core.harness.engine import Floor
-from ..core.trajectory import Array, Trajectory
-from .exudyn_rows import DRIVERS, JOINTS, NO_ROTATION, Rows, turned
+from ..core.trajectory import Array
+from .exudyn_rows import JOINTS, NO_ROTATION, Rows, turned
 from .floors import floor_of
-from .own_frame import in_own_frame, own_frame
-from .projection import EFFORTS, settings_of_newton, solve_by_projection, without_counterpart
+from .own_frame import in_own_frame
+from .projection_engine import ProjectionEngine
 
 # Largest change of a coordinate per step of the differences of the Jacobian [units of length or -]. Round-off, 1e-16 / 1e-3, and
 # truncation, (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
@@ -30,48 +29,24 @@ DIFFERENCE = 1e-3
 WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 
 
-@dataclass(frozen=True)
-class Exudyn:
-    """The engine `exudyn`; see `Engine`. With a number of corrections, Newton makes so many; see `solve_by_projection`."""
+class Exudyn(ProjectionEngine):
+    """The engine `exudyn`."""
 
-    corrections: int | None = None
-    name = "exudyn"
-    mode = "projection"
-    loop = "python"
+    name, title, joints = "exudyn", "Exudyn", JOINTS
 
     @property
-    def settings(self) -> Mapping[str, Any]:
-        """What is solved and how."""
+    def described(self) -> Mapping[str, Any]:
+        """Its bodies, and what its solver evaluates."""
         return {
             "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
             "residual": "ComputeAlgebraicEquations",
             "jacobian": "ComputeNewtonJacobian, constraint rows",
             "acceleration": f"Jacobian differentiated along the velocity, sixth order, coordinates changed by {DIFFERENCE:g}",
-            **settings_of_newton(self.corrections),
         }
-
-    def version(self) -> str | None:
-        """Version of Exudyn, or None where it cannot be imported, for whatever reason."""
-        try:
-            return str(importlib.import_module("exudyn").__version__)
-        except (Exception, SystemExit):
-            return None
-
-    def unsupported(self, case: Case) -> str | None:
-        """None, or the joint or driver that has no counterpart here."""
-        return without_counterpart(case, "Exudyn", JOINTS, DRIVERS)
 
     def build(self, case: Case) -> ExudynModel:
         """Exudyn's system of the case, at the design position."""
         return ExudynModel(in_own_frame(case))
-
-    def solve(self, model: ExudynModel, case: Case, tol: float) -> Trajectory:
-        """All samples; see `kincheck.core.harness.engine.Engine.solve`."""
-        return solve_by_projection(model, case, tol, {"rows": len(model.target)}, self.corrections, own_frame(case))
-
-    def efforts(self) -> Mapping[str, Exudyn]:
-        """By the number of Newton steps."""
-        return {label: Exudyn(corrections) for label, corrections in EFFORTS.items()}
 
     def floor(self, case: Case) -> Floor:
         """Of the residual and Jacobian of its static solver; rates take two more Jacobians, the fewest that make a difference."""
@@ -141,6 +116,7 @@ class ExudynModel:
         kinds = exu.OutputVariableType
         self.rotation = kinds.RotationMatrix
         self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
+        self.details = {"rows": len(self.target)}
         self.reset()
 
     def reset(self) -> None:

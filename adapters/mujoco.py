@@ -11,74 +11,46 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.drivers import JointAngle, JointDisplacement, JointDriver, PointCoordinate
+from ..core.drivers import JointDriver, PointCoordinate
 from ..core.harness.case import Case
 from ..core.harness.engine import Floor
-from ..core.trajectory import Array, Trajectory
+from ..core.trajectory import Array
 from .floors import floor_of
 from .mujoco_spec import JOINTS, Closure, Sketch, coordinate
-from .own_frame import in_own_frame, own_frame
-from .projection import EFFORTS, settings_of_newton, solve_by_projection, without_counterpart
+from .own_frame import in_own_frame
+from .projection_engine import ProjectionEngine
 
-DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 ROWS = {"connect": 3, "weld": 6, "tendon": 1, "joint": 1}
 
 
-@dataclass(frozen=True)
-class MuJoCo:
-    """The engine `mujoco`; see `Engine`. With a number of corrections, Newton makes so many; see `solve_by_projection`."""
+class MuJoCo(ProjectionEngine):
+    """The engine `mujoco`."""
 
-    corrections: int | None = None
-    name = "mujoco"
-    mode = "projection"
-    loop = "python"
+    name, title, joints = "mujoco", "MuJoCo", JOINTS
 
     @property
-    def settings(self) -> Mapping[str, Any]:
-        """What is solved and how."""
+    def described(self) -> Mapping[str, Any]:
+        """Its equalities."""
         return {
             "residual": "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers: units or rad",
             "jacobian": "efc_J, dense",
             "options": "no gravity, no contact, no autoreset; equalities without spring and damper",
             "cut_joints": "tendon; or connect or weld, to an auxiliary body where the joint has slides or hinges",
             "relations": "joint equalities",
-            **settings_of_newton(self.corrections),
         }
-
-    def version(self) -> str | None:
-        """MuJoCo's version, or None where it cannot be imported."""
-        try:
-            return str(mujoco().__version__)
-        except (
-            Exception,
-            SystemExit,
-        ):  # a broken binary raises what its loader likes; to the harness it all means "not here"
-            return None
-
-    def unsupported(self, case: Case) -> str | None:
-        """None, or the joint or driver that has no counterpart here."""
-        return without_counterpart(case, "MuJoCo", JOINTS, DRIVERS)
 
     def build(self, case: Case) -> MuJoCoModel:
         """The compiled model and its rows."""
         model = MuJoCoModel(mujoco(), in_own_frame(case))
         model.m.eq_solref[:] = 0.0  # no spring and no damper: aref is minus Jdot v, to the last bit
         return model
-
-    def solve(self, model: MuJoCoModel, case: Case, tol: float) -> Trajectory:
-        """All samples; see `Engine.solve`."""
-        return solve_by_projection(model, case, tol, model.details, self.corrections, own_frame(case))
-
-    def efforts(self) -> Mapping[str, MuJoCo]:
-        """By the number of Newton steps."""
-        return {label: MuJoCo(corrections) for label, corrections in EFFORTS.items()}
 
     def floor(self, case: Case) -> Floor:
         """Of `mj_kinematics` and what else a pose takes."""

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..core.drivers import JointAngle, JointDisplacement, JointDriver, PointCoordinate
+from ..core.drivers import JointDriver, PointCoordinate
 from ..core.harness.case import Case
 from ..core.harness.engine import Floor
 from ..core.joints import (
@@ -35,57 +34,35 @@ from ..core.joints import (
 from ..core.joints.base import triad, unit
 from ..core.mechanism import GROUND, Mechanism, Vector
 from ..core.topology import Branch, SpanningTree, spanning_tree
-from ..core.trajectory import Array, Trajectory
+from ..core.trajectory import Array
 from .closures import CLOSURES, ends_of, twistless
 from .conditions import Condition
 from .floors import floor_of
-from .own_frame import in_own_frame, own_frame
+from .own_frame import in_own_frame
 from .pinocchio_rows import DrivenPoint, Frame, Linear
-from .projection import EFFORTS, settings_of_newton, solve_by_projection, without_counterpart
+from .projection_engine import ProjectionEngine
 
 
-@dataclass(frozen=True)
-class Pinocchio:
-    """The engine `pinocchio`; see `Engine`. With a number of corrections, Newton makes so many; see `solve_by_projection`."""
+class Pinocchio(ProjectionEngine):
+    """The engine `pinocchio`."""
 
-    corrections: int | None = None
-    name = "pinocchio"
-    mode = "projection"
-    loop = "python"
+    name, title, joints = "pinocchio", "Pinocchio", CLOSURES
 
     @property
-    def settings(self) -> Mapping[str, Any]:
-        """What is solved and how."""
+    def described(self) -> Mapping[str, Any]:
+        """Its tree, and what closes the loops."""
         return {
             "coordinates": "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer",
             "closures": "conditions on frame placements, Jacobians and classical accelerations",
-            **settings_of_newton(self.corrections),
         }
 
-    def version(self) -> str | None:
-        """Version of Pinocchio, or None where it cannot be imported."""
-        try:
-            pin: Any = importlib.import_module("pinocchio")
-            # PyPI's package "pinocchio" is something else and has no Model; the simulator's is "pin"
-            return str(pin.__version__) if hasattr(pin, "Model") else None
-        except (Exception, SystemExit):  # a broken installation fails in many ways: a missing shared library, another numpy ABI
-            return None
-
-    def unsupported(self, case: Case) -> str | None:
-        """None, or which joint or driver has no counterpart here."""
-        return without_counterpart(case, "Pinocchio", CLOSURES, (PointCoordinate, JointAngle, JointDisplacement))
+    def version_of(self, simulator: Any) -> str | None:
+        """PyPI's package "pinocchio" is something else and has no Model; the simulator's is "pin"."""
+        return super().version_of(simulator) if hasattr(simulator, "Model") else None
 
     def build(self, case: Case) -> PinocchioModel:
         """Tree, frames and conditions of the case, at the design position."""
         return PinocchioModel(importlib.import_module("pinocchio"), in_own_frame(case))
-
-    def solve(self, model: PinocchioModel, case: Case, tol: float) -> Trajectory:
-        """Solve all samples; see `Engine.solve`."""
-        return solve_by_projection(model, case, tol, {"closures": model.closures}, self.corrections, own_frame(case))
-
-    def efforts(self) -> Mapping[str, Pinocchio]:
-        """By the number of Newton steps."""
-        return {label: Pinocchio(corrections) for label, corrections in EFFORTS.items()}
 
     def floor(self, case: Case) -> Floor:
         """Of the Jacobians and placements of joints and frames."""
@@ -226,6 +203,10 @@ class PinocchioModel:
         # numbered, because a second frame of one name would silently be the first one
         name = f"frame {self.model.nframes}"
         return Frame(self, self.model.addFrame(self.pin.Frame(name, joint, 0, placement, self.pin.FrameType.OP_FRAME)))
+
+    @property
+    def details(self) -> Mapping[str, Any]:
+        return {"closures": self.closures}
 
     def reset(self) -> None:
         self.q: Array = self.pin.neutral(self.model)

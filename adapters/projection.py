@@ -68,12 +68,6 @@ def without_counterpart(
     return None
 
 
-def settings_of_newton(corrections: int | None) -> Mapping[str, Any]:
-    """What is the same for all: how the equations are solved, and how often, where that is a setting."""
-    solver = {"linear solver": "numpy LU where the rows are square and of full rank at design, else least squares"}
-    return solver if corrections is None else {**solver, "newton_steps": corrections}
-
-
 def solve_by_projection(
     model: ProjectionModel,
     case: Case,

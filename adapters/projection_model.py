@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from ..core.trajectory import Array
@@ -13,7 +13,13 @@ class ProjectionModel(Protocol):
 
     Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of the current configuration.
     `residual` updates whatever the other methods read.
+
+    Attributes:
+        details: what a record says of it.
     """
+
+    @property
+    def details(self) -> Mapping[str, Any]: ...
 
     def reset(self) -> None:
         """Back to the design configuration."""

@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 SIMULATORS = {"mujoco", "pinocchio", "exudyn"}
 SHARED_BY_ADAPTERS = {"chains", "closures", "conditions", "floors", "jointed", "poses"}
-SHARED_BY_ADAPTERS |= {"simulation", "xml_text", "projection", "own_frame", "projection_model"}
+SHARED_BY_ADAPTERS |= {"simulation", "xml_text", "projection", "own_frame", "projection_model", "projection_engine"}
 LONGEST = 300
 
 DESCRIPTION = {"errors", "algebra", "trajectory", "joints", "drivers", "motions", "mechanism", "topology"}

@@ -196,7 +196,7 @@ def test_displacement_of_a_slider(sign):
 
 def test_a_missing_or_broken_mujoco_is_no_version(monkeypatch):
     assert adapter.MuJoCo().version()
-    monkeypatch.setattr(adapter, "mujoco", lambda: ctypes.CDLL("there is no such library"))
+    monkeypatch.setattr(adapter.importlib, "import_module", lambda name: ctypes.CDLL("there is no such library"))
     assert adapter.MuJoCo().version() is None
 
 

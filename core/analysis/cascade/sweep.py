@@ -128,7 +128,7 @@ class CascadeSweep:
                 joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}  # as they are called in a section
                 named = (name.partition(":") for name in account.redundant_rows)
                 redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
-            which = f"{len(kind.members)} components like that of {like}"
+            which = f"components like that of {like} ({len(kind.members)})"
             sizes |= {f"{name}, {which}": size for name, size in kind.model.sizes.items()}
         return {
             **counted(cascade.mechanism, unknowns, rows, redundant).details,
