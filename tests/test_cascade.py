@@ -172,7 +172,9 @@ def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
     found = CascadeSweep(Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
     assert found.solved.all(), found.message
     expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
-    assert np.abs(found.points["end"].position - expected).max() <= 1e-13
+    # every loop adds its rounding, over the sine of how far its links are from in line
+    rounding = 4.0 * loops * np.finfo(float).eps / np.abs(np.cos(turn - LEAN))
+    assert (np.abs(found.points["end"].position - expected).max(axis=1) <= rounding).all()
     (note,) = found.details["notes"]
     assert "crosses a singular pose near turn = 1.870" in note
 

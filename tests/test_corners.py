@@ -1,5 +1,7 @@
 """Corners and gaps that are narrower than a step: turned round, or told as the end of the motion, and never stepped over."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, Universal, solve
@@ -88,12 +90,12 @@ def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, 
     assert (found.solved == (turn < -start - end)).all()
 
 
-def universal_loop(pin, meet, rest):
+def universal_loop(pin, meet, rest, across=(1.0, 0.0, 0.0)):
     """A four-bar with its rod on two universals, one row more than is needed. Its crank's pivot is the origin."""
     hinges = [Revolute("pivot", "ground", "crank", ORIGIN, Z), Revolute("rest", "ground", "rocker", rest, Z)]
     ends = [
-        Universal("pin", "crank", "rod", pin, ((1.0, 0.0, 0.0), Z)),
-        Universal("end", "rod", "rocker", meet, (Z, (1.0, 0.0, 0.0))),
+        Universal("pin", "crank", "rod", pin, (across, Z)),
+        Universal("end", "rod", "rocker", meet, (Z, across)),
     ]
     bodies = [Body("crank"), Body("rod"), Body("rocker")]
     return Mechanism("loop", bodies, [*hinges, *ends], [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")])
@@ -142,6 +144,14 @@ NEARLY_KITES = {  # and nearly parallelograms: pin, end of the rod, rest of the 
 }
 
 
+def side_of_the_line(pin, rest, turn, found):
+    """By its sign on which side of the line from the pin to the rocker's pivot the rod's end is: there it stays."""
+    (x, y), cos, sin = pin, np.cos(turn), np.sin(turn)
+    across = np.stack([rest - (x * cos - y * sin), -(x * sin + y * cos)], axis=-1)
+    d = found.points["meet"].position[:, :2] - (np.array([rest, 0.0]) - across)
+    return across[:, 0] * d[:, 1] - across[:, 1] * d[:, 0]
+
+
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
 @pytest.mark.parametrize("made", [universal_loop, revolute_loop])
 @pytest.mark.parametrize("name", NEARLY_KITES)
@@ -150,10 +160,26 @@ def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
     (x, y), meet, rest, last, count = NEARLY_KITES[name]
     turn = np.linspace(0.0, last, count)
     found = solve(made((x, y, 0.0), (*meet, 0.0), (rest, 0.0, 0.0)), "turn", turn, order=0, style=style)
-    cos, sin = np.cos(turn), np.sin(turn)
-    across = np.stack([rest - (x * cos - y * sin), -(x * sin + y * cos)], axis=-1)
-    d = found.points["meet"].position[:, :2] - (np.array([rest, 0.0]) - across)
-    side = across[:, 0] * d[:, 1] - across[:, 1] * d[:, 0]  # of the line from pin to rest, on which the rod's end stays
+    side = side_of_the_line((x, y), rest, turn, found)
     assert (side[found.solved] * side[0] > 0.0).all()
     assert found.solved.all() or "there is a singular pose ahead" in found.message
     assert found.solved.sum() >= 3
+
+
+@pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
+@pytest.mark.parametrize("count", [4, 7, 8, 10, 12, 15])
+def test_a_small_loop_does_not_hide_the_corner_of_a_large_one(count, style):
+    """Its singular values are the smaller ones all the way round, but where the large one folds."""
+    x, y, rest, end = -0.35245745516404536, -0.7148047631848835, 2.802282190370843, (2.175441305403854, 0.49218148289661845)
+    large = universal_loop((x, y, 0.0), (*end, 0.0), (rest, 0.0, 0.0), (np.cos(1.345), np.sin(1.345), 0.0))
+    pin, meet = (-0.023472379164771337, -0.0056469601124647896, 0.0), (0.0017654205974588259, 0.11112362657419883, 0.0)
+    joints = [
+        Revolute("small rest", "ground", "small", (0.12433883023528294, 0.04634680743282863, 0.0), Z),
+        Distance("small rod", "crank", "small", (pin, meet)),
+    ]
+    both = replace(large, bodies=[*large.bodies, Body("small")], joints=[*large.joints, *joints])
+    turn = np.linspace(0.0, 5.0379839, count)
+    found = solve(both, "turn", turn, order=0, style=style)
+    assert found.solved.all(), found.message
+    side = side_of_the_line((x, y), rest, turn, found)
+    assert (side * side[0] > 0.0).all()

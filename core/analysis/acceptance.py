@@ -6,7 +6,7 @@ alone, joined   all that is tested, and the tolerance   -> margin    positive wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import TYPE_CHECKING
 
@@ -29,7 +29,7 @@ from .continuity import (
     TURNED,
     WORSE,
 )
-from .request import ACCEPT, BLOCKS, FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, SLOPE
+from .request import ACCEPT, BLOCKS, FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, SLOPE, by_block
 
 if TYPE_CHECKING:
     from .model import Model
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 ALONE, JOINED = ("alone_gaps", "alone"), ("joined_gaps", "joined")
 """The programs of the two tests: of lanes that know nothing of each other, and of neighbours on one way."""
+Block = tuple[Scalar, Scalar, Scalar]
+"""Of a block of the rows: sigma as estimated, that of where a lane is predicted from, how steeply it changes as far as known."""
 GAPS = GAP, MOVED, REACH = "gap", "moved", "reach"
 """Slots of the largest change of a correction, of a component of the state, and of its distance from the start."""
 
@@ -72,17 +74,24 @@ def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
     largest = maximum(sigma, largest)
     if neighbours:
         sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
-    moved, slope = read(MOVED), _slope(read)
-    found = where_larger(moved, NEGLIGIBLE, absolute(sigma - sigma_before) / moved, 0.0)
-    least = maximum(FALLS * slope, EPSILON)
-    passed = margins(read, sigma_before, turned_before, largest, maximum(before(found, slope), least) if neighbours else slope)
-    out = {MARGIN: reduce(minimum, passed.values()), LARGEST_SIGMA: largest, SLOPE: maximum(found, least)}
+    moved, blocks, slopes = read(MOVED), list[Block](), dict[str, Scalar]()
+    for which, label in zip(by_block(SIGMA, tracer.blocks), by_block(SLOPE, tracer.blocks), strict=True):
+        size, size_before, slope = read(which), read(FROM + which), _slope(read, label)
+        if neighbours:
+            size_before = before(size, size_before)
+        found = where_larger(moved, NEGLIGIBLE, absolute(size - size_before) / moved, 0.0)
+        least = maximum(FALLS * slope, EPSILON)
+        known = maximum(before(found, slope), least) if neighbours else slope
+        blocks.append((size, size_before, maximum(known, found)))
+        slopes[label] = maximum(found, least)
+    passed = margins(read, sigma_before, turned_before, largest, blocks)
+    out = {MARGIN: reduce(minimum, passed.values()), LARGEST_SIGMA: largest, **slopes}
     out = {tracer.layout.scalar(label): value for label, value in out.items()}
     return program(name, tracer.tape, out, tracer.prepared)
 
 
 def margins(
-    read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar, slope: Scalar
+    read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar, blocks: Sequence[Block]
 ) -> dict[str, Scalar]:
     """By how much a lane passes each test of a solution: it has converged, closes, agrees with the redundant rows, is on its
     branch, and continues the motion it is predicted from.
@@ -94,7 +103,7 @@ def margins(
         read: a scalar of the lane by its name.
         sigma_before, turned_before: of where it is predicted from.
         largest: the largest estimate of sigma so far.
-        slope: how steeply sigma changes, as far as known.
+        blocks: of the rows. Of one loop sigma may stay as small as it is while another's, which is larger, falls to nothing.
     """
     tol, consistent, crossing = (read(label) for label in ACCEPT)
     closure, sigma, turned = (read(label) for label in ("closure", SIGMA, ORIENTATION))
@@ -106,17 +115,27 @@ def margins(
         "on the branch": read("branch"),
         "continued": LARGEST_CORRECTION * read(MOVED) + NEGLIGIBLE - read(GAP),
         "near": LONGEST_STEP - read(REACH),
-        "as regular": (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma) + crossing,
+        "as regular": reduce(minimum, (_as_regular(size, size_before) for size, size_before, _ in blocks)) + crossing,
         "on this side": 0.5 - absolute(turned - turned_before) + crossing,
-        "regular between": sigma + sigma_before - minimum(STEEPER * slope, STEEPEST) * read(MOVED) + crossing,
+        "regular between": reduce(minimum, (_between(*block, read(MOVED)) for block in blocks)) + crossing,
         "certain": FOLLOWED * sigma * sigma - uncertain,
         "not turned by rounding": maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
     }
 
 
-def _slope(read: Callable[[str], Scalar]) -> Scalar:
-    """How steeply sigma changed so far; as much as may be, where nothing is known of that."""
-    found = read(FROM + SLOPE)
+def _as_regular(sigma: Scalar, sigma_before: Scalar) -> Scalar:
+    """Positive where none of two numbers is too many times the other."""
+    return (LARGEST_RATIO * sigma - sigma_before) * (LARGEST_RATIO * sigma_before - sigma)
+
+
+def _between(sigma: Scalar, sigma_before: Scalar, slope: Scalar, moved: Scalar) -> Scalar:
+    """Positive where sigma cannot have been zero on the way."""
+    return sigma + sigma_before - minimum(STEEPER * slope, STEEPEST) * moved
+
+
+def _slope(read: Callable[[str], Scalar], label: str) -> Scalar:
+    """How steeply sigma of a block changed so far; as much as may be, where nothing is known of that."""
+    found = read(FROM + label)
     return where_larger(found, 0.0, found, STEEPEST)
 
 
@@ -134,7 +153,9 @@ def why_refused(model: Model, lane: Array) -> str:
     def read(name: str) -> float:
         return float(lane[model.slots[name]])
 
-    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), _slope(read))
+    names = zip(by_block(SIGMA, model.blocks), by_block(SLOPE, model.blocks), strict=True)
+    blocks = [(read(name), read(FROM + name), max(_slope(read, label), read(label))) for name, label in names]
+    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), blocks)
     failed = [name for name, margin in found.items() if not margin > 0.0]
     closure, leftover, tol = (read(name) for name in ("closure", "leftover", "tolerance"))
     if not np.isfinite(closure):

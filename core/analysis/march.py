@@ -18,7 +18,7 @@ from ..program import MARGIN, Side
 from ..trajectory import Array
 from .acceptance import why_refused
 from .model import Model
-from .request import FROM, LARGEST_SIGMA, REMEMBERED, SIGMA, TIME, accept_by
+from .request import FROM, LARGEST_SIGMA, SIGMA, TIME, accept_by, remembered
 from .route import AS_THEY_ARE, Route
 
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
@@ -107,7 +107,7 @@ def arrived(model: Model, lane: Array) -> Array:
     found = lane.copy()
     for name in model.state:
         found[model.vectors[name]] = lane[model.vectors[FROM + name]]
-    for name in REMEMBERED:
+    for name in remembered(model.blocks):
         found[model.slots[name]] = lane[model.slots[FROM + name]]
     return found
 

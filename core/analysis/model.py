@@ -16,7 +16,7 @@ from ..program.llvm.compiler import available
 from ..trajectory import Array
 from . import acceptance, prediction
 from .equations.drives import drive_numbers
-from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, REMEMBERED, SIGMA, TIME, Request
+from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request, remembered
 from .structure.components import Section
 from .thread_cache import ThreadCache
 from .tracing import Tracing, ours, traced
@@ -71,6 +71,7 @@ class Model:
         sampled: the places of what is given at every sample: the time, and five numbers of each moving driver.
         geometry: the places of the numbers of all varied places.
         given: name of a vector that tells how a given body moves -> its value at rest at design.
+        blocks: of the rows (`Elimination.sigmas`).
         design: all slots of a lane that stands at the design position; NaN where the rows were chosen elsewhere.
         bound: what is made of it for a thread.
         rows: name of a motion or test -> its rows among what is kept of a sample.
@@ -80,7 +81,7 @@ class Model:
 
     def __init__(self, mechanism: Mechanism, request: Request, tracing: Tracing) -> None:
         self.mechanism, self.request = mechanism, request
-        self.selection, self.frame = tracing.selection, tracing.frame
+        self.selection, self.frame, self.blocks = tracing.selection, tracing.frame, tracing.blocks
         self.programs: Mapping[str, Program] = {program.name: program for program in tracing.programs}
         self.slots, self.vectors = tracing.slots, tracing.vectors
         self.state, self.given = tracing.state, tracing.given
@@ -129,7 +130,7 @@ class Model:
     @property
     def _tests(self) -> Sequence[str]:
         if self.request.state:  # a part of a large mechanism: whose fault it is, and what the next sample is accepted by
-            return ("closure", *REMEMBERED)
+            return ("closure", *remembered(self.blocks))
         return TESTS_OF_VARIANTS if self.request.varied else TESTS
 
     def _rows(self) -> dict[str, slice]:

@@ -22,7 +22,7 @@ from ..program import (
 )
 from ..program.executor import shifted
 from .equations.formulation import EULER_PARAMETERS
-from .request import ACCEPT, EARLIER, FROM, PREDICTED, RATE, RATE_T, REMEMBERED, TIME
+from .request import ACCEPT, EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, remembered
 
 if TYPE_CHECKING:
     from .programs import Tracer
@@ -39,7 +39,7 @@ def carried(tracer: Tracer) -> list[tuple[int, int]]:
     sizes |= {PREDICTED + name: count for name, count in sizes.items()}
     sizes |= {RATE: tracer.unknowns, RATE_T: tracer.unknowns}
     pairs = [(tracer.layout.scalar(FROM + TIME), tracer.layout.scalar(EARLIER + TIME))]
-    told = TIME, *REMEMBERED
+    told = TIME, *remembered(tracer.blocks)
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in told]
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(name)) for name in ACCEPT]
     for name, count in sizes.items():

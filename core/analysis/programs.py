@@ -29,13 +29,14 @@ from ..program import (
     minimum,
     program,
 )
+from .continuity import EPSILON
 from .equations.carried import motion_of_frame, motion_of_point
 from .equations.cartesian import Cartesian, Given
 from .equations.constraints import Style, constraints, frames
 from .equations.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
 from .equations.geometry import placed, places
 from .equations.relative import Relative
-from .request import BLOCKS, GIVEN, ORIENTATION, RATE, RATE_T, SIGMA, Layout, Request
+from .request import BLOCKS, FIRM, GIVEN, ORIENTATION, RATE, RATE_T, SIGMA, Layout, Request, by_block
 from .structure.components import Section, select_section
 from .structure.freedom import select_rows
 
@@ -110,14 +111,24 @@ class Tracer:
         """The rows at the state, factored: to iterate, and where the iteration ends for the rates."""
         return Elimination(self._kept(self.formulation.rows(self.at)))
 
+    @property
+    def blocks(self) -> int:
+        """Blocks of the rows, each with an estimate of its own of how singular it is."""
+        return len(self._factor.sigmas)
+
     def newton(self) -> Program:
         """One Newton-Raphson iteration of (28), Phi = 0: (29) Phi_Pi dPi = -Phi."""
         phi = self._kept(self.formulation.phi(self.at))
         out: dict[int, Scalar] = {
-            self.layout.scalar("residual"): largest(phi),
+            # iterations end by this: a pose is off by the residual over sigma, and the next one by the square of that
+            self.layout.scalar("residual"): largest(phi) * maximum(1.0, FIRM / maximum(self._factor.sigma, EPSILON)),
             self.layout.scalar(SIGMA): self._factor.sigma,
+            **{
+                self.layout.scalar(name): each for name, each in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)
+            },
             self.layout.scalar(ORIENTATION): self._factor.orientation,
         }
+        out |= {self.layout.scalar(name): x for name, x in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)}
         step = self._factor.solve(phi)
         self.store_state(out, self.formulation.retract(self.at, [-x for x in step]))
         return program("newton", self.tape, out, self.prepared)

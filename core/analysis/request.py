@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 from .equations.constraints import Style
 
-# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition).
-LAST_ITERATION = 1e-9
+# Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16 times the condition), where
+# sigma is at least `FIRM`; where it is less, from a residual below as many times less.
+LAST_ITERATION, FIRM = 1e-9, 1.0 / 16.0
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,15 @@ SLOPE = "slope"
 """The slot of how steeply that estimate changes, by what the pose does; zero where nothing is known of that."""
 
 
-REMEMBERED = SIGMA, ORIENTATION, LARGEST_SIGMA, SLOPE
-"""The slots that tests know of what a lane is predicted from."""
+def by_block(label: str, blocks: int) -> Sequence[str]:
+    """The slots of the estimate, or of its slope, of each block of the rows (`Elimination.sigmas`)."""
+    return [label] if blocks == 1 else [f"{label} {k}" for k in range(blocks)]
+
+
+def remembered(blocks: int) -> Sequence[str]:
+    """The slots that tests know of what a lane is predicted from, where the rows fall into so many blocks."""
+    return [*dict.fromkeys((SIGMA, ORIENTATION, LARGEST_SIGMA, *by_block(SIGMA, blocks), *by_block(SLOPE, blocks)))]
+
 
 ACCEPT = ("tolerance", "consistent", "crossing")
 """The slots that a lane is accepted by."""

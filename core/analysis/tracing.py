@@ -40,6 +40,7 @@ class Tracing:
         carried, continued: slots of a solved lane, and of what the lanes after it are predicted from, or continued.
         prepared: slots of what depends on the geometry alone.
         behind: by how many groups of lanes those after them are extrapolated.
+        blocks: of the rows (`Elimination.sigmas`).
     """
 
     programs: Sequence[Program]
@@ -52,6 +53,7 @@ class Tracing:
     continued: Sequence[tuple[int, int]]
     prepared: Sequence[int]
     behind: int
+    blocks: int
     selection: Selection
     frame: Frames
 
@@ -117,6 +119,7 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None, lane
         continued,
         tracer.prepared.slots,
         groups_behind(lanes),
+        tracer.blocks,
         tracer.selection,
         tracer.frame,
     )

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from operator import add, mul
 
 import numpy as np
@@ -57,6 +57,8 @@ class Elimination:
     def __init__(self, rows: Sequence[Mapping[int, Scalar]]) -> None:
         self.n = len(rows)
         self.pivots: list[Scalar] = []
+        self._alone: list[tuple[int, Scalar]] = []  # traced pivots of no core, and their rows
+        self._block_of_row: dict[int, int] = {}
         entries = [dict(row) for row in rows]
         self._sparse = self._eliminate_sparse(entries)
         done_rows = {pivot.row for pivot in self._sparse}
@@ -67,14 +69,23 @@ class Elimination:
 
     @property
     def sigma(self) -> Scalar:
-        """An estimate of the smallest singular value, at most one.
+        """An estimate of the smallest singular value, at most one: the least of all blocks."""
+        return reduce(minimum, self.sigmas)
+
+    @cached_property
+    def sigmas(self) -> Sequence[Scalar]:
+        """Likewise of each block that is not constant, or one where all are; at most one.
 
         It is the least stretch of the cores' upper triangles, and no more than any pivot. The smallest pivot alone may stay where
         it is while the matrix becomes singular: two rows of small pivots, tied by a large entry. Lower triangles hold no more than
         ones, and add little.
         """
-        pivots = (absolute(x) for x in self.pivots)
-        return reduce(minimum, (core.least_stretch for core in self._cores), reduce(minimum, pivots, 1.0))
+        found = dict[int, Scalar]()
+        sizes = [(row, absolute(x)) for row, x in self._alone] + [(core.rows[0], core.least_stretch) for core in self._cores]
+        for row, size in sizes:
+            block = self._block_of_row[row]
+            found[block] = minimum(found.get(block, 1.0), size)
+        return [*found.values()] or [1.0]
 
     @property
     def orientation(self) -> Scalar:
@@ -87,7 +98,7 @@ class Elimination:
         return sum((2.0**k * digit for k, digit in enumerate(digits)), 0.0)
 
     def _signs(self) -> Iterator[Scalar]:
-        for x in self.pivots[: len(self.pivots) - sum(len(core.rows) for core in self._cores)]:
+        for _, x in self._alone:
             yield _sign(x)
         for core in self._cores:
             exchanged = (where_larger(x, y, -1.0, 1.0) for step in core.steps for _, x, y in step.exchanges)
@@ -100,7 +111,7 @@ class Elimination:
 
     def _eliminate_sparse(self, entries: list[dict[int, Scalar]]) -> list[_Pivot]:
         rows, steps = set(range(self.n)), list[_Pivot]()
-        block_of_row, block_of_column = dict[int, int](), dict[int, int]()
+        block_of_row, block_of_column = self._block_of_row, dict[int, int]()
         for k, (block_rows, block_columns) in enumerate(_blocks(entries, range(self.n))):
             block_of_row |= dict.fromkeys(block_rows, k)
             block_of_column |= dict.fromkeys(block_columns, k)
@@ -112,6 +123,7 @@ class Elimination:
             i, j = found
             if isinstance(entries[i][j], Traced):
                 self.pivots.append(entries[i][j])
+                self._alone.append((i, entries[i][j]))
             inverse = 1.0 / entries[i].pop(j)
             rest = tuple(entries[i].items())
             multipliers = list[tuple[int, Scalar]]()

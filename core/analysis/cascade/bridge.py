@@ -16,8 +16,8 @@ from .cascade import Lanes
 
 # Nothing is interpolated here: it is enough to see that there is one curve, and other assemblies are farther off.
 SMOOTH = 1e-7
-# Number of the first of the eight that is beyond, and halvings of a step to one of them.
-BEYOND, PARTS = 4, 8
+# Number of the first of the eight that is beyond, halvings of a step to one of them, and how many parts it is gone in at most.
+BEYOND, HALVED, MOST = 4, 8, 64
 # The last pose before is followed to where rounding leaves rates uncertain by a hundredth: itself by this.
 NEARLY = 1e-7
 
@@ -61,8 +61,8 @@ def _eight(lanes: Lanes, path: Path, start: float, times: Array, tol: float) -> 
 
 def _reach(lanes: Lanes, path: Path, here: float, time: float) -> bool:
     """Solve at a time as lane 0, by parts of the step where it must be."""
-    for _ in range(PARTS):
-        parts: Array = here + (time - here) * 0.5 ** np.arange(0.0, PARTS)
+    for _ in range(MOST):
+        parts: Array = here + (time - here) * 0.5 ** np.arange(0.0, HALVED)
         part = longest(lanes.attempt(parts, path))
         if part is None:
             return False
