@@ -37,7 +37,8 @@ class Frame:
 
     @property
     def jacobian(self) -> Array:
-        return self.of.pin.getFrameJacobian(self.of.model, self.of.data, self.index, self.of.axes)
+        # a matrix of one column is given as a vector
+        return self.of.pin.getFrameJacobian(self.of.model, self.of.data, self.index, self.of.axes).reshape(6, -1)
 
     @property
     def velocity(self) -> Array:

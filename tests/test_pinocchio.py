@@ -23,6 +23,7 @@ from kincheck.core import (
     Revolute,
     Spherical,
     Translational,
+    Universal,
 )
 from kincheck.core.drivers import Driver
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
@@ -230,6 +231,18 @@ def test_other_drivers_hold_their_design_value(hold: Driver) -> None:
     mechanism = Mechanism("arm", [Body("upper"), Body("lower")], joints, [Point("tip", "lower", tip)], drivers)
     found = solved(mechanism, turn).points["tip"]
     np.testing.assert_allclose(found.position, rotation((0.0, 0.0, 1.0), turn) @ tip, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("second", [Revolute, Spherical, Universal])
+def test_a_door_on_two_hinges(second: type[Joint]) -> None:
+    """A tree of one freedom: of its Jacobians of one column Pinocchio makes vectors."""
+    z, top = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
+    how = {Revolute: (z,), Spherical: (), Universal: ((z, (1.0, 0.0, 0.0)),)}[second]
+    joints = [Revolute("lower", GROUND, "door", (0.0, 0.0, 0.0), z), second("upper", GROUND, "door", top, *how)]
+    handle, turn = (0.8, 0.0, 0.5), np.linspace(-1.0, 2.0, 7)
+    mechanism = Mechanism("door", [Body("door")], joints, [Point("handle", "door", handle)], [JointAngle("turn", "lower")])
+    found = solved(mechanism, turn).points["handle"]
+    np.testing.assert_allclose(found.position, rotation(z, turn) @ handle, rtol=0, atol=1e-14)
 
 
 @dataclass(frozen=True)
