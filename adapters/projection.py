@@ -107,6 +107,8 @@ class Walk:
         jacobian = model.jacobian()
         left, singular, _ = np.linalg.svd(jacobian)
         self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
+        joints = jacobian[~np.any(model.driver_columns(), axis=1)]
+        self.dof = jacobian.shape[1] - (int(np.linalg.matrix_rank(joints, tol=RANK_TOLERANCE * singular[0])) if len(joints) else 0)
         self.independent = left[:, : self.rank].T  # sums of rows that say all
         self.square = jacobian.shape == (self.rank, self.rank)
         self.rows, self.unknowns = jacobian.shape
@@ -254,7 +256,14 @@ class Walk:
         unit = self.frame.unit
         position, velocity, acceleration = self.frame.back(motion[0]), unit * motion[1], unit * motion[2]
         moves = {name: PointMotion(position[:, k], velocity[:, k], acceleration[:, k]) for k, name in enumerate(points)}
-        facts = {"rank": self.rank, "unknowns": self.unknowns, "length_unit": unit, "origin": [*self.frame.origin], **details}
+        facts = {
+            "rank": self.rank,
+            "dof": self.dof,
+            "unknowns": self.unknowns,
+            "length_unit": unit,
+            "origin": [*self.frame.origin],
+            **details,
+        }
         return Trajectory(moves, solved, iterations, largest_found(unit * residual[solved]), "; ".join(messages), facts)
 
 

@@ -154,3 +154,24 @@ def test_a_closed_standard_output_has_nobody_to_read_it(tmp_path):
     done = subprocess.run([sys.executable, "-c", code, "run", "rssr", "--engine", "native", "--json", str(file)], check=False)
     assert done.returncode == 0
     assert len(from_json(file.read_bytes()).records) == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes a pipe as a shell does")
+@pytest.mark.parametrize("command", [("list",), ("list", "--joints"), ("run", "rssr", "--engine", "native"), ("explain", "rssr")])
+def test_a_reader_that_has_gone_is_no_failure(command):
+    """As for `kincheck list | head`, whose head has what it wanted."""
+    read, write = os.pipe()
+    os.close(read)
+    code = "import sys; from kincheck.core.harness.cli import main; sys.exit(main(sys.argv[1:]))"
+    with os.fdopen(write, "wb") as gone:
+        done = subprocess.run([sys.executable, "-c", code, *command], stdout=gone, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 0
+    assert all(line.startswith("[") for line in done.stderr.splitlines()), done.stderr  # progress, and no complaint
+
+
+@pytest.mark.parametrize("option", ["--junit", "--markdown"])
+def test_standard_output_takes_json_alone(kincheck_main, capsys, option, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert kincheck_main("run", "crank", option, "-", engines=[RIGHT]) == 2
+    assert f"{option} -: standard output takes the document of --json alone" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

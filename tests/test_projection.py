@@ -92,7 +92,9 @@ def test_freedom_that_is_left_is_refused():
 def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
     """No step between samples says how small a part of one may be."""
     case = replace(CASE, sweep=Sweep("turn", np.array([0.5, 0.5])))
-    assert solve_by_projection(Crank(lambda c: 1.0), case, 1e-12).solved.all()
+    found = solve_by_projection(Crank(lambda c: 1.0), case, 1e-12)
+    assert found.solved.all()
+    assert (found.details["rank"], found.details["dof"], found.details["unknowns"]) == (2, 1, 2)
     jumps = solve_by_projection(Crank(lambda c: float(c > 0.25)), case, 1e-12)
     assert not jumps.solved.any()
     assert "no sample reached on this side" in jumps.message

@@ -141,6 +141,8 @@ def test_a_run_is_not_taken_from_a_process_that_is_at_it(path):
             store.connection.execute("UPDATE runs SET owner = ?", [theirs])
             assert store.resume_run("same") is None
             other.kill()
+            os.waitid(os.P_PID, other.pid, os.WEXITED | os.WNOWAIT)  # it has ended, and nobody has asked how
+            assert not alive(theirs)
         assert not alive(theirs)
         assert store.resume_run("same").id == run_number
         # the number of a process is given again; when it began is not

@@ -32,9 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # argparse has said why
         return int(end.code or 0)
     try:
-        status = int(options.do(options, house()))
-        sys.stdout.flush()
-        return status
+        return _printed(int(options.do(options, house())))
     except KincheckError as error:
         complain(str(error).splitlines())
     except KeyboardInterrupt:
@@ -65,9 +63,19 @@ def _be_able_to_print() -> None:
             stream.reconfigure(errors="replace")
 
 
+def _printed(status: int) -> int:
+    """The status of a command that has come to its end, when all it said is out; that its reader has gone is no failure."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _print_no_more()
+    return status
+
+
 def _print_no_more() -> None:
-    """Let what is left for standard output go to nowhere: the interpreter would complain of it at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    from .printing import print_no_more
+
+    print_no_more(sys.stdout)
 
 
 def house() -> House:

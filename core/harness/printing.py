@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import IO, Any, TextIO
 
 import msgspec
 from rich.console import Console
@@ -18,9 +19,22 @@ from .writing import to_standard_output, write
 LOG_WIDTH = 200
 
 
+class _Console(Console):
+    """One whose reader may go: what is left goes nowhere, and the command on, whose status is that of its results."""
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+        print_no_more(self.file)
+
+
+def print_no_more(file: IO[str]) -> None:
+    """Let what is left for a stream go to nowhere: the interpreter would complain of it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), file.fileno())
+
+
 def console(file: TextIO) -> Console:
     """Where to print text as it is: names may have square brackets or colons, which rich takes for colours and pictures."""
-    return Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False, emoji=False)
+    return _Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False, emoji=False)
 
 
 def page(json: str | None) -> Console:

@@ -83,7 +83,9 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
         if name in (None, "-"):
             continue
         path = Path(name)
-        if path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+        if path == Path("-"):
+            found.append(f"{option} -: standard output takes the document of --json alone; give a file")
+        elif path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
             found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
         elif path.exists() and not path.is_file():
             continue  # a pipe or a device takes what several have to say

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import Any
 
 from ..console import how_to_install
@@ -22,22 +23,24 @@ def _list(options: argparse.Namespace, house: House) -> int:
     from ..apart import versions
     from ..catalogue import catalogue, output_catalogue
     from ..circumstances import truth_of
+    from ..printing import page
 
+    tell = partial(page(None).print, soft_wrap=True)
     if options.joints or options.outputs:
         listed = [*(catalogue() if options.joints else ()), *(output_catalogue() if options.outputs else ())]
-        print(*listed, sep="\n")
+        tell(*listed, sep="\n")
         return Status.WITHIN
-    print("cases:")
+    tell("cases:")
     names = house.cases()
     for name in names:
         case = house.case(name)
-        print(f"  {name:{max(map(len, names))}}  {str(truth_of(case)).replace('_', ' '):16}  {case.source}")
-    print("engines:")
+        tell(f"  {name:{max(map(len, names))}}  {str(truth_of(case)).replace('_', ' '):16}  {case.source}")
+    tell("engines:")
     engines = [*map(house.engine, house.engines), *(house.engine(name, "simulate") for name in house.simulations)]
     width = max(len(engine.name) for engine in engines)
     for engine, version in zip(engines, versions(engines), strict=True):
         name = engine.name
         missing = f"not installed, or cannot be imported: {how_to_install(name)}; kincheck doctor says which"
         state = missing if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
-        print(f"  {name:{width}}  {state}")
+        tell(f"  {name:{width}}  {state}")
     return Status.WITHIN

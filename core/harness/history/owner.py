@@ -29,9 +29,11 @@ def alive(owner: str) -> bool:
 
 
 def _begun(number: int) -> str:
-    """Clock ticks from the start of the system to that of the process; empty where there is no /proc."""
+    """Clock ticks from the start of the system to that of the process; empty where there is no /proc, or it has ended and nobody
+    has asked how (in containers nobody may)."""
     try:
         # the second field is the program's name in brackets, and may hold anything
-        return Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()[19]
-    except (OSError, IndexError):
+        state, *fields = Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
+        return "" if state in "ZX" else fields[18]
+    except (OSError, ValueError, IndexError):
         return ""
