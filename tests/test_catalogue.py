@@ -1,12 +1,16 @@
 """The list of types is that of the registries, and its keys are those that case files take."""
 
+import re
 from dataclasses import dataclass
 
+import msgspec
 from kincheck.core.errors import MechanismError
 from kincheck.core.harness import cli
 from kincheck.core.harness.catalogue import catalogue, rows_of
+from kincheck.core.harness.reading import schema
 from kincheck.core.harness.reading.driving import DRIVERS
 from kincheck.core.harness.reading.schema import driver_keys, joint_keys, motion_keys
+from kincheck.core.harness.study import vary
 from kincheck.core.joints import Coupler, Joint, Spherical
 from kincheck.core.joints.base import directions
 from kincheck.core.motions import Motion
@@ -75,3 +79,16 @@ def test_a_new_type_is_listed_even_if_its_rows_are_not_known():
         assert "? rows  ? free" in lines()[Picky.type]
     finally:
         del Joint.registry[Picky.type]
+
+
+def test_every_key_of_a_file_is_in_the_reference_that_is_printed(capsys):
+    """Read off the structures that take them; what is optional stands in brackets."""
+    assert cli.main(["list", "--schema"]) == 0
+    said = capsys.readouterr().out
+    structures = [each for room in (schema, vary) for each in vars(room).values() if isinstance(each, type)]
+    keys = [each for each in structures if issubclass(each, msgspec.Struct) and each is not msgspec.Struct]
+    assert len(keys) >= 8
+    for name in [name for each in keys for name in msgspec.structs.fields(each)]:
+        assert re.search(rf"[\[( ]{name.encode_name}\b", said), name.encode_name
+    assert "kincheck-case/1" in said
+    assert "kincheck-vary/1" in said

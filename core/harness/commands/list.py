@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -14,20 +15,22 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     listing: argparse.ArgumentParser = commands.add_parser("list", help="list cases and engines", description=_list.__doc__)
     listing.set_defaults(do=_list)
+    listing.add_argument("--schema", action="store_true", help="list the keys of a case file, and of a file of variations")
     listing.add_argument("--joints", action="store_true", help="list the types a case file can name: joints, drivers, motions")
     listing.add_argument("--outputs", action="store_true", help="list the types of outputs a case file can name, with their signs")
 
 
 def _list(options: argparse.Namespace, house: House) -> int:
-    """List the built-in cases with truth and source, and the engines with their versions; or the types of joints or of outputs."""
+    """List the built-in cases with truth and source, and the engines with their versions; or what a file may hold."""
     from ..apart import versions
     from ..catalogue import catalogue, output_catalogue
     from ..circumstances import truth_of
     from ..printing import page
 
     tell = partial(page(None).print, soft_wrap=True)
-    if options.joints or options.outputs:
-        listed = [*(catalogue() if options.joints else ()), *(output_catalogue() if options.outputs else ())]
+    if options.schema or options.joints or options.outputs:
+        listed = [*(_references() if options.schema else ())]
+        listed += [*(catalogue() if options.joints else ()), *(output_catalogue() if options.outputs else ())]
         tell(*listed, sep="\n")
         return Status.WITHIN
     tell("cases:")
@@ -44,3 +47,13 @@ def _list(options: argparse.Namespace, house: House) -> int:
         state = missing if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
         tell(f"  {name:{width}}  {state}")
     return Status.WITHIN
+
+
+def _references() -> Iterator[str]:
+    """What the modules that read these files say of their keys."""
+    from ..reading import schema
+    from ..study import vary
+
+    for module in (schema, vary):
+        what, _, keys = (module.__doc__ or "").partition("Reference. ")
+        yield f"{what.splitlines()[0]}\n\n{keys}"
