@@ -32,3 +32,29 @@ def test_a_gear_leaves_a_large_mechanism_a_sparse_system():
     s, c, o = np.sin(-2.0 * turn), np.cos(-2.0 * turn), 0.0 * turn
     assert np.abs(found.points["rim"].position - np.column_stack([c - 2.0, s, o])).max() <= 1e-14
     assert np.abs(found.points["rim"].velocity - -2.0 * np.column_stack([-s, c, o])).max() <= 1e-13
+
+
+@pytest.mark.parametrize(("rod", "end"), [(1.000001, 2.0), (0.99999, 1.098176)])
+def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, end):
+    """On the driven crank of a ring a kite on its side, on hinges: three rows more than are needed."""
+    ground, start, turn = 1.2, -1.1, np.linspace(0.0, 1.6, 9)
+    pin = np.stack([np.cos(start + turn), np.sin(start + turn)], axis=-1)
+    d = np.array([ground, 0.0]) - pin
+    square = (d * d).sum(axis=-1)
+    along = 0.5 * (square + rod**2 - ground**2) / square
+    off = np.sqrt(np.maximum(rod**2 / square - along**2, 0.0))
+    meet = pin + along[:, None] * d + off[:, None] * np.stack([-d[:, 1], d[:, 0]], axis=-1)
+    at = (*meet[0].tolist(), 0.0)
+    hinges = [
+        Revolute("rest", "ground", "rocker", (ground, 0.0, 0.0), Z),
+        Revolute("pin", "crank0", "rod", (*pin[0].tolist(), 0.0), Z),
+        Revolute("end", "rod", "rocker", at, Z),
+    ]
+    whole = ring(25)
+    made = replace(whole, bodies=[*whole.bodies, Body("rod"), Body("rocker")], joints=[*whole.joints, *hinges])
+    found = solve(replace(made, points=[Point("meet", "rocker", at)]), "turn", turn)
+    assert "factor_entries" in found.details
+    assert found.solved.sum() >= 6
+    assert not found.solved[turn > end].any()
+    assert np.abs(found.points["meet"].position[:, :2] - meet)[found.solved].max() < 1e-12
+    assert found.solved.all() or "singular pose ahead" in found.message

@@ -18,7 +18,7 @@ from ..continuity import EPSILON, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, 
 from ..interpolation import lagrange
 from ..request import CONSISTENT
 from ..structure.factors import PIVOT_THRESHOLD
-from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
+from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance, regular_between
 from .tables import SparseTables
 
 if TYPE_CHECKING:
@@ -91,6 +91,10 @@ class Batch:
             taylor = self._taylor(past, _past(here.rates, rates), _past(here.accelerations, accelerations), times - earlier)
             gap, step = distance(state - taylor, self._scale), distance(state - past, self._scale)
             sure &= (gap <= LARGEST_CORRECTION * step + NEGLIGIBLE) & (step <= LONGEST_STEP)
+            sigmas = np.zeros((self.width, 0))
+            if len(self._dropped):
+                sigmas = self._blocks.sigmas(tables["entries"].take(self._solved, axis=0))
+                sure &= regular_between(sigmas, np.vstack([here.sigmas, sigmas[:-1]]), step)
             small = tables.growth <= GROWTH
         accepted = int(np.logical_and.accumulate((sure & small)[:count]).sum())
         self.outgrown = accepted < count and bool(sure[accepted])
@@ -99,7 +103,7 @@ class Batch:
                 *(float(times[k]), float(earlier[k])),
                 *(state[:, k], taylor[:, k], rates[:, k], accelerations[:, k]),
                 *(iterations, float(closure[k]), float(leftover[k]), float(branch[k])),
-                *(float(pivot[k]), here.largest_pivot, here.orientation),
+                *(float(pivot[k]), here.largest_pivot, here.orientation, sigmas[k]),
             )
             for k in range(accepted)
         ]

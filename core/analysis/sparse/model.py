@@ -35,7 +35,7 @@ from .batch import Batch
 from .elements import Elements
 from .orientation import Blocks
 from .row_selection import Jacobian
-from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance
+from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance, regular_between
 from .turning import Turn
 
 FEW = 5
@@ -156,12 +156,17 @@ class SparseModel:
         rates, accelerations = self._motion()
         now = replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
         pivot, orientation = self._pivots()
+        now = replace(now, sigmas=self._sigmas())
         return replace(now, pivot=pivot, largest_pivot=max(at.largest_pivot, pivot), orientation=orientation)
 
     def _pivots(self) -> tuple[float, bytes]:
         """The smallest in size, and the orientation, where all was last factored."""
         pivot, entries = self.factors.signed_pivot, self.elements.entries[self.solved]
         return abs(pivot), self.blocks.orientation(entries[:, None], np.array([pivot]))[0]
+
+    def _sigmas(self) -> Array:
+        """Those of the blocks where all was last evaluated; none where all rows are solved."""
+        return self.blocks.sigmas(self.elements.entries[self.solved][:, None])[0] if len(self.dropped) else np.zeros(0)
 
     def _factor(self) -> None:
         try:
@@ -232,7 +237,10 @@ class SparseModel:
         limit = FOLLOWED if pivot < here.pivot else TURNED_BY_PIVOTS
         if orientation != here.orientation or limit * pivot**2 <= WORSE_BY_PIVOTS * largest * max(closure, EPSILON):
             raise FailedError(f"there is a singular pose ahead, smallest pivot {pivot:.3g}")
-        tests = closure, leftover, branch, pivot, largest, orientation
+        sigmas = self._sigmas()
+        if len(self.dropped) and not regular_between(sigmas[None], here.sigmas[None], np.array([reach])).all():
+            raise FailedError(f"there may be a singular pose ahead, smallest singular value of a part {sigmas.min():.3g}")
+        tests = closure, leftover, branch, pivot, largest, orientation, sigmas
         return Stand(time, here.time, state, taylor, rates, accelerations, iterations, *tests)
 
     def _tested(self, closure: float, tol: float, *, done: bool) -> tuple[float, float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -45,13 +46,25 @@ class Blocks:
             values: of the entries, in the order of the pattern, shape (entries, poses).
             whole: of the sign of the whole determinant, from which that of the largest block follows, shape (poses,).
         """
-        poses = len(whole)
-        signs = [np.ones((poses, 1))]
-        for size, entries, at in self._groups:
-            dense = np.zeros((poses, at.max() // (size * size) + 1, size, size))
-            dense.reshape(poses, -1)[:, at] = values.take(entries, axis=0).T
-            # most blocks are of one row
-            signs.append(np.sign(dense[..., 0, 0]) if size == 1 else np.linalg.slogdet(dense)[0])
+        signs = [np.ones((len(whole), 1))]
+        # most blocks are of one row
+        signs += [np.sign(each[..., 0, 0]) if each.shape[-1] == 1 else np.linalg.slogdet(each)[0] for each in self._dense(values)]
         small = np.concatenate(signs, axis=1)
         found = np.column_stack([small, np.sign(whole) * small.prod(axis=1)])
         return [each.tobytes() for each in found.astype(np.int8)]
+
+    def sigmas(self, values: Array) -> Array:
+        """Of several poses the smallest singular value of each block but the largest, shape (poses, blocks); none is infinite."""
+        found = [np.full((values.shape[1], 1), np.inf)]
+        for each in self._dense(values):
+            sound = np.where(np.isfinite(each).all(axis=(2, 3), keepdims=True), each, 0.0)  # what is no number is singular
+            found.append(np.abs(sound[..., 0, 0]) if each.shape[-1] == 1 else np.linalg.svd(sound, compute_uv=False)[..., -1])
+        return np.concatenate(found, axis=1)
+
+    def _dense(self, values: Array) -> Iterator[Array]:
+        """The blocks of each size, shape (poses, blocks, size, size)."""
+        poses = values.shape[1]
+        for size, entries, at in self._groups:
+            dense = np.zeros((poses, at.max() // (size * size) + 1, size, size))
+            dense.reshape(poses, -1)[:, at] = values.take(entries, axis=0).T
+            yield dense

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...trajectory import Array
+from ..continuity import STEEPEST
 
 # An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.
 CONTRACTS = 1e-2
@@ -24,6 +26,7 @@ class Stand:
         state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
         rates, accelerations: of the unknowns.
         closure, leftover, branch: largest residual of the rows solved and of the redundant ones, smallest branch test.
+        sigmas: of the blocks (`Blocks.sigmas`), where there are more rows than are solved.
         pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see `Blocks`.
     """
 
@@ -40,6 +43,14 @@ class Stand:
     pivot: float = 0.0
     largest_pivot: float = 0.0
     orientation: bytes = b""
+    sigmas: Array = field(default_factory=lambda: np.zeros(0))
+
+
+def regular_between(sigmas: Array, sigmas_before: Array, moved: Array) -> NDArray[np.bool_]:
+    """Whether no block can have been singular on the way, shape (poses,). The signs of determinants do not say so where rows are
+    chosen from more: they change by the choice too.
+    """
+    return np.all(sigmas + sigmas_before > STEEPEST * moved[:, None], axis=1)
 
 
 def distance(change: Array, scale: Array) -> Array:
