@@ -26,7 +26,7 @@ LARGEST_RATIO = 16.0
 # Nor one in which sigma could have been zero: it is taken to change, by what the pose does [Euler parameters, parts of the
 # mechanism's size], by no more than the first times what it did or does, which is forgotten by the second from step to step, and
 # never by more than the third: the angle between two bodies changes by up to four times what the Euler parameters of each do. It
-# is asked of every block of the rows, for a small loop's sigma hides that of a large one beside it (11 of 5,000 sweeps).
+# is asked of every block of the rows, for a small loop's sigma hides that of a large one beside it (8 of 2,500 sweeps).
 # The sign of a determinant says nothing of a gap behind which the motion seems to go on; and where there are more rows than are
 # solved it changes by their choice too, and not where both are within a step. Of 600 coarse sweeps of kites with redundant rows
 # that are off by less than 1e-4, 79 were found on their other assembly without this, four where all was forgotten at once, none of
