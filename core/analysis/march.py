@@ -1,13 +1,15 @@
 """March from the design position outwards, along the samples of a path on both sides of it.
 
-The executor follows each side as far as sample after sample continues the motion. A step that fails is divided, so a coarse grid
-costs steps; where no part of a step succeeds the motion ends, and a message says where and why.
+The executor follows each side as far as sample after sample continues the motion. A step that fails is gone in parts, so a coarse
+grid costs steps: in equal ones, which the executor follows by itself, or else one by one, as long as may be. Where no part of a
+step succeeds the motion ends, and a message says where and why.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -21,6 +23,11 @@ from .model import Model
 from .request import FROM, LARGEST_SIGMA, SIGMA, TIME, accept_by, remembered
 from .route import AS_THEY_ARE, Route
 
+# A step that fails is gone in so many equal parts, or in more where that fails: each takes a tenth of a microsecond, and a hundred
+# where it is looked for by itself. They are kept ready for sweeps of up to so many parts: longer ones are seldom coarse.
+FINER, ROOM = (8, 64), 4096
+# So many steps are gone in parts before the next is tried whole; twice as many where that fails each time.
+FEW = 4
 # A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
 # passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
 HALVINGS = 40
@@ -35,14 +42,15 @@ class March(NamedTuple):
 
     Attributes:
         kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not reached.
-        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest estimate of sigma.
+        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest estimate of sigma; None where steps
+            failed.
         solved: shape (n,).
         ends: one for each side that ended before its last sample.
         visited: by sample, all slots of a lane that stands there and goes on from it; those asked for.
     """
 
     kept: Array
-    worst: Sequence[float]
+    worst: Sequence[float] | None
     solved: NDArray[np.bool_]
     ends: tuple[End, ...]
     visited: Mapping[int, Array] = MappingProxyType({})
@@ -121,6 +129,30 @@ def longest(margins: Array) -> int | None:
     return int(good[0]) if len(good) else None
 
 
+class Grid:
+    """The samples of a route, bound to lanes of this thread, or as many more as make equal parts of the steps between them.
+
+    Attributes:
+        parts: how many.
+        sides, track: see `Side` and `Track`.
+    """
+
+    def __init__(self, route: Route, start: Array, parts: int) -> None:
+        self.parts, self.sides = parts, route.divided(parts)
+        n = parts * len(route.path.times)
+        self.track = route.model.executor(route.lanes).track(self.sides, start[route.model.ahead], n)
+
+    def columns(self, side: int, at: int, stop: int) -> NDArray[np.intp]:
+        """Of samples of a side among all that are kept."""
+        first = self.sides[side]
+        return first.first + first.step * (self.parts * np.arange(at + 1, stop + 1) - 1)
+
+    @cached_property
+    def kept(self) -> Array:
+        """What is kept of all its samples, again and again in the same memory."""
+        return self.track.begin()
+
+
 class Marcher:
     """A route bound to lanes of this thread, to be gone along again and again."""
 
@@ -129,15 +161,21 @@ class Marcher:
         self.start = start.copy()
         for name, value in tolerances.items():
             self.start[self.slots[name]] = value
-        self.executor = self.model.executor(route.lanes)
         self.every = np.ones(len(route.path.times), dtype=np.bool_)
-        self.track = self.executor.track(route.sides, self.start[self.model.ahead], len(self.every))
-        self.counts = [side.count for side in route.sides]
+        self.grid = Grid(route, self.start, 1)
+        self.track = self.grid.track
+        self.counts = [side.count for side in self.grid.sides]
+        self.small = [self.model.ahead.index(self.slots[FROM + name]) for name in (SIGMA, LARGEST_SIGMA)]
+
+    @cached_property
+    def finer(self) -> Sequence[Grid]:
+        """Grids of parts of the steps."""
+        return [Grid(self.route, self.start, parts) for parts in FINER if parts * len(self.every) <= ROOM]
 
     def run(self, visit: Collection[int] = (), low: float = 0.0) -> March:
         """See `march`."""
         if self.model.geometry:  # the lanes know their variant
-            self.executor.put(range(len(self.start)), self.start[:, None])
+            self.route.model.executor(self.route.lanes).put(range(len(self.start)), self.start[:, None])
         self.kept, self.solved = self.track.begin(), self.every.copy()
         self.visit, self.visited = visit, dict[int, Array]()
         self.low = low if self.model.selection.dropped else 0.0
@@ -149,30 +187,56 @@ class Marcher:
         del self.kept, self.solved  # they are whose they are given to
         if back is not AS_THEY_ARE:
             kept, solved = kept[:, back], solved[back]
-        return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
+        worst = self.track.worst.tolist() if reached == self.counts else None
+        return March(kept, worst, solved, tuple(ends), self.visited)
 
     def _side(self, number: int, at: int) -> End | None:
         """Follow one side, which came so far, to its last sample; None, or where and why it ends before."""
-        side, anew = self.route.sides[number], True
+        side, anew = self.grid.sides[number], True
         for stop in self._stops(side) if self.visit else [side.count]:
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
-            parts = 0
+            few, divided = FEW, 0
             while at < stop:
-                anchor, wanted = self._anchor(number), float(side.samples[0, at])
-                early = bool(anchor[self.slots[FROM + SIGMA]] < self.low * anchor[self.slots[FROM + LARGEST_SIGMA]])
-                further, reason = (None, "") if early else self._divide(anchor, wanted)
-                if further is None or parts == MOST_PARTS:
-                    columns = side.first + side.step * np.arange(at, side.count)
-                    self.kept[:, columns], self.solved[columns] = np.nan, False
-                    said = self._end(side, at, anchor, reason if further is None else TOO_MANY)
-                    return End(said, self.route, anchor, wanted, early, divided=further is not None)
-                self.track.anchors[number] = further[self.model.ahead]
-                came, at = at, self.track.follow(number, at, stop, anew=False)
-                parts = 0 if at > came else parts + 1
+                came, early = at, self._early(number)
+                if not early and not divided:
+                    at, few = self._in_parts(number, at, min(at + few, stop)), 2 * few
+                if at == came:
+                    anchor, wanted = self._anchor(number), float(side.samples[0, at])
+                    further, reason = (None, "") if early else self._divide(anchor, wanted)
+                    if further is None or divided == MOST_PARTS:
+                        said = self._end(side, at, anchor, reason if further is None else TOO_MANY)
+                        columns = self.grid.columns(number, at, side.count)
+                        self.kept[:, columns], self.solved[columns] = np.nan, False
+                        return End(said, self.route, anchor, wanted, early, divided=further is not None)
+                    self.track.anchors[number] = further[self.model.ahead]
+                    divided += 1
+                beyond, at = at, self.track.follow(number, at, stop, anew=False)
+                few = FEW if at - beyond > few else few
+                divided = 0 if at > came else divided
             if self.visit:
                 self._stand(number, at)
         return None
+
+    def _early(self, number: int) -> bool:
+        """Whether to leave off where a side stands; see `march`."""
+        sigma, largest = self.track.anchors[number, self.small]
+        return bool(sigma < self.low * largest)
+
+    def _in_parts(self, number: int, at: int, stop: int) -> int:
+        """Go on in equal parts of steps, and in more to the end of one that fails; how many samples have passed then."""
+        anchors, passed, before = self.track.anchors, at, 1
+        for grid in self.finer:
+            kept, parts = grid.kept, grid.parts
+            grid.track.anchors[number] = anchors[number]
+            passed = grid.track.follow(number, passed * (parts // before), stop * parts, anew=False)
+            anchors[number] = grid.track.anchors[number]
+            came, at, before = at, passed // parts, parts
+            self.kept[:, self.grid.columns(number, came, at)] = kept[:, grid.columns(number, came, at)]
+            if at == stop:
+                break
+            stop = at + 1
+        return at
 
     def _anchor(self, number: int) -> Array:
         """All slots of a lane where the motion stands on a side."""

@@ -82,14 +82,19 @@ class Route:
     @cached_property
     def sides(self) -> tuple[Side, ...]:
         """The side after the start and the side before it, as far as there are samples."""
+        return self.divided(1)
+
+    def divided(self, parts: int) -> tuple[Side, ...]:
+        """The sides with every step in equal parts, the last of which ends at the sample."""
         times = self.path.times[self.order]
         n, below, executor = len(times), self.below, self.model.executor(self.lanes)
         found: list[Side] = []
         for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
             if len(columns):
-                samples = np.concatenate([self.sampled(times[columns]), weights_of_groups(times[columns], executor.group)])
+                given = _in_parts(self.start, times[columns], parts)
+                samples = np.concatenate([self.sampled(given), weights_of_groups(given, executor.group)])
                 padded = np.concatenate([samples, np.repeat(samples[:, -1:], executor.margin, axis=1)], axis=1)
-                found.append(Side(padded, len(columns), int(columns[0]), step))
+                found.append(Side(padded, len(given), parts * below - (step < 0), step))
         return tuple(found)
 
     @cached_property
@@ -116,6 +121,14 @@ class Route:
     def sampled(self, times: Array) -> Array:
         """What is given at the times, shape (sampled, n)."""
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
+
+
+def _in_parts(start: float, times: Array, parts: int) -> Array:
+    """Times with each step to them, the first one from the start, in equal parts."""
+    before = np.concatenate([[start], times[:-1]])[:, None]
+    found = before + (times[:, None] - before) * (np.arange(1, parts + 1) / parts)
+    found[:, -1] = times
+    return found.ravel()
 
 
 def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
