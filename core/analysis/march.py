@@ -7,7 +7,7 @@ step succeeds the motion ends, and a message says where and why.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -165,12 +165,15 @@ class Marcher:
         self.grid = Grid(route, self.start, 1)
         self.track = self.grid.track
         self.counts = [side.count for side in self.grid.sides]
+        self._finer: list[Grid] = []
         self.small = [self.model.ahead.index(self.slots[FROM + name]) for name in (SIGMA, LARGEST_SIGMA)]
 
-    @cached_property
-    def finer(self) -> Sequence[Grid]:
-        """Grids of parts of the steps."""
-        return [Grid(self.route, self.start, parts) for parts in FINER if parts * len(self.every) <= ROOM]
+    def finer(self) -> Iterator[Grid]:
+        """Grids of parts of the steps; each is made when it is first needed."""
+        for k, parts in enumerate(parts for parts in FINER if parts * len(self.every) <= ROOM):
+            if k == len(self._finer):
+                self._finer.append(Grid(self.route, self.start, parts))
+            yield self._finer[k]
 
     def run(self, visit: Collection[int] = (), low: float = 0.0) -> March:
         """See `march`."""
@@ -226,7 +229,7 @@ class Marcher:
     def _in_parts(self, number: int, at: int, stop: int) -> int:
         """Go on in equal parts of steps, and in more to the end of one that fails; how many samples have passed then."""
         anchors, passed, before = self.track.anchors, at, 1
-        for grid in self.finer:
+        for grid in self.finer():
             kept, parts = grid.kept, grid.parts
             grid.track.anchors[number] = anchors[number]
             passed = grid.track.follow(number, passed * (parts // before), stop * parts, anew=False)
