@@ -42,15 +42,14 @@ class March(NamedTuple):
 
     Attributes:
         kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not reached.
-        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest estimate of sigma; None where steps
-            failed.
+        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest estimate of sigma.
         solved: shape (n,).
         ends: one for each side that ended before its last sample.
         visited: by sample, all slots of a lane that stands there and goes on from it; those asked for.
     """
 
     kept: Array
-    worst: Sequence[float] | None
+    worst: Sequence[float]
     solved: NDArray[np.bool_]
     ends: tuple[End, ...]
     visited: Mapping[int, Array] = MappingProxyType({})
@@ -190,8 +189,7 @@ class Marcher:
         del self.kept, self.solved  # they are whose they are given to
         if back is not AS_THEY_ARE:
             kept, solved = kept[:, back], solved[back]
-        worst = self.track.worst.tolist() if reached == self.counts else None
-        return March(kept, worst, solved, tuple(ends), self.visited)
+        return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
 
     def _side(self, number: int, at: int) -> End | None:
         """Follow one side, which came so far, to its last sample; None, or where and why it ends before."""
@@ -235,11 +233,21 @@ class Marcher:
             passed = grid.track.follow(number, passed * (parts // before), stop * parts, anew=False)
             anchors[number] = grid.track.anchors[number]
             came, at, before = at, passed // parts, parts
-            self.kept[:, self.grid.columns(number, came, at)] = kept[:, grid.columns(number, came, at)]
+            if at > came:
+                found = self.kept[:, self.grid.columns(number, came, at)] = kept[:, grid.columns(number, came, at)]
+                self._worsen(found)
             if at == stop:
                 break
             stop = at + 1
         return at
+
+    def _worsen(self, found: Array) -> None:
+        """Take account of samples that a finer grid reached."""
+        plan, worst = self.model.plan, self.track.worst
+        for k, slot in enumerate([*plan.largest, *plan.smallest]):
+            if slot in plan.kept:
+                values = found[plan.kept.index(slot)]
+                worst[k] = max(worst[k], values.max()) if k < len(plan.largest) else min(worst[k], values.min())
 
     def _anchor(self, number: int) -> Array:
         """All slots of a lane where the motion stands on a side."""

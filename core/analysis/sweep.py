@@ -10,9 +10,9 @@ import numpy as np
 
 from ..motions import Path
 from ..program import ITERATIONS
-from ..trajectory import BodyMotion, Motions, PointMotion, Trajectory
+from ..trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
 from .continuity import LOW, in_question
-from .march import March, march
+from .march import march
 from .model import Model
 from .request import SIGMA
 from .route import Route
@@ -26,7 +26,7 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
     model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
-    closure, leftover, sigma = found.worst or _worst(model, found)
+    closure, leftover, sigma = found.worst
     largest = math.inf if model.selection.dropped else None
     findings: Mapping[str, Any] = {}
     if not math.isfinite(tol):  # nothing is asked of the samples
@@ -35,7 +35,7 @@ def follow(route: Route, tol: float) -> Trajectory:
         from .singular.scrutiny import scrutinise  # rarely needed
 
         scrutiny = scrutinise(route, found, tol)
-        closure, leftover, sigma = _worst(model, found)
+        closure, leftover, sigma = _worst(found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved])
         message, findings = "; ".join(scrutiny.messages), scrutiny.details
     if not (found.solved.any() if message else found.solved.size):
         closure = leftover = sigma = math.nan
@@ -56,8 +56,7 @@ def follow(route: Route, tol: float) -> Trajectory:
     )
 
 
-def _worst(model: Model, found: March) -> tuple[float, float, float]:
-    """The largest residuals of kept and redundant rows, and the smallest estimate of sigma, at the samples that were solved."""
-    tests = found.kept[model.rows["closure"].start : model.rows[SIGMA].stop, found.solved]
+def _worst(tests: Array) -> tuple[float, float, float]:
+    """The largest residuals of kept and redundant rows, and the smallest estimate of sigma; rows from "closure" to `SIGMA`."""
     closure, leftover = np.maximum.reduce(tests[:2], axis=1, initial=0.0).tolist()
     return closure, leftover, float(np.minimum.reduce(tests[-1], initial=1.0))

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..trajectory import Array
 from .executor import MARGIN, Side
-
-if TYPE_CHECKING:
-    from .numpy_executor import NumpyExecutor
+from .numpy_lanes import NumpyLanes
 
 
 def _leading(margins: Array) -> int:
@@ -23,7 +20,7 @@ def _leading(margins: Array) -> int:
 class NumpyTrack:
     """See `Track`."""
 
-    def __init__(self, executor: NumpyExecutor, sides: Sequence[Side], start: Array, n: int) -> None:
+    def __init__(self, executor: NumpyLanes, sides: Sequence[Side], start: Array, n: int) -> None:
         self._executor, self._sides, self._start, self._n = executor, sides, start, n
         self.anchors = np.tile(start, (len(sides), 1))
 

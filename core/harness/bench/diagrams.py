@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ..reporting.figures import Figure, Style, plain
 from ..reporting.measures import precision_figure
 from ..reporting.views import Plot
 from .engines import Bench, effort
+from .pages import Diagram
 from .precision import Entry
 from .size import Size
-
-
-@dataclass(frozen=True)
-class Diagram:
-    """A figure, what is said of it, and the styles of its curves."""
-
-    plot: Plot
-    figure: Figure
-    styles: Sequence[Style]
 
 
 def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import Any, TextIO, cast
 
 import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -18,12 +18,20 @@ from rich.text import Text
 from ...errors import KincheckError
 from .. import printing
 from ..record import to_json
+from ..reporting.figures import Figure, Style
 from ..reporting.report import packed
+from ..reporting.views import Plot
 from ..reporting.wording import known, number
 from ..writing import to_standard_output, write_all
 
-if TYPE_CHECKING:
-    from .diagrams import Diagram
+
+@dataclass(frozen=True)
+class Diagram:
+    """A figure, what is said of it, and the styles of its curves."""
+
+    plot: Plot
+    figure: Figure
+    styles: Sequence[Style]
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .conditions import Conditions, Term
 from .extended import PI, Real, extended
+from .writer import Conditions, Term
 
 Indices = NDArray[np.intp]
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...joints import Screw
 from .extended import GROUND_AXES, Real, extended, triad, unit
-
-if TYPE_CHECKING:
-    from .conditions import Writer
+from .writer import Writer
 
 
 def _meet(w: Writer, joint: Any) -> None:
