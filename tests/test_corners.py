@@ -166,6 +166,18 @@ def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
     assert found.solved.sum() >= 3
 
 
+@pytest.mark.parametrize("style", ["native", "relative"])
+@pytest.mark.parametrize("beside", [1e-2, -3e-3, 1e-3])
+@pytest.mark.parametrize("made", [universal_loop, revolute_loop])
+def test_other_rows_are_chosen_where_a_kite_is_nearly_singular(made, beside, style):
+    """Those that were chosen at design depend on each other where it lies flat, or so nearly that it cannot be told from that."""
+    start, turn = np.float64(-1.5), np.linspace(0.0, 3.3, 31)
+    mechanism = made(tuple(pin(start).tolist()), tuple(corner(start, beside, 1.2, 1.2).tolist()), (1.0 - beside, 0.0, 0.0))
+    found = solve(mechanism, "turn", turn, style=style, order=0)
+    assert found.solved.all(), found.message
+    assert np.abs(found.points["meet"].position - corner(start + turn, beside, 1.2, 1.2)).max() <= 1e-13 / abs(beside)
+
+
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
 @pytest.mark.parametrize("count", [4, 7, 8, 10, 12, 15])
 def test_a_small_loop_does_not_hide_the_corner_of_a_large_one(count, style):

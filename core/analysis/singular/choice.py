@@ -27,6 +27,9 @@ from ..system import system_of
 
 # A motion that ends with a smallest singular value above this part of the largest that it has had does not end at a singular pose.
 NEAR = 1e-2
+# Where that of all rows together is below this part of it the mechanism itself is nearly singular, and no rows are good.
+# (By NEAR kites that are off by a hundredth to a thousandth of their size were refused where they lie flat.)
+REGULAR = 1e-4
 # Rows are chosen anew where that makes the smallest singular value as many times larger.
 BETTER = 3.0
 # Rows of before are taken again where their smallest singular value is this part of that of all rows: of those that are chosen at a
@@ -63,7 +66,7 @@ class Choice:
         matrix[[*model.selection.kept]], matrix[[*model.selection.dropped]] = found.jacobian[0], found.redundant[0]
         if not np.isfinite(matrix).all():
             return None
-        least = max(BETTER * _sigma(matrix, model.selection.kept), NEAR * float(lane[slots[FROM + LARGEST_SIGMA]]))
+        least = max(BETTER * _sigma(matrix, model.selection.kept), REGULAR * float(lane[slots[FROM + LARGEST_SIGMA]]))
         if not _sigma(matrix, range(len(matrix))) > least:
             return None
         known = {each.selection.kept: each for each in self.models}
