@@ -128,23 +128,24 @@ def longest(margins: Array) -> int | None:
     return int(good[0]) if len(good) else None
 
 
+def _columns(side: Side, at: int, stop: int) -> NDArray[np.intp]:
+    """Of samples of a side among all that are kept."""
+    return side.first + side.step * np.arange(at, stop)
+
+
 class Grid:
     """The samples of a route, bound to lanes of this thread, or as many more as make equal parts of the steps between them.
 
     Attributes:
         parts: how many.
+        ends: the route's samples by time among those.
         sides, track: see `Side` and `Track`.
     """
 
     def __init__(self, route: Route, start: Array, parts: int) -> None:
-        self.parts, self.sides = parts, route.divided(parts)
-        n = parts * len(route.path.times)
-        self.track = route.model.executor(route.lanes).track(self.sides, start[route.model.ahead], n)
-
-    def columns(self, side: int, at: int, stop: int) -> NDArray[np.intp]:
-        """Of samples of a side among all that are kept."""
-        first = self.sides[side]
-        return first.first + first.step * (self.parts * np.arange(at + 1, stop + 1) - 1)
+        self.parts, self.ends = parts, route.ends(parts)
+        self.sides = route.sides if parts == 1 else route.divided(parts)
+        self.track = route.model.executor(route.lanes).track(self.sides, start[route.model.ahead], parts * len(self.ends))
 
     @cached_property
     def kept(self) -> Array:
@@ -207,7 +208,7 @@ class Marcher:
                     further, reason = (None, "") if early else self._divide(anchor, wanted)
                     if further is None or divided == MOST_PARTS:
                         said = self._end(side, at, anchor, reason if further is None else TOO_MANY)
-                        columns = self.grid.columns(number, at, side.count)
+                        columns = _columns(side, at, side.count)
                         self.kept[:, columns], self.solved[columns] = np.nan, False
                         return End(said, self.route, anchor, wanted, early, divided=further is not None)
                     self.track.anchors[number] = further[self.model.ahead]
@@ -234,19 +235,20 @@ class Marcher:
             anchors[number] = grid.track.anchors[number]
             came, at, before = at, passed // parts, parts
             if at > came:
-                found = self.kept[:, self.grid.columns(number, came, at)] = kept[:, grid.columns(number, came, at)]
-                self._worsen(found)
+                columns = _columns(self.grid.sides[number], came, at)
+                self.kept[:, columns] = kept[:, grid.ends[columns]]
+                self._worsen(columns)
             if at == stop:
                 break
             stop = at + 1
         return at
 
-    def _worsen(self, found: Array) -> None:
+    def _worsen(self, columns: NDArray[np.intp]) -> None:
         """Take account of samples that a finer grid reached."""
         plan, worst = self.model.plan, self.track.worst
         for k, slot in enumerate([*plan.largest, *plan.smallest]):
             if slot in plan.kept:
-                values = found[plan.kept.index(slot)]
+                values = self.kept[plan.kept.index(slot), columns]
                 worst[k] = max(worst[k], values.max()) if k < len(plan.largest) else min(worst[k], values.min())
 
     def _anchor(self, number: int) -> Array:

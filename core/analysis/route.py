@@ -85,7 +85,7 @@ class Route:
         return self.divided(1)
 
     def divided(self, parts: int) -> tuple[Side, ...]:
-        """The sides with every step in equal parts, the last of which ends at the sample."""
+        """The sides with every step in equal parts, the last of which ends at the sample; see `ends`."""
         times = self.path.times[self.order]
         n, below, executor = len(times), self.below, self.model.executor(self.lanes)
         found: list[Side] = []
@@ -97,10 +97,17 @@ class Route:
                 found.append(Side(padded, len(given), parts * below - (step < 0), step))
         return tuple(found)
 
-    @cached_property
-    def for_motions(self) -> tuple[Array, ...]:
+    def ends(self, parts: int) -> NDArray[np.intp]:
+        """The samples by time among those where every step is in equal parts."""
+        n = len(self.path.times)
+        return parts * np.arange(n) + np.where(np.arange(n) < self.below, 0, parts - 1)
+
+    def for_motions(self, parts: int = 1) -> tuple[Array, ...]:
         """The samples of each side for lanes that are motions of their own."""
-        given = [self.sampled(side.samples[0, : side.count]) for side in self.sides]
+        return self.bound(parts, lambda: self._for_motions(parts))
+
+    def _for_motions(self, parts: int) -> tuple[Array, ...]:
+        given = [side.samples[: len(self.origin), : side.count] for side in self.divided(parts)]
         return tuple(np.concatenate([each, weights_of_samples(each[0])]) for each in given)
 
     @cached_property

@@ -1,7 +1,8 @@
 """Many variants of one mechanism along one path: the programs' lanes are variants, and geometry is an input.
 
-All variants take the same samples, predicted each from its own poses at the samples before. A lane that is not accepted somewhere
-is solved again alone, by the march that divides its steps; what that does not reach either is NaN, with the reason.
+All variants take the same samples, predicted each from its own poses at the samples before. Those that are not accepted somewhere
+are solved again in parts of steps, and then alone, by the march that divides steps; what that does not reach either is NaN, with
+the reason.
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from ..motions import Path
 from ..program import Executor
 from ..trajectory import Array
 from .continuity import doubtful
-from .march import march
+from .march import FINER, ROOM, march
 from .request import SIGMA, accept_by
 from .route import Route
 
 # Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
 # it is too long is solved again alone.
 LEAD = 16
+# So many variants are solved again together in parts of steps, of which there are as many more: their table stays small.
+SOME = 32
 # Bytes of the largest blocks that are used again: glibc's own limit is twice that.
 RECYCLED = 16_000_000
 # What a batch does not do.
@@ -37,7 +40,7 @@ class Variants:
     Attributes:
         kept: the kept rows of the model (`Model.rows`), shape (kept, n, V); NaN where a sample was not reached.
         solved: whether each sample of each variant was reached, shape (n, V).
-        retried: how many variants were solved again alone.
+        retried: how many variants were solved again.
         messages: by variant, why samples are missing.
     """
 
@@ -58,27 +61,18 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         tol: as for `solve`.
     """
     _recycle()
-    model, n, count = route.model, len(route.path.times), geometry.shape[1]
-    executor = model.executor(count)
-    closes = model.stand(executor, geometry)
-    accepted_by = accept_by(tol)
-    executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
-    arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
-    model.start(executor, route.origin)
-    ahead = model.ahead
-    start = executor.get(ahead)
-    whole = executor.table(n)
-    for k, side in enumerate(route.sides):
-        if k:
-            executor.put(ahead, start)
-        executor.fan(route.for_motions[k], whole, side.first, side.step)
-    kept = whole[:, :, :count]
-    if not (arrived & closes).all():
-        kept[:, :, ~(arrived & closes)] = np.nan
-    solved = ~np.isnan(kept[model.rows["closure"].start])
-    failed = np.flatnonzero(~solved.all(axis=0))
-    messages: dict[int, str] = {}
-    for k in failed.tolist():
+    model = route.model
+    kept, closes = _together(route, geometry, tol)
+    closure = kept[model.rows["closure"].start]
+    failed = np.flatnonzero(np.isnan(closure).any(axis=0))
+    again = failed[closes[failed]]
+    if FINER[0] * len(closure) <= ROOM:
+        for first in range(0, len(again), SOME):
+            some = again[first : first + SOME]
+            filled = np.resize(some, SOME)  # the executor of as many is kept
+            kept[:, :, some] = _together(route, geometry[:, filled], tol, FINER[0])[0][:, :, : len(some)]
+    solved, messages = ~np.isnan(closure), dict[int, str]()
+    for k in failed[~solved[:, failed].all(axis=0)].tolist():
         if not closes[k]:
             messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
             continue
@@ -101,6 +95,27 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
 
 
+def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tuple[Array, NDArray[np.bool_]]:
+    """Follow variants through all samples, each step in as many parts; the kept rows, by time, and which close at their design."""
+    model, count = route.model, geometry.shape[1]
+    executor = model.executor(count)
+    closes = model.stand(executor, geometry)
+    accepted_by = accept_by(tol)
+    executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
+    arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
+    model.start(executor, route.origin)
+    start = executor.get(model.ahead)
+    whole = executor.table(parts * len(route.path.times))
+    for k, (side, samples) in enumerate(zip(route.sides, route.for_motions(parts), strict=True)):
+        if k:
+            executor.put(model.ahead, start)
+        executor.fan(samples, whole, parts * route.below - (side.step < 0), side.step)
+    kept = whole[:, route.ends(parts) if parts > 1 else slice(None), :count]
+    if not (arrived & closes).all():
+        kept[:, :, ~(arrived & closes)] = np.nan
+    return kept, closes
+
+
 @cache
 def _recycle() -> None:
     """Have freed blocks kept for the next ones, else the system clears every page of every table anew: that takes half as long as
@@ -116,5 +131,5 @@ def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
     model.start(executor, way.origin)
     found = executor.table(LEAD)
     (side,) = way.sides
-    executor.fan(way.for_motions[0], found, side.first, side.step)
+    executor.fan(way.for_motions()[0], found, side.first, side.step)
     return ~np.isnan(found[model.rows["closure"].start, -1, :count])
