@@ -86,7 +86,7 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
 
     Args:
         visit: samples at which the lane that stands there is wanted, and beyond which nothing is.
-        crossing: accept steps across singular poses, whatever is there.
+        crossing: accept steps across singular poses, whatever is there, whole or not at all: parts of them end at the pose.
         low: leave off at a step that fails where the smallest singular value is below this part of the largest that it has had,
             if there are more rows than are solved: others may be better.
     """
@@ -158,7 +158,7 @@ class Marcher:
 
     def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float]) -> None:
         self.route, self.model, self.slots = route, route.model, route.model.slots
-        self.start = start.copy()
+        self.start, self.crossing = start.copy(), tolerances["crossing"] > 0.0
         for name, value in tolerances.items():
             self.start[self.slots[name]] = value
         self.every = np.ones(len(route.path.times), dtype=np.bool_)
@@ -205,12 +205,12 @@ class Marcher:
                     at, few = self._in_parts(number, at, min(at + few, stop)), 2 * few
                 if at == came:
                     anchor, wanted = self._anchor(number), float(side.samples[0, at])
-                    further, reason = (None, "") if early else self._divide(anchor, wanted)
-                    if further is None or divided == MOST_PARTS:
-                        said = self._end(side, at, anchor, reason if further is None else TOO_MANY)
+                    further = "" if early else TOO_MANY if divided == MOST_PARTS else self._divide(anchor, wanted)
+                    if isinstance(further, str):
                         columns = _columns(side, at, side.count)
                         self.kept[:, columns], self.solved[columns] = np.nan, False
-                        return End(said, self.route, anchor, wanted, early, divided=further is not None)
+                        said = self._end(side, at, anchor, further)
+                        return End(said, self.route, anchor, wanted, early, divided=further is TOO_MANY)
                     self.track.anchors[number] = further[self.model.ahead]
                     divided += 1
                 beyond, at = at, self.track.follow(number, at, stop, anew=False)
@@ -223,7 +223,7 @@ class Marcher:
     def _early(self, number: int) -> bool:
         """Whether to leave off where a side stands; see `march`."""
         sigma, largest = self.track.anchors[number, self.small]
-        return bool(sigma < self.low * largest)
+        return self.crossing or bool(sigma < self.low * largest)
 
     def _in_parts(self, number: int, at: int, stop: int) -> int:
         """Go on in equal parts of steps, and in more to the end of one that fails; how many samples have passed then."""
@@ -273,8 +273,8 @@ class Marcher:
         if sample in self.visit:
             self.visited[sample] = self._anchor(number)
 
-    def _divide(self, anchor: Array, aim: float) -> tuple[Array | None, str]:
-        """Go a part of the step to a sample that could not be reached: the lane there, and why the shortest refused is."""
+    def _divide(self, anchor: Array, aim: float) -> Array | str:
+        """Go a part of the step to a sample that could not be reached: the lane there, or why the shortest is refused."""
         here = self._stands(anchor)
         times: Array = here + (aim - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
         parts = self.model.executor(HALVINGS)
@@ -285,11 +285,9 @@ class Marcher:
         lanes = parts.get(every)
         margins = lanes[self.slots[MARGIN]]
         part = longest(margins)
-        refused = np.flatnonzero(~(margins[:part] > 0.0))
-        reason = why_refused(self.model, lanes[:, refused[-1]]) if len(refused) else ""
         if part is None:
-            return None, reason
-        return self.model.moving(lanes[:, part], lanes[self.model.sampled, part]), reason
+            return why_refused(self.model, lanes[:, np.flatnonzero(~(margins > 0.0))[-1]])
+        return self.model.moving(lanes[:, part], lanes[self.model.sampled, part])
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
         sigma, last = float(anchor[self.slots[FROM + SIGMA]]), float(side.samples[0, at - 1]) if at else None
