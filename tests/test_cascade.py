@@ -8,7 +8,7 @@ from kincheck import cases
 from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, SolveError, solve
 from kincheck.core.analysis.cascade.cascade import WORST, Cascade
 from kincheck.core.analysis.cascade.sweep import LANES, CascadeSweep
-from kincheck.core.analysis.march import HALVINGS
+from kincheck.core.analysis.division import HALVINGS, part_of_step
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request, accept_by
 from kincheck.core.analysis.route import Route
@@ -254,20 +254,18 @@ def test_nothing_may_be_wanted():
     assert not found.points
 
 
-@pytest.mark.parametrize("part", [1, 2, 14, 15, 16, 17, 30, 31, 39])
-def test_a_step_is_divided_as_often_as_with_one_program(part):
+@pytest.mark.parametrize("lanes", [8, 16])
+@pytest.mark.parametrize("part", [1, 2, 7, 8, 9, 14, 15, 16, 17, 30, 31, 39])
+def test_a_step_is_divided_as_often_whatever_the_lanes(part, lanes):
     """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is not reached."""
-    sweep = CascadeSweep(Cascade(chain(1), Request(("turn",), ("end",), compiled=False)), Path({"turn": Ramp(1.0)}, np.ones(1)))
     tried = list[np.ndarray]()
 
-    def attempt(times, path):
-        assert len(times) <= LANES
+    def attempt(times):
+        assert len(times) == lanes
         tried.append(times)
         return np.where(times - 1.0 <= 2.0**-part, 1.0, -1.0)
 
-    sweep._lanes.attempt = attempt
-    lane, time = sweep._divide(1.0, 2.0, sweep.path)
+    lane, time = part_of_step(1.0, 2.0, attempt, lanes)
     assert time == 1.0 + 2.0**-part == tried[-1][lane]
-    sweep._lanes.attempt = lambda times, path: np.where(times - 1.0 <= 2.0**-HALVINGS, 1.0, tried.append(times) or -1.0)
-    assert sweep._divide(1.0, 2.0, sweep.path) is None
-    assert tried[-1][-1] == 1.0 + 2.0**-HALVINGS
+    assert part_of_step(1.0, 2.0, lambda times: tried.append(times) or np.full(lanes, -1.0), lanes) is None
+    assert tried[-1][-1] <= 1.0 + 2.0**-HALVINGS

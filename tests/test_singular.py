@@ -9,7 +9,8 @@ from kincheck.adapters.native import Native
 from kincheck.core import Distance, JointDisplacement, Point, Translational
 from kincheck.core.analysis import system
 from kincheck.core.analysis.continuity import doubtful
-from kincheck.core.analysis.march import longest, march
+from kincheck.core.analysis.division import longest
+from kincheck.core.analysis.march import march
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import SIGMA, Request
 from kincheck.core.analysis.route import Route

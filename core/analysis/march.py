@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..program import MARGIN, Side
 from ..trajectory import Array
 from .acceptance import why_refused
+from .division import AT_ONCE, LONGER, MOST_PARTS, TOO_MANY, part_of_step
 from .model import Model
 from .request import FROM, LARGEST_SIGMA, SIGMA, TIME, accept_by, remembered
 from .route import AS_THEY_ARE, Route
@@ -28,13 +29,6 @@ from .route import AS_THEY_ARE, Route
 FINER, ROOM = (8, 64), 4096
 # So many steps are gone in parts before the next is tried whole; twice as many where that fails each time.
 FEW = 4
-# A failing step is tried at its halves, quarters, ... down to this many halvings, all at once: to 1e-12 of it, for a crank that
-# passes within 1e-9 of its length beside a pivot turns its rocker by half a turn over such a part of a sweep.
-HALVINGS = 40
-# A step is gone in at most so many parts. Of a slider-crank a part is 0.7 rad: a step of 1,000 rad is gone to its end, one of 1,500
-# is not.
-MOST_PARTS = 2000
-TOO_MANY = f"{MOST_PARTS} parts of the step were taken, and the next sample was not reached; give samples in between"
 
 
 class March(NamedTuple):
@@ -119,15 +113,6 @@ def arrived(model: Model, lane: Array) -> Array:
     return found
 
 
-def longest(margins: Array) -> int | None:
-    """The longest part of a step to go, of parts each half of the one before: one that was accepted, and its half too.
-
-    Of so many parts one may be accepted by chance, at a pose of another assembly; two such are not halves of each other.
-    """
-    good = np.flatnonzero((margins[:-1] > 0.0) & (margins[1:] > 0.0))
-    return int(good[0]) if len(good) else None
-
-
 def _columns(side: Side, at: int, stop: int) -> NDArray[np.intp]:
     """Of samples of a side among all that are kept."""
     return side.first + side.step * np.arange(at, stop)
@@ -198,24 +183,26 @@ class Marcher:
         for stop in self._stops(side) if self.visit else [side.count]:
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
-            few, divided = FEW, 0
+            few, divided, length = FEW, 0, np.inf
             while at < stop:
                 came, early = at, self._early(number)
                 if not early and not divided:
                     at, few = self._in_parts(number, at, min(at + few, stop)), 2 * few
                 if at == came:
                     anchor, wanted = self._anchor(number), float(side.samples[0, at])
-                    further = "" if early else TOO_MANY if divided == MOST_PARTS else self._divide(anchor, wanted)
+                    here = self._stands(anchor)
+                    aim = here + float(np.clip(wanted - here, -length, length))
+                    further = "" if early else TOO_MANY if divided == MOST_PARTS else self._divide(anchor, aim)
                     if isinstance(further, str):
                         columns = _columns(side, at, side.count)
                         self.kept[:, columns], self.solved[columns] = np.nan, False
                         said = self._end(side, at, anchor, further)
                         return End(said, self.route, anchor, wanted, early, divided=further is TOO_MANY)
                     self.track.anchors[number] = further[self.model.ahead]
-                    divided += 1
+                    divided, length = divided + 1, LONGER * abs(self._stands(further) - here)
                 beyond, at = at, self.track.follow(number, at, stop, anew=False)
                 few = FEW if at - beyond > few else few
-                divided = 0 if at > came else divided
+                divided, length = (0, np.inf) if at > came else (divided, length)
             if self.visit:
                 self._stand(number, at)
         return None
@@ -274,20 +261,20 @@ class Marcher:
             self.visited[sample] = self._anchor(number)
 
     def _divide(self, anchor: Array, aim: float) -> Array | str:
-        """Go a part of the step to a sample that could not be reached: the lane there, or why the shortest is refused."""
-        here = self._stands(anchor)
-        times: Array = here + (aim - here) * 0.5 ** np.arange(1.0, HALVINGS + 1)
-        parts = self.model.executor(HALVINGS)
-        every = range(len(self.slots))
-        parts.put(every, anchor[:, None])
-        parts.put(self.model.sampled, self.route.sampled(times))
-        parts.attempt()
+        """Go a part of a step: the lane there, or why the shortest is refused."""
+        parts, every = self.model.executor(AT_ONCE), range(len(self.slots))
+
+        def attempt(times: Array) -> Array:
+            parts.put(every, anchor[:, None])
+            parts.put(self.model.sampled, self.route.sampled(times))
+            parts.attempt()
+            return parts.get([self.slots[MARGIN]])[0]
+
+        part = part_of_step(self._stands(anchor), aim, attempt, AT_ONCE)
         lanes = parts.get(every)
-        margins = lanes[self.slots[MARGIN]]
-        part = longest(margins)
         if part is None:
-            return why_refused(self.model, lanes[:, np.flatnonzero(~(margins > 0.0))[-1]])
-        return self.model.moving(lanes[:, part], lanes[self.model.sampled, part])
+            return why_refused(self.model, lanes[:, np.flatnonzero(~(lanes[self.slots[MARGIN]] > 0.0))[-1]])
+        return self.model.moving(lanes[:, part[0]], lanes[self.model.sampled, part[0]])
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
         sigma, last = float(anchor[self.slots[FROM + SIGMA]]), float(side.samples[0, at - 1]) if at else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...motions import Path
 from ...trajectory import Array
-from ..march import longest
+from ..division import longest
 from ..request import accept_by
 from ..singular.bridge import COVERED, EIGHT, NODES, PLACES, SIX
 from .cascade import Lanes

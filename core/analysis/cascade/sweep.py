@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...motions import Path, outwards
 from ...program import ITERATIONS
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
-from ..march import HALVINGS, MOST_PARTS, TOO_MANY, longest
+from ..division import MOST_PARTS, TOO_MANY, part_of_step
 from ..model import CLOSED
 from ..request import SIGMA, accept_by
 from ..singular.singularity import CONTINUED, listed
@@ -198,22 +198,13 @@ class CascadeSweep:
                 sound, start = lanes.anchor, here
             if parts == MOST_PARTS:
                 return Halt(at, here, sound, start, TOO_MANY)
-            reached = self._divide(here, float(times[samples[at]]), path)
+            reached = part_of_step(here, float(times[samples[at]]), lambda parts: lanes.attempt(parts, path), LANES)
             if reached is None:
                 break
             lane, here = reached
             lanes.carry(lane)
             parts += 1
         return Halt(at, here, sound, start)
-
-    def _divide(self, here: float, wanted: float, path: Path) -> tuple[int, float] | None:
-        """Go a part of a step: the lane there and its time. As many parts as there are lanes are tried at once, longest first."""
-        for first in range(1, HALVINGS, LANES - 1):  # a part counts if its half is reached too
-            parts: Array = here + (wanted - here) * 0.5 ** np.arange(float(first), min(first + LANES, HALVINGS + 1))
-            part = longest(self._lanes.attempt(parts, path))
-            if part is not None:
-                return part, float(parts[part])
-        return None
 
     def _why_ended(self, tol: float) -> str:
         """Which component could not be solved at the shortest part of a step, and how singular it is."""

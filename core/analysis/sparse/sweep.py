@@ -15,9 +15,9 @@ from ...mechanism import Mechanism
 from ...motions import Path, outwards
 from ...primitives.base import Pose, Twist
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ..division import HALVINGS, MOST_PARTS, TOO_MANY
 from ..equations.carried import motion_of_frame, motion_of_point
 from ..equations.formulation import Acceleration
-from ..march import HALVINGS, MOST_PARTS, TOO_MANY
 from .batch import REMEMBERED
 from .model import FailedError, SparseModel, Stand
 
