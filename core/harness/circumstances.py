@@ -37,7 +37,7 @@ def results(
 
     Args:
         facts: further circumstances; they come before those found here, for a run that began in another process.
-        plan: the pairs that there were to be, of a run that ended before it had them all.
+        plan: the pairs that there were to be, of a run that does not have them all.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
     return Results(

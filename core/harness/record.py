@@ -223,8 +223,13 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:
-        """Case, engine and mode of the pairs that were asked for and have no record: the run ended before them."""
+        """Case, engine and mode of the pairs that were asked for and have no record: the run ended before them, or see `unread`."""
         return [(case, engine, mode) for case, engine, mode in self.run.get("missing", [])]
+
+    @property
+    def unread(self) -> dict[str, str]:
+        """Cases that were asked for and make no sense, by their names as given, and why."""
+        return self.run.get("unread", {})
 
 
 def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:

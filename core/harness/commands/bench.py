@@ -89,7 +89,9 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
     if not any(name in os.environ for name in bench_engines.THREADS):
         return _with_one_thread(options.command, bench_engines.THREADS)
     problems = _destinations(options, bench_engines.NAME)
-    cases = {name: found for name in options.cases for found in house.find_cases([name], problems)}
+    unread: dict[str, str] = {}
+    cases = {name: found for name in options.cases for found in house.find_cases([name], unread)}
+    problems += unread.values()
     engines = [
         engine
         for mode, known in (("projection", house.engines), ("simulate", house.simulations))

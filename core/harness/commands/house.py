@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Status(IntEnum):
-    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work."""
+    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work, or part of it."""
 
     WITHIN = 0
     DEVIATES = 1
@@ -79,19 +79,20 @@ class House:
         return case
 
     def find_cases(
-        self, names: Sequence[str], problems: list[str], found: Sequence[Case] = (), supplied: Supplied = NOTHING
+        self, names: Sequence[str], unread: dict[str, str], found: Sequence[Case] = (), supplied: Supplied = NOTHING
     ) -> list[Case]:
-        """The cases found already and those named; what is wrong with any of them is added to the problems."""
+        """The cases found already and those named; what is wrong with the others is put beside their names as given."""
         cases = {case.name: case for case in found}
         for name in dict.fromkeys(names):
             try:
                 case = self.find_case(name, supplied)
             except KincheckError as error:
-                problems += str(error).splitlines()
+                unread[name] = str(error)
                 continue
             if case.name in cases:
-                problems.append(f"{name}: there are two cases named {case.name!r}; results go by name: rename one")
-            cases[case.name] = case
+                unread[name] = f"{name}: there are two cases named {case.name!r}; results go by name: rename one"
+            else:
+                cases[case.name] = case
         return list(cases.values())
 
     def find_engines(self, names: Sequence[str], problems: list[str], mode: str | None = None) -> list[Engine]:

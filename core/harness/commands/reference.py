@@ -53,8 +53,9 @@ def _prove(options: argparse.Namespace, house: House) -> int:
     from ..record import to_json
     from ..writing import unwritable, write
 
-    problems: list[str] = []
-    cases = house.find_cases(options.case or [*house.cases()], problems)
+    unread: dict[str, str] = {}
+    cases = house.find_cases(options.case or [*house.cases()], unread)
+    problems = [*unread.values()]
     if options.out is not None:
         try:
             options.out.mkdir(parents=True, exist_ok=True)

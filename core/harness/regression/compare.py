@@ -47,8 +47,10 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
 
 def unmade(now: Subject) -> list[Finding]:
     """The pairs that the run was to make and did not: whatever it is compared with, nothing checks them."""
-    pairs = now.results.missing
-    return [Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=UNMADE) for case, engine, mode in pairs]
+    pairs, why = now.results.missing, now.results.unread
+    return [
+        Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE)) for case, engine, mode in pairs
+    ]
 
 
 def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:

@@ -36,8 +36,9 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
         if pairs and outcome not in COMPARED:
             say(f"{outcome.value.capitalize()}: {len(pairs)}", f"Nothing is said about {'; '.join(pairs)}.")
-    if results.missing:
-        pairs = [f"{product(engine, mode)} on {case}" for case, engine, mode in results.missing]
+    for case, why in results.unread.items():
+        say(f"Not read: {case}", f"{why}. Nothing is said about it.")
+    if pairs := [f"{product(engine, mode)} on {case}" for case, engine, mode in results.missing if case not in results.unread]:
         say(f"Never made: {len(pairs)}", f"The run ended before them, and nothing is said about {'; '.join(pairs)}.")
     for record in records:
         if record.solved is not None and record.samples is not None and record.solved < record.samples:

@@ -17,7 +17,7 @@ TRUTHS = {
 }
 
 UNMADE = "asked for and never made: the run ended before it"
-"""Of a pair that has no record."""
+"""Of a pair that has no record, unless its case cannot be read."""
 
 _LABELS = {"half_track_change": "half-track change", "wheelbase_change": "wheel-base change"}
 
