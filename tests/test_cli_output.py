@@ -8,8 +8,11 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from kincheck.core.harness import cli
 from kincheck.core.harness.case import Truth
+from kincheck.core.harness.reading.results import read_results
 from kincheck.core.harness.record import from_json
+from kincheck.core.harness.reporting.caveats import caveats
 
 from .fakes import Fake, crank, off, raising
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
@@ -40,6 +43,57 @@ def test_what_c_keeps_in_its_buffer_does_not_come_after_the_json():
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
     assert (done.stdout, done.stderr) == ("json\n", "from C\n")
+
+
+ROD = """
+schema = "kincheck-case/1"
+name = "rod"
+source = "made up"
+[bodies.crank]
+[bodies.rocker]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.hinge]
+type = "revolute"
+bodies = ["ground", "rocker"]
+point = [1, 0, 0]
+axis = [0, 0, 1]
+[joints.rod]
+type = "distance"
+bodies = ["crank", "rocker"]
+points = [[0, 0.5, 0], [1, 0.5, 0]]
+length = LENGTH
+[points.tip]
+body = "rocker"
+position = [1, 0.5, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[sweep]
+driver = "turn"
+start = 0
+stop = 0.1
+steps = 3
+"""
+
+
+@pytest.mark.parametrize(("length", "told"), [("1.1", True), ("1.0", False), ("1.0000000001", False), ("1.00001", True)])
+def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(tmp_path, capsys, length, told):
+    file, out = tmp_path / "rod.toml", tmp_path / "out"
+    file.write_text(ROD.replace("LENGTH", length))
+    assert cli.main(["run", str(file), "--engine", "native", "--out", str(out), "--markdown", str(tmp_path / "rod.md")]) == 0
+    note = (
+        f"joint 'rod' (distance): length {length} m, points 1 m apart at design: "
+        "assembled from there, so the design position is another than the given one"
+    )
+    results = read_results(out / "results.json")
+    assert results.run["cases"]["rod"]["notes"] == [note] * told
+    assert (f"note: rod: {note}\n" in capsys.readouterr().out) is told
+    assert ("Note: rod: joint 'rod'" in (tmp_path / "rod.md").read_text()) is told
+    assert ("Geometry of rod" in dict(caveats(results))) is told
 
 
 def test_the_table_says_what_happened_and_never_too_much(kincheck_main, capsys):

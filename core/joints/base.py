@@ -180,6 +180,11 @@ class Joint(ABC):
         return other
 
     @property
+    def notes(self) -> Sequence[str]:
+        """What a reader of results should know of its geometry: where it can be meant, and yet be a mistake."""
+        return ()
+
+    @property
     def rows(self) -> int:
         """Number of constraint equations."""
         here = Attachment(ZERO)

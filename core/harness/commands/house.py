@@ -75,7 +75,7 @@ class House:
         try:
             require_driven(case.mechanism)
         except SolveError as error:  # it names the mechanism; the file is what the reader has to open
-            raise KincheckError(f"{name}: {error}") from error
+            raise KincheckError(f"{name}: {'drivers' if case.mechanism.moving else 'bodies'}: {error}") from error
         return case
 
     def find_cases(

@@ -36,6 +36,7 @@ class _About(msgspec.Struct):
 
     source: str = ""
     signs: str = ""
+    notes: list[str] = []
     driver: _Driver = _Driver()
     motions: dict[str, _Driver] = {}
 

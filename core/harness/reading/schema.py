@@ -25,7 +25,8 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
                          type = "ramp": rate, per second
                          type = "sine": amplitude, frequency [Hz], (phase) = 0: amplitude sin(2 pi frequency t + phase)
                          type = "table": times [s], values: the natural cubic spline through them, which must cover the sweep
-    [sweep]              (driver), start, stop, steps: samples with both ends; (rate) = 1, in driver units per second
+    [sweep]              (driver), start, stop, steps: samples with both ends, 1 where they are the same; (rate) = 1, in driver
+                         units per second
                          driver: its samples from start to stop; it moves at the rate, whose sign says which way, and has its design
                          value at time zero
                          no driver, or "time": start and stop are times [s], there is no rate, and the motions move everything

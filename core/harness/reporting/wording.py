@@ -46,6 +46,11 @@ def signs(run: Mapping[str, Any]) -> list[str]:
     return [f"Signs of {', '.join(cases)}: {words}" for words, cases in said.items()]
 
 
+def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Cases and what is to be known of their geometry, by the circumstances of a run."""
+    return [(case, note) for case, facts in run.get("cases", {}).items() for note in facts.get("notes", ())]
+
+
 def motion_unit(unit: str, motion: str) -> str:
     """The unit of a motion's derivative, e.g. m/s for a velocity in m."""
     return unit + {"position": "", "velocity": "/s", "acceleration": "/s²"}[motion]
