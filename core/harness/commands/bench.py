@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..console import complain
-from .house import House, Status, whole
+from .house import House, Status, add_joint_types, whole
 from .run import TOL
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def add(commands: Any) -> None:
     engines.add_argument(
         "--cases", nargs="+", default=[STRUT], metavar="CASE", help=f"built-in names, or paths to case files; default: {STRUT}"
     )
+    add_joint_types(engines)
     engines.add_argument("--engine", nargs="+", default=[], metavar="NAME", help="default: all engines, in both modes")
     engines.add_argument(
         "--rounds", type=whole(1), default=ROUNDS, metavar="N", help="of all contestants in turn; default %(default)s"

@@ -118,6 +118,18 @@ class House:
             return Unloadable(name, f"{type(error).__name__}: {error}", mode)
 
 
+def add_joint_types(command: argparse.ArgumentParser) -> None:
+    """Add the option to a command that takes case files; `main` loads what it names."""
+    command.add_argument(
+        "--joint-type",
+        action="append",
+        default=[],
+        metavar="MODULE:CLASS",
+        help="a joint type of your own, which case files may name then, in a module of this folder or an installed one; may be "
+        "repeated; check-joint checks it",
+    )
+
+
 def unknown(what: str, name: str, known: Sequence[str]) -> str:
     """What to say of a name that is none of the known ones."""
     close = difflib.get_close_matches(name, known, n=1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..visible import file_name
-from .house import House, Status, whole
+from .house import House, Status, add_joint_types, whole
 from .run import TOL
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def add(commands: Any) -> None:
     proving.add_argument(
         "case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases"
     )
+    add_joint_types(proving)
     proving.add_argument(
         "--out", type=Path, metavar="DIR", help="write CASE.reference.json there, for run --reference or a case file"
     )

@@ -14,6 +14,7 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
     [bodies.NAME]        (origin) = [0, 0, 0], (euler_parameters) = [1, 0, 0, 0], e0..e3, body to global; (fixed) = false
                          the body "ground" is there without being declared
     [joints.NAME]        type, bodies = [first, second], and what the type asks for: point, axis, lengths, ...
+                         a type of your own: --joint-type MODULE:CLASS on the command line has it known
                          type, joints = [first, second], where it couples two other joints: gear (ratio), rack_pinion (radius)
                          a joint's rotation and displacement are those of its second body relative to its first, about and
                          along its axis by the right-hand rule, zero at design
