@@ -20,7 +20,8 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
                          along its axis by the right-hand rule, zero at design
     [points.NAME]        body, position: a point that is compared, or driven
     [drivers.NAME]       type = "point_coordinate": point, direction, (relative) = true
-                         type = "joint_angle" or "joint_displacement": joint, (relative) = true
+                         type = "joint_angle" or "joint_displacement": joint, (relative) = true; of joints that have a rotation
+                         or a translation: revolute, cylindrical, screw, planar (its turn), translational
                          values are measured from the design position; relative = false: absolute, which for joints is the same
     [drivers.NAME.motion]   how it goes with time; without, it holds its design value unless it is swept
                          type = "ramp": rate, per second
