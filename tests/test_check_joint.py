@@ -166,7 +166,7 @@ def test_case_files_name_a_type_that_the_command_line_has_loaded(in_folder, caps
     assert "pin_in_slot" in other.message
     capsys.readouterr()
     assert main(["list", "--joints", *given]) == 0
-    assert re.search(r"^  pin_in_slot +point, axes +4 rows  2 free: slide, turn$", capsys.readouterr().out, re.MULTILINE)
+    assert re.search(r"^  pin_in_slot +point, axes +4 rows  2 free: slide, turn +Body i has", capsys.readouterr().out, re.MULTILINE)
     assert main(["explain", str(file), "--joint-type", "pin_in_slot:PinSlot"]) == 2
     assert capsys.readouterr().err == "kincheck: module 'pin_in_slot' has no class 'PinSlot'; did you mean 'PinInSlot'?\n"
 

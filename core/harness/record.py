@@ -109,9 +109,13 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         driver: values at the samples by name: of what is swept [m, rad or s] first, then of every further moving driver.
         errors: one entry for every output of the case, whatever the outcome.
         residual_max: the engine's own largest constraint residual over the solved samples [m or -].
+        rank: of the rows that the engine solves, at the design: native's are those of the joints, Cartesian and without drivers
+            (unknowns less rank is dof), a simulator's those of its own model, loops, relations and drivers. Ranks of different
+            engines are not to be compared.
+        dof: degrees of freedom, drivers apart; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: how many samples were reached, out of how many.
-        us_per_step: warm solve by sample [us]; null unless all samples were reached.
+        us_per_step: warm solve by sample [us]; null unless all samples were reached: `solved` and `message` say why.
     """
 
     case: str
