@@ -101,7 +101,7 @@ CHAINS: dict[type[Joint], Callable[[Any, Vector], list[Link]]] = {
     ParallelAxes: lambda joint, P: [*_shift(P), _hinge(joint.axis, P)],
     # like a universal joint's, these hinges keep the design angle of the axes where a table has rounded the right angle
     PerpendicularAxes: lambda joint, P: [*_shift(P), *(_hinge(axis, P) for axis in joint.axes)],
-    Planar: lambda joint, P: [*_across(joint.axis, P), _hinge(joint.axis, P)],
+    Planar: lambda joint, P: [*_across(joint.axis, P), _hinge(joint.axis, P, "rotation")],
     Revolute: lambda joint, P: [_hinge(joint.axis, P, "rotation")],
     RevoluteSpherical: lambda joint, P: [_hinge(joint.axis, joint.points[0]), _ball(joint.points[1])],
     Screw: _turn_and_slide,

@@ -99,7 +99,7 @@ class Mechanism:
             if self.is_fixed(joint.bodies[0]) and self.is_fixed(joint.bodies[1]):
                 raise MechanismError(
                     f"joint {joint.name!r} ({joint.type}): {joint.bodies[0]!r} and {joint.bodies[1]!r} are both fixed; "
-                    "join a moving body or remove the joint",
+                    "free one of them, join a moving body or remove the joint",
                     f"joints.{joint.name}.bodies",
                 )
         for point in self.points:

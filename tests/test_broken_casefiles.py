@@ -69,6 +69,10 @@ BROKEN = {
     "no rate": (("rate = 2.0", "rate = 0"), ["sweep.rate", "found 0"]),
     "NaN rate": (("rate = 2.0", "rate = nan"), ["sweep.rate", "nan"]),
     "no motion": (("stop = 0.1", "stop = -0.1"), ["sweep.stop", "steps = 1"]),
+    "one step of two": (
+        ("steps = 3", "steps = 1"),
+        ["sweep.steps", "found 1 with start -0.1 and stop 0.1", "2 or more", "stop = start for a single sample"],
+    ),
     "no stop": (("stop = 0.1\n", ""), ["sweep.stop", "missing"]),
     "no sweep": ((BASE[BASE.index("[sweep]") : BASE.index("[outputs")], ""), ["sweep", "missing"]),
     "no point": (('[points.tip]\nbody = "slider"\nposition = [1.5, 2.0, 3.0]', ""), ["points", "no point", "[points.NAME]"]),
@@ -93,12 +97,19 @@ BROKEN = {
     "too deep": (("[bodies.slider]", f"[bodies.{'a.' * 3000}a]\n[bodies.slider]"), ["nested more than 16 deep"]),
     "TOML syntax": (("rate = 2.0", "rate = = 2.0"), ["not valid TOML", "line"]),
     "key twice": (("rate = 2.0", "rate = 2.0\nrate = 2.0"), ["not valid TOML"]),
-    "no reference file": (("[outputs.tip_x]", BY_FILE + "[outputs.tip_x]"), ["tip.csv", "no such file"]),
+    "no reference file": (
+        ("[outputs.tip_x]", BY_FILE + "[outputs.tip_x]"),
+        ["case.toml: reference.file: found 'tip.csv', but there is no such file"],
+    ),
     "file and rows": (("[outputs.tip_x]", BY_FILE + "rows = [[1, 1]]\n[outputs.tip_x]"), ["reference", "one source"]),
     "neither file nor rows": (("[outputs.tip_x]", "[reference]\n[outputs.tip_x]"), ["reference", "neither file nor rows"]),
     "ragged rows": (
         ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [0]]\n[outputs.tip_x]"),
         ["reference.rows[1]", "found 1 numbers"],
+    ),
+    "too few rows": (
+        ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [0.0, 1]]\n[outputs.tip_x]"),
+        ["case.toml: reference.rows: found 2 rows, expected 3, the steps of the sweep", "give a row for each"],
     ),
     "rows off the grid": (
         ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [0.02, 1], [0.1, 1]]\n[outputs.tip_x]"),

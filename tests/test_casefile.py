@@ -173,7 +173,7 @@ def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path: Path):
     assert (output.atol, output.rtol) == (1e-9, 0.0)
 
 
-@pytest.mark.parametrize(("start", "stop", "steps", "values"), [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.1", "1", [0.2])])
+@pytest.mark.parametrize(("start", "stop", "steps", "values"), [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.2", "1", [0.2])])
 def test_sweeps_may_run_down_or_have_one_sample(tmp_path: Path, start: str, stop: str, steps: str, values: list[float]):
     text = edited(("start = -0.1", f"start = {start}"), ("stop = 0.1", f"stop = {stop}"), ("steps = 3", f"steps = {steps}"))
     assert load_case(write(tmp_path, text)).sweep.values.tolist() == values

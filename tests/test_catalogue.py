@@ -54,12 +54,26 @@ def test_every_key_is_printed():
                 assert key in lines()[name]
 
 
+def test_every_type_says_what_it_does(own_joint_types):
+    @dataclass(frozen=True)
+    class Mute(Spherical):
+        type = "mute_of_test_catalogue"
+
+    found = lines()
+    for registry in (Joint.registry, Coupler.registry, DRIVERS, Motion.registry):
+        for name, cls in registry.items():
+            if cls.__module__.startswith("kincheck."):
+                assert found[name].endswith(f"  {cls.__doc__.splitlines()[0]}")
+    assert found["revolute"].endswith("  Both bodies share the point and the axis and turn about it.")
+    assert found[Mute.type].endswith("rotation z")  # not the signature that a dataclass has for a text
+
+
 def test_rows_and_freedoms():
     assert {name: rows_of(cls) for name, cls in Joint.registry.items()} == ROWS
     for name, rows in ROWS.items():
         assert f"  {rows} row" in lines()[name]
         assert f"  {6 - rows} free" in lines()[name]
-    assert lines()["gear"].split() == ["gear", "ratio", "1", "row", "couples", "rotation", "and", "rotation"]
+    assert lines()["gear"].split()[:8] == ["gear", "ratio", "1", "row", "couples", "rotation", "and", "rotation"]
     assert "points, (length)" in lines()["distance"]
 
 

@@ -1,21 +1,28 @@
 """The check of joint types: sound joints pass, and every kind of mistake is caught by the check that is there for it."""
 
 import dataclasses
+import importlib
+import math
+import os
+import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import kincheck.core
 import pytest
 from kincheck import adapters
-from kincheck.core import Body, InPlane, Joint, Revolute, Universal
+from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Universal
 from kincheck.core import primitives as p
-from kincheck.core.errors import KincheckError
+from kincheck.core.errors import KincheckError, MechanismError
 from kincheck.core.harness import check_joint
 from kincheck.core.harness.cli import main
-from kincheck.core.harness.joint_check.check_joint import load_joint
 from kincheck.core.harness.joint_check.findings import Verdict
+from kincheck.core.harness.joint_check.loading import load_joint
+from kincheck.core.harness.reading.results import read_results
 from kincheck.core.joints import AxialJoint
 
+from .fakes import Fake
 from .test_check_joint_mistakes import mistaken
 
 BUILT_IN = sorted(name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck."))
@@ -81,6 +88,110 @@ def test_no_specimen():
         check_joint(Odd)
     with pytest.raises(KincheckError, match="no specimens were offered"):
         check_joint(Revolute, specimens=[])
+
+
+def test_an_equivalent_that_fails_is_not_told_as_missing():
+    def equivalent(self):
+        raise ValueError("no such bodies")
+
+    lame = Fake("lame", refusal="unknown joint")
+    report = check_joint(mistaken(Revolute, equivalent=equivalent), engines=[lame])
+    assert report["loop: native, equivalent"].message == "ValueError: no such bodies"
+    assert report["loop: lame"].message == "unknown joint; equivalent() fails, see native"
+    assert "there is no equivalent()" in check_joint(mistaken(Revolute), engines=[lame])["loop: lame"].message
+
+
+def test_a_type_that_is_taken_is_refused_and_the_same_class_may_be_declared_anew():
+    with pytest.raises(MechanismError, match=r"Mine: type = 'revolute' is taken by kincheck.core.joints.revolute.Revolute; give"):
+        type("Mine", (Revolute,), {"type": "revolute"})
+    assert Joint.registry["revolute"] is Revolute
+    with pytest.raises(MechanismError, match=r"type = 'gear' is taken by kincheck.core.joints.gear.Gear"):
+        type("Mine", (Gear,), {"type": "gear"})
+    first, second = (dataclass(frozen=True, slots=True)(type("Mine", (Revolute,), {"type": "mine"})) for _ in range(2))
+    assert Joint.registry["mine"] is second is not first
+
+
+# In case files
+
+SLOT = """
+schema = "kincheck-case/1"
+name = "slot"
+source = "made up"
+[bodies.block]
+[bodies.crank]
+[joints.guide]
+type = "translational"
+bodies = ["ground", "block"]
+point = [0, 0, 0]
+axis = [0, 1, 0]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.slot]
+type = "pin_in_slot"
+bodies = ["block", "crank"]
+point = [0.5, 0, 0]
+axes = [[1, 0, 0], [0, 0, 1]]
+[points.tip]
+body = "block"
+position = [0, 0, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[sweep]
+driver = "turn"
+start = -0.5
+stop = 0.5
+steps = 5
+"""
+
+
+def test_case_files_name_a_type_that_the_command_line_has_loaded(in_folder, capsys, tmp_path, monkeypatch):
+    """A Scotch yoke: the block is where the pin's height is, 0.5 sin(turn)."""
+    monkeypatch.delitem(Joint.registry, "pin_in_slot", raising=False)
+    monkeypatch.delitem(sys.modules, "pin_in_slot", raising=False)
+    file, out = tmp_path / "slot.toml", tmp_path / "slot.json"
+    file.write_text(SLOT)
+    run = ["run", str(file), "--engine", "native", "pinocchio", "--json", str(out)]
+    assert main(run) == 2
+    assert "joints.slot.type: found 'pin_in_slot', expected a joint type" in capsys.readouterr().err
+    given = ["--joint-type", "pin_in_slot:PinInSlot"]
+    assert main([*run, *given]) == 0
+    native, other = read_results(out).records
+    expected = [0.5 * math.sin(angle) for angle in native.driver["turn"]]
+    assert native.outputs["tip.y"].position == pytest.approx(expected, abs=1e-15)
+    assert other.outcome == "unsupported"
+    assert "pin_in_slot" in other.message
+    capsys.readouterr()
+    assert main(["list", "--joints", *given]) == 0
+    assert re.search(r"^  pin_in_slot +point, axes +4 rows  2 free: slide, turn +Body i has", capsys.readouterr().out, re.MULTILINE)
+    assert main(["explain", str(file), "--joint-type", "pin_in_slot:PinSlot"]) == 2
+    assert capsys.readouterr().err == "kincheck: module 'pin_in_slot' has no class 'PinSlot'; did you mean 'PinInSlot'?\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (
+            'type = "revolute"',
+            "is taken by kincheck.core.joints.revolute.Revolute; give it another name (own.py, line 2: class Mine(",
+        ),
+        ('type = "gear"', "own:Mine: the type 'gear' is that of joints that couple two others; give it another"),
+        ("pass", 'own:Mine has no type, the name of joints like it in case files; write type = "..." in the class'),
+    ],
+)
+def test_a_type_that_no_case_file_can_name_is_refused(monkeypatch, tmp_path, capsys, body, message):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", ["", *sys.path])
+    monkeypatch.delitem(sys.modules, "own", raising=False)
+    Path("own.py").write_text(f"from kincheck.core import Joint\nclass Mine(Joint):\n    {body}\n")
+    importlib.invalidate_caches()
+    for argv in (["check-joint", "own:Mine"], ["list", "--joints", "--joint-type", "own:Mine"]):
+        assert main(argv) == 2
+        said = capsys.readouterr().err
+        assert message in said.replace(f"{tmp_path}{os.sep}", ""), said
 
 
 # The command

@@ -9,7 +9,7 @@ from kincheck.core import ConstantVelocity, InPlane, Revolute, Spherical, Transl
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.harness import check_joint
-from kincheck.core.harness.joint_check.check_joint import load_joint
+from kincheck.core.harness.joint_check.loading import load_joint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import kincheck.adapters
 import kincheck.cases
@@ -14,6 +15,9 @@ import pytest
 from kincheck.core.errors import CaseError
 from kincheck.core.harness import cli
 from kincheck.core.harness.console import how_to_install
+from kincheck.core.harness.reading.results import read_results
+from kincheck.core.harness.reporting.caveats import caveats
+from kincheck.core.harness.reporting.report import headline
 
 from .fakes import Fake, crank, off, partial, raising
 
@@ -32,6 +36,18 @@ UNABLE = Fake("unable", refusal="joint 'cv' (universal) has no counterpart")
 )
 def test_exit_status_of_a_run(kincheck_main, engine, status):
     assert kincheck_main("run", engines=[RIGHT, engine]) == status
+
+
+@pytest.mark.parametrize(
+    ("engines", "status"),
+    [([BROKEN], 2), ([BROKEN, MISSING, UNABLE], 2), ([BROKEN, PARTIAL], 1), ([BROKEN, WRONG], 1), ([MISSING, UNABLE], 0)],
+    ids=["errors", "errors and missing", "errors and a motion that ends", "errors and deviations", "missing"],
+)
+def test_a_run_of_which_nothing_came_but_errors_has_not_found_that_something_deviates(kincheck_main, capsys, engines, status):
+    assert kincheck_main("run", engines=engines) == status
+    assert ("kincheck: nothing was solved: every engine that was there and able ended in an error" in capsys.readouterr().err) == (
+        status == 2
+    )
 
 
 def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
@@ -137,12 +153,47 @@ def test_all_bad_case_files_are_named_before_anything_is_computed(kincheck_main,
     first.write_text('schema = "kincheck-case/9"\n')
     second.write_text("{")
     RIGHT.solves = 0
-    assert kincheck_main("run", "crank", first, second, tmp_path / "third.toml") == 2
+    assert kincheck_main("run", first, second, tmp_path / "third.toml") == 2
     captured = capsys.readouterr()
     said = captured.err.splitlines()
     assert [sum(name in line for line in said) for name in ("first.toml", "second.json", "third.toml")] == [1, 1, 1]
     assert "Traceback" not in captured.err
     assert captured.out == ""
+    assert RIGHT.solves == 0
+
+
+@pytest.mark.parametrize("bad", ["bad.toml", "nosuch"])
+def test_the_other_cases_of_a_bad_one_are_run_and_recorded(kincheck_main, capsys, tmp_path, monkeypatch, bad):
+    monkeypatch.chdir(tmp_path)
+    Path("bad.toml").write_text('schema = "kincheck-case/9"\n')
+    files = ["--out", "out", "--junit", "junit.xml", "--history", "history"]
+    for _ in range(2):
+        assert kincheck_main("run", "crank", bad, "crank_two", *files) == 2
+    captured = capsys.readouterr()
+    message = f"{bad}: schema: found" if bad == "bad.toml" else f"there is no case {bad!r}"
+    assert captured.err.count(message) == 2  # once each run
+    assert captured.err.index(message) < captured.err.index("[1/2] crank native: pass")
+    found = read_results(Path("out/results.json"))
+    assert [record.case for record in found.records] == ["crank", "crank_two"]
+    assert found.missing == [(bad, "native", "projection")]
+    assert [*found.unread] == [bad]
+    assert message in found.unread[bad]
+    assert headline(found).endswith("within tolerance; 1 case could not be read")
+    assert dict(caveats(found))[f"Not read: {bad}"].startswith(message)
+    (error,) = (test.find("error") for test in ElementTree.parse("junit.xml").iter("testcase") if test.find("error") is not None)
+    assert error.get("message") == found.unread[bad]
+    # what is broken tonight is told, and tomorrow too
+    assert kincheck_main("report", "--history", "history") == 1
+    assert message.partition(":")[0].replace("_", r"\_") in capsys.readouterr().out
+
+
+def test_an_option_that_is_wrong_ends_a_run_and_the_bad_cases_are_told_too(kincheck_main, capsys):
+    RIGHT.solves = 0
+    assert kincheck_main("run", "crank", "nosuch", "--engine", "nativ", engines=[RIGHT]) == 2
+    assert [line[:29] for line in capsys.readouterr().err.splitlines()] == [
+        "kincheck: there is no case 'n",
+        "kincheck: there is no engine ",
+    ]
     assert RIGHT.solves == 0
 
 

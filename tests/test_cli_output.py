@@ -8,8 +8,12 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from kincheck.core.harness import cli
+from kincheck.core.harness.attempt import said
 from kincheck.core.harness.case import Truth
+from kincheck.core.harness.reading.results import read_results
 from kincheck.core.harness.record import from_json
+from kincheck.core.harness.reporting.caveats import caveats
 
 from .fakes import Fake, crank, off, raising
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
@@ -24,8 +28,8 @@ def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
     assert kincheck_main("run", "crank", "--json", "-", engines=[Fake("native", answer=chatty)]) == 0
     captured = capfd.readouterr()
     assert len(from_json(captured.out.encode()).records) == 1
-    for said in ("from Python", "from the file descriptor", "[1/1] crank native: pass", "truth"):
-        assert said in captured.err
+    for text in ("from Python", "from the file descriptor", "[1/1] crank native: pass", "truth"):
+        assert text in captured.err
 
 
 @pytest.mark.skipif(os.name != "posix", reason="finds the C library by its POSIX name")
@@ -40,6 +44,81 @@ def test_what_c_keeps_in_its_buffer_does_not_come_after_the_json():
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
     assert (done.stdout, done.stderr) == ("json\n", "from C\n")
+
+
+ROD = """
+schema = "kincheck-case/1"
+name = "rod"
+source = "made up"
+[bodies.crank]
+[bodies.rocker]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.hinge]
+type = "revolute"
+bodies = ["ground", "rocker"]
+point = [1, 0, 0]
+axis = [0, 0, 1]
+[joints.rod]
+type = "distance"
+bodies = ["crank", "rocker"]
+points = [[0, 0.5, 0], [1, 0.5, 0]]
+length = LENGTH
+[points.tip]
+body = "rocker"
+position = [1, 0.5, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[sweep]
+driver = "turn"
+start = 0
+stop = 0.1
+steps = 3
+"""
+
+
+@pytest.mark.parametrize(("length", "told"), [("1.1", True), ("1.0", False), ("1.0000000001", False), ("1.00001", True)])
+def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(tmp_path, capsys, length, told):
+    file, out = tmp_path / "rod.toml", tmp_path / "out"
+    file.write_text(ROD.replace("LENGTH", length))
+    assert cli.main(["run", str(file), "--engine", "native", "--out", str(out), "--markdown", str(tmp_path / "rod.md")]) == 0
+    note = (
+        f"joint 'rod' (distance): length {length} m, points 1 m apart at design: "
+        "assembled from there, so the design position is another than the given one"
+    )
+    results = read_results(out / "results.json")
+    assert results.run["cases"]["rod"]["notes"] == [note] * told
+    assert (f"note: rod: {note}\n" in capsys.readouterr().out) is told
+    assert ("Note: rod: joint 'rod'" in (tmp_path / "rod.md").read_text()) is told
+    assert ("Geometry of rod" in dict(caveats(results))) is told
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="has /dev/stdout")
+def test_a_file_that_standard_output_goes_to_is_not_written_over(tmp_path):
+    file = tmp_path / "case.toml"
+    file.write_text(ROD.replace("LENGTH", "1.0"))
+    command = [sys.executable, "-c", "import sys; from kincheck.core.harness.cli import main; sys.exit(main(sys.argv[1:]))"]
+    command += ["run", str(file), "--engine", "native", "--junit"]
+    for name in ("/dev/stdout", str(tmp_path / "printed")):
+        with open(tmp_path / "printed", "w") as printed:
+            done = subprocess.run([*command, name], stdout=printed, stderr=subprocess.PIPE, text=True, check=False)
+        assert done.returncode == 2
+        expected = f"kincheck: --junit {name}: found the file that standard output goes to, expected one of its own; give another\n"
+        assert done.stderr == expected
+    done = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True)  # a pipe takes both
+    assert "</testsuites>" in done.stdout
+    assert "1 pass" in done.stdout
+
+
+def test_out_of_memory_says_so_where_the_exception_says_nothing(monkeypatch):
+    assert said(MemoryError()) == "MemoryError"
+    monkeypatch.setattr("kincheck.core.harness.attempt.memory_limit", lambda: 4.0)
+    assert said(MemoryError()) == "MemoryError; this process may have 4 GB, --memory gives it more"
+    assert said(ValueError("no axis")) == "ValueError: no axis"
 
 
 def test_the_table_says_what_happened_and_never_too_much(kincheck_main, capsys):

@@ -229,8 +229,8 @@ def test_a_derivative_has_one_less_of_what_the_engine_gives(rates):
     )
     assert [quantity for quantity, _ in known.items()] == ["position", "velocity"][: len(rates)]
     assert not known.lost
-    # with velocities alone it cannot be told from one that lacks them
-    assert lost.lost == (SAMPLES if len(rates) == 2 else UNSET)
+    assert lost.lost == (SAMPLES if rates else UNSET)
+    assert ("position: the engine gives no velocities to make it of" in (lost.reason or "")) is not bool(rates)
 
 
 def test_a_reference_of_all_there_is_needs_no_native_engine():

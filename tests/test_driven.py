@@ -106,5 +106,5 @@ def test_exit_status_is_the_same_for_small_and_large(loops, drivers, left_out, s
     stream = capsys.readouterr()
     assert said in stream.err
     if status:
-        assert f"kincheck: {file}: mechanism 'long': " in stream.err
+        assert f"kincheck: {file}: drivers: mechanism 'long': " in stream.err
         assert stream.out == ""

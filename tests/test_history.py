@@ -19,6 +19,7 @@ from kincheck.core.harness.history.series import green, read
 from kincheck.core.harness.history.store import HistoryError, Store
 from kincheck.core.harness.history.trends import trends
 from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.reporting.measures import Past, trend_figures
 
 from .nights import changed, keep, nights, records, times
 
@@ -219,3 +220,16 @@ def test_a_run_keeps_how_long_it_was_kept_waiting(path):
     with Store(path) as store:
         (entry,) = read(store).pairs["first", "mujoco", "projection"]
     assert math.isclose(entry.seconds, 0.006)
+
+
+def test_times_that_are_close_are_drawn_over_a_decade():
+    """Else a tenth looks like a step; a decade or more is drawn as it is."""
+    for factor, spread in ((1.1, 1.0), (20.0, None)):
+        past = [Past(run=str(k), engine="native", max_error=None, us_per_step=time) for k, time in enumerate((2.0, 2.0 * factor))]
+        axis = trend_figures(past, {})["time"]["layout"]["yaxis"]
+        if spread is None:
+            assert "range" not in axis
+        else:
+            low, high = axis["range"]
+            assert high - low == pytest.approx(spread)
+            assert low < math.log10(2.0) < math.log10(2.2) < high

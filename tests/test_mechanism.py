@@ -70,6 +70,12 @@ WRONG = {
     "a motion of words": (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
     "no axis": (lambda: Revolute("a", "b", "c", (0, 0, 0), None), "joint 'a' (revolute): axis is None, expected a direction"),
     "no rod": (lambda: Distance("a", "b", "c", None), "joint 'a' (distance): points is None, expected two points"),
+    "a negative rod": (
+        lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), -4.0),
+        "length is -4 m, expected a positive one; the points are 0.4 m apart at design, which is the length where none is given",
+    ),
+    "a rod of zero": (lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), 0.0), "length is 0 m, expected a positive one"),
+    "a rod of one point": (lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0), "the points coincide at design"),
     "no lead": (lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None), "joint 'a' (screw): lead is None, expected a length"),
     "no ratio": (lambda: Gear("g", ("a", "b"), ratio=None), "joint 'g' (gear): ratio = None is not finite; give a finite number"),
     "a radius of words": (lambda: RackPinion("r", ("a", "b"), radius="2"), "joint 'r' (rack_pinion): radius = 2 is not finite"),

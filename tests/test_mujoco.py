@@ -202,7 +202,9 @@ def test_a_missing_or_broken_mujoco_is_no_version(monkeypatch):
 
 def test_unknown_joints_and_drivers_are_named(monkeypatch):
     monkeypatch.setattr(Joint, "registry", dict(Joint.registry))
-    screw = type("Screw", (Revolute,), {"type": "screw"})("pivot", "ground", "crank", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    wobble = type("Wobble", (Revolute,), {"type": "wobble_of_test_mujoco"})(
+        "pivot", "ground", "crank", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+    )
     twist = type("Twist", (Driver,), {"type": "twist"})("crank")
-    assert "'pivot' (screw)" in adapter.MuJoCo().unsupported(change(slider_crank(), screw))
+    assert "'pivot' (wobble_of_test_mujoco)" in adapter.MuJoCo().unsupported(change(slider_crank(), wobble))
     assert "'crank' (twist)" in adapter.MuJoCo().unsupported(change(slider_crank(), drivers=(twist,)))

@@ -15,7 +15,7 @@ from kincheck.core.harness.regression.report import regressions
 from kincheck.core.harness.regression.subject import find, find_against
 from kincheck.core.harness.regression.summary import to_markdown
 
-from .nights import changed, keep, nights, records, times, worse
+from .nights import FACTS, RESULTS, changed, keep, nights, records, times, worse
 
 
 @pytest.fixture
@@ -182,6 +182,25 @@ def test_a_changed_tolerance_is_said(path):
     keep(path, changed(records(), errors=loosened))
     (finding,) = reported(path).findings
     assert (finding.kind, finding.message) == (Kind.TOLERANCE, "x position: 1e-9 → 1e-6")
+
+
+def test_a_changed_reference_is_said_and_no_regression(tmp_path, capsys):
+    """Somebody has edited the table beside the case, by less than any tolerance or by more."""
+    files = [tmp_path / name for name in ("before.json", "now.json")]
+    truth = RESULTS.references["first"]["x"]
+    edited = [truth.position[0] + 1e-10, *truth.position[1:]]
+    references = {
+        **RESULTS.references,
+        "first": RESULTS.references["first"] | {"x": msgspec.structs.replace(truth, position=edited)},
+    }
+    for file, changes in zip(files, ({}, {"references": references}), strict=True):
+        file.write_bytes(to_json(msgspec.structs.replace(RESULTS, run={**FACTS, "started": file.name}, **changes)))
+    assert cli.main(["report", str(files[0]), "--against", str(files[0])]) == 0
+    assert "Reference changed" not in capsys.readouterr().out
+    assert cli.main(["report", str(files[1]), "--against", str(files[0])]) == 0
+    said = capsys.readouterr().out
+    assert "Reference changed (2): what passes now is judged by other true values" in said
+    assert said.count(r"x position differs by up to 1e-10 m from what it was") == 2
 
 
 def test_tolerances_that_nothing_needed_are_named_after_ten_runs(path):

@@ -34,6 +34,7 @@ from kincheck.core.topology import Branch, SpanningTree, spanning_tree
 from . import naive
 from .exported import READERS, read
 from .mechanisms import four_bar, mcpherson, slider_crank, swapped
+from .test_planar_drive import ladder
 
 # Roundings of numbers of a few metres: some twenty of 2.2e-16 each, through a chain of ten bodies at most.
 ROUND_OFF = 5e-15
@@ -131,6 +132,7 @@ CASES = {
         case(gear_train(), 150.0),
         case(coupled_loop(), 5.0),
         case(shafts(), 3.0),
+        case(ladder(("ladder", "ground"), Z), 8.0),
         *probes(),
     )
 }

@@ -232,8 +232,10 @@ def said(error: BaseException) -> str:
         text = str(error)
     except Exception as another:  # its own text is code of the engine too
         text = f"its text cannot be had ({type(another).__name__})"
-    known = f"; this process may have {limit:g} GB" if isinstance(error, MemoryError) and (limit := memory_limit()) else ""
-    return bounded(f"{type(error).__name__}: {text}") + known
+    told = bounded(f"{type(error).__name__}: {text}" if text else type(error).__name__)
+    if isinstance(error, MemoryError) and (limit := memory_limit()):
+        told += f"; this process may have {limit:g} GB, --memory gives it more"
+    return told
 
 
 def bounded(text: Any) -> str:

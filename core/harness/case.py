@@ -181,11 +181,16 @@ class Output:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One output over the samples: value [unit], and derivatives by time where they are known, each of shape (n,)."""
+    """One output over the samples: value [unit], and derivatives by time where they are known, each of shape (n,).
+
+    Attributes:
+        possible: whether the engine gives what the value is made of; that of a derivative takes velocities.
+    """
 
     position: Array
     velocity: Array | None = None
     acceleration: Array | None = None
+    possible: bool = field(default=True, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)

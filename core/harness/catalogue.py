@@ -28,15 +28,19 @@ _EXAMPLES: Mapping[Kind | None, Any] = {
 
 def catalogue() -> Iterator[str]:
     """Lines to print: joints, couplers, drivers and motions, a type each."""
+    yield "points and directions are [x, y, z], global, at the design; of points and axes there is one on each body"
+    yield "keys in brackets may be left out; body i is the first, j the second"
     yield 'joints: type, bodies = ["first", "second"], and'
-    yield from _columns([(name, _keys(cls), *_counts(cls)) for name, cls in sorted(Joint.registry.items())])
+    yield from _columns([(name, _keys(cls), *_counts(cls), _meaning(cls)) for name, cls in sorted(Joint.registry.items())])
     yield 'joints that couple two others: type, joints = ["first", "second"], and'
     couplers = sorted(Coupler.registry.items())
-    yield from _columns([(name, _keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}") for name, cls in couplers])
+    yield from _columns(
+        [(name, _keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}", _meaning(cls)) for name, cls in couplers]
+    )
     yield "drivers: type, and"
-    yield from _columns([(name, _keys(cls)) for name, cls in sorted(DRIVERS.items())])
+    yield from _columns([(name, _keys(cls), _meaning(cls)) for name, cls in sorted(DRIVERS.items())])
     yield "motions of drivers: type, and"
-    yield from _columns([(name, _keys(cls)) for name, cls in sorted(Motion.registry.items())])
+    yield from _columns([(name, _keys(cls), _meaning(cls)) for name, cls in sorted(Motion.registry.items())])
 
 
 def output_catalogue() -> Iterator[str]:
@@ -76,6 +80,12 @@ def _keys(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str
         name = f"{each.name} [{measure.value}]" if measure else each.name
         names.append(name if each.default is MISSING else f"({name})")
     return ", ".join(names) or "nothing else"
+
+
+def _meaning(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str:
+    """The first line of what a class says of itself; a dataclass that says nothing has its signature there."""
+    first, *_ = (cls.__doc__ or "").strip().splitlines() or [""]
+    return "" if first.startswith(f"{cls.__name__}(") else first
 
 
 def _columns(rows: list[tuple[str, ...]]) -> Iterator[str]:

@@ -37,7 +37,7 @@ def results(
 
     Args:
         facts: further circumstances; they come before those found here, for a run that began in another process.
-        plan: the pairs that there were to be, of a run that ended before it had them all.
+        plan: the pairs that there were to be, of a run that does not have them all.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
     return Results(
@@ -151,6 +151,7 @@ def _facts(case: Case) -> dict[str, Any]:
         "driver": swept,
         "motions": {name: _driver(case, name) | {"motion": _motion(motion)} for name, motion in sweep.motions.items()},
         "signs": case.signs,
+        "notes": [note for joint in case.mechanism.joints for note in joint.notes],
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
     }
 

@@ -32,6 +32,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # argparse has said why
         return int(end.code or 0)
     try:
+        if getattr(options, "joint_type", ()):
+            from .joint_check.loading import load_joint
+
+            for where in options.joint_type:
+                load_joint(where)
         return _printed(int(options.do(options, house())))
     except KincheckError as error:
         complain(str(error).splitlines())

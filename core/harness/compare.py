@@ -79,7 +79,7 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
     motions = [trajectory.points[name] for name in output.points]
     given = 1 + sum(all(getattr(each, quantity) is not None for each in motions) for quantity in ("velocity", "acceleration"))
     known = given - (ORDERS - output.orders)  # the value of a derivative takes what the engine gives as a rate
-    return Series(position, *(rate if order < known else None for order, rate in enumerate(rates, 1)))
+    return Series(position, *(rate if order < known else None for order, rate in enumerate(rates, 1)), possible=known > 0)
 
 
 def _moving(motion: PointMotion) -> Vec3:
@@ -142,11 +142,12 @@ def deviations(
             name, reference = known[0]
             compared[quantity] = off = deviation(values, reference, output.atol * beat**order, output.rtol, name)
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
-            # the value of a derivative is nowhere known either where the engine gives no velocities to make it of
-            if lost and (off is not None or order or found.velocity is not None or output.orders == ORDERS):
+            if lost and (order or found.possible):
                 compared[quantity] = off and msgspec.structs.replace(off, within=False)
                 reasons.append(f"{quantity}: {lost} samples without a value where {name} has one")
                 losses += lost
+            elif not (order or found.possible):
+                reasons.append(f"{quantity}: the engine gives no velocities to make it of")
             elif off is None:
                 reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
             if off is not None and (alone := int((np.isfinite(values) & ~np.isfinite(reference)).sum())):

@@ -43,6 +43,14 @@ def lacking(results: Results, required: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(lines))
 
 
+def unsolved(results: Results) -> list[str]:
+    """That nothing came of a run but errors, timeouts and crashes: no result deviates, for there is none."""
+    outcomes = {record.outcome for record in results.records}
+    if outcomes & {Outcome.PASS, Outcome.FAIL} or not any(outcome.bad for outcome in outcomes):
+        return []
+    return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
+
+
 def how_to_install(engine: str) -> str:
     """The command that installs an engine's simulator, whose name is its own up to a hyphen, from kincheck's own metadata."""
     import importlib.metadata  # rarely needed, and slow

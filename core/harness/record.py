@@ -109,9 +109,13 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         driver: values at the samples by name: of what is swept [m, rad or s] first, then of every further moving driver.
         errors: one entry for every output of the case, whatever the outcome.
         residual_max: the engine's own largest constraint residual over the solved samples [m or -].
+        rank: of the rows that the engine solves, at the design: native's are those of the joints, Cartesian and without drivers
+            (unknowns less rank is dof), a simulator's those of its own model, loops, relations and drivers. Ranks of different
+            engines are not to be compared.
+        dof: degrees of freedom, drivers apart; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: how many samples were reached, out of how many.
-        us_per_step: warm solve by sample [us]; null unless all samples were reached.
+        us_per_step: warm solve by sample [us]; null unless all samples were reached: `solved` and `message` say why.
     """
 
     case: str
@@ -223,8 +227,13 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:
-        """Case, engine and mode of the pairs that were asked for and have no record: the run ended before them."""
+        """Case, engine and mode of the pairs that were asked for and have no record: the run ended before them, or see `unread`."""
         return [(case, engine, mode) for case, engine, mode in self.run.get("missing", [])]
+
+    @property
+    def unread(self) -> dict[str, str]:
+        """Cases that were asked for and make no sense, by their names as given, and why."""
+        return self.run.get("unread", {})
 
 
 def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:

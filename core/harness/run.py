@@ -54,6 +54,7 @@ def run(
     solver: Solver = here,
     made: Sequence[Record] = (),
     facts: Mapping[str, Any] | None = None,
+    unread: Sequence[str] = (),
 ) -> Results:
     """Solve every case with every engine and judge each answer.
 
@@ -68,6 +69,7 @@ def run(
         solver: where pairs are solved: in this process, in worker processes, on a cluster.
         made: records made earlier, by a run of the same cases and engines; their pairs are not solved again.
         facts: further circumstances, kept with the results; they come before those of now.
+        unread: names of cases that were asked for and make no sense; their pairs are among those that are missing.
 
     Raises:
         CaseError: two cases share their name, or two engines theirs and the mode: records go by names.
@@ -100,7 +102,8 @@ def run(
                 case.waiting.append((pair, attempt))
             else:
                 judge(pair, attempt, case.standard)
-    return results(cases, [records[key] for key in wanted], started=started, tol=tol, command=command, facts=facts)
+    found, asked = [records[key] for key in wanted], planned(cases, engines, unread)
+    return results(cases, found, started=started, tol=tol, command=command, facts=facts, plan=asked)
 
 
 def _distinct(what: str, names: Sequence[str]) -> None:
@@ -109,9 +112,10 @@ def _distinct(what: str, names: Sequence[str]) -> None:
         raise CaseError(f"run: there are two {what} named {twice[0]!r}; results go by name: rename one, or leave it out")
 
 
-def planned(cases: Sequence[Case], engines: Sequence[Engine]) -> list[tuple[str, str, str]]:
-    """Case, engine and mode of every pair, in the order of the records."""
-    return [(case.name, engine.name, engine.mode) for case in cases for engine in sorted(engines, key=_native_first)]
+def planned(cases: Sequence[Case], engines: Sequence[Engine], unread: Sequence[str] = ()) -> list[tuple[str, str, str]]:
+    """Case, engine and mode of every pair, in the order of the records; last those of cases that cannot be read."""
+    names = [*(case.name for case in cases), *unread]
+    return [(name, engine.name, engine.mode) for name in names for engine in sorted(engines, key=_native_first)]
 
 
 def _native_first(engine: Engine) -> bool:

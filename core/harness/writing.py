@@ -87,11 +87,21 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
             found.append(f"{option} -: standard output takes the document of --json alone; give a file")
         elif path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
             found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
+        elif _is_standard_output(path):
+            found.append(f"{option} {path}: found the file that standard output goes to, expected one of its own; give another")
         elif path.exists() and not path.is_file():
             continue  # a pipe or a device takes what several have to say
         elif (other := seen.setdefault(path.resolve(), option)) != option:
             found.append(f"{option} {path}: found the file of {other}, expected one of its own; give another")
     return found
+
+
+def _is_standard_output(path: Path) -> bool:
+    """Whether it is the file that standard output is sent to, under any name: one would take the other's place."""
+    try:
+        return path.is_file() and os.path.samestat(path.stat(), os.fstat(1))
+    except OSError:  # closed
+        return False
 
 
 def to_standard_output(encoded: bytes) -> None:

@@ -81,6 +81,20 @@ class Attachment:
         return P - self.origin
 
 
+def register(registry: dict[str, Any], cls: Any) -> None:
+    """Have case files know a type by its name. The same class may be declared anew: a module loaded again, a cell run again.
+
+    Raises:
+        MechanismError: another class has the name; case files would mean this one instead, and nobody would know.
+    """
+    known = registry.get(cls.type, cls)
+    if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+        raise MechanismError(
+            f"{cls.__name__}: type = {cls.type!r} is taken by {known.__module__}.{known.__qualname__}; give it another name"
+        )
+    registry[cls.type] = cls
+
+
 @dataclass(frozen=True)
 class Joint(ABC):
     """A joint between a first body i and a second body j.
@@ -91,7 +105,8 @@ class Joint(ABC):
         symmetric: both bodies may change places; not so where geometry belongs to one of them (a line, a plane, a hinge).
 
     Raises:
-        MechanismError: a number is not finite, a direction is zero, or a shape is wrong.
+        MechanismError: a number is not finite, a direction is zero, or a shape is wrong; or, where a class is declared, another has
+            its type.
     """
 
     type: ClassVar[str]
@@ -106,7 +121,7 @@ class Joint(ABC):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "type" in cls.__dict__:
-            Joint.registry[cls.type] = cls
+            register(Joint.registry, cls)
 
     def __post_init__(self) -> None:
         if self.i == self.j:
@@ -178,6 +193,11 @@ class Joint(ABC):
         for name, value in values.items():
             object.__setattr__(other, name, value)
         return other
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What a reader of results should know of its geometry: where it can be meant, and yet be a mistake."""
+        return ()
 
     @property
     def rows(self) -> int:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 from ..errors import MechanismError
 from ..given import held, plain, require_finite
-from .base import Kind
+from .base import Kind, register
 
 NUMBERS = (float, int, "float", "int")
 """What fields that are numbers are annotated with."""
@@ -37,7 +37,7 @@ class Coupler(ABC):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "type" in cls.__dict__:
-            Coupler.registry[cls.type] = cls
+            register(Coupler.registry, cls)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", held(f"{self}: joints", self.joints, 2, "two names"))

@@ -11,6 +11,9 @@ from ..algebra import root, vec
 from ..errors import MechanismError
 from .base import Attachment, Joint, length, positions
 
+# A length that differs from the design distance by less, relatively, moves no output beyond its tolerance, unless one is given.
+NOTED = 1e-9
+
 
 @dataclass(frozen=True)
 class Distance(Joint):
@@ -23,11 +26,12 @@ class Distance(Joint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        found = self.rod_length
-        if not (found > 0.0 and self.design_distance > 0.0):
+        if not self.design_distance > 0.0:
+            raise MechanismError(f"{self}: the points coincide at design, expected two places; use a spherical joint")
+        if not self.rod_length > 0.0:
             raise MechanismError(
-                f"{self}: length {found:.6g} m between points {self.design_distance:.6g} m apart at design, expected both "
-                "positive; for points that coincide use a spherical joint"
+                f"{self}: length is {self.rod_length:.10g} m, expected a positive one; the points are "
+                f"{self.design_distance:.10g} m apart at design, which is the length where none is given"
             )
 
     @property
@@ -39,6 +43,14 @@ class Distance(Joint):
     def rod_length(self) -> float:
         """The length the joint keeps [m]."""
         return self.design_distance if self.length is None else self.length
+
+    @property
+    def notes(self) -> Sequence[str]:
+        found, apart = self.rod_length, self.design_distance
+        if abs(found - apart) <= NOTED * apart:
+            return ()
+        how = "assembled from there, so the design position is another than the given one"
+        return (f"{self}: length {found:.10g} m, points {apart:.10g} m apart at design: {how}",)
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P_i, P_j = (vec(point) for point in self.points)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..console import complain
-from .house import House, Status, whole
+from .house import House, Status, add_joint_types, whole
 from .run import TOL
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def add(commands: Any) -> None:
     engines.add_argument(
         "--cases", nargs="+", default=[STRUT], metavar="CASE", help=f"built-in names, or paths to case files; default: {STRUT}"
     )
+    add_joint_types(engines)
     engines.add_argument("--engine", nargs="+", default=[], metavar="NAME", help="default: all engines, in both modes")
     engines.add_argument(
         "--rounds", type=whole(1), default=ROUNDS, metavar="N", help="of all contestants in turn; default %(default)s"
@@ -89,7 +90,9 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
     if not any(name in os.environ for name in bench_engines.THREADS):
         return _with_one_thread(options.command, bench_engines.THREADS)
     problems = _destinations(options, bench_engines.NAME)
-    cases = {name: found for name in options.cases for found in house.find_cases([name], problems)}
+    unread: dict[str, str] = {}
+    cases = {name: found for name in options.cases for found in house.find_cases([name], unread)}
+    problems += unread.values()
     engines = [
         engine
         for mode, known in (("projection", house.engines), ("simulate", house.simulations))

@@ -20,7 +20,8 @@ def add(commands: Any) -> None:
 
 def _check_joint(options: argparse.Namespace, house: House) -> int:
     """Check a joint type: its equations against their derivatives, its branches, and a closed loop in every engine."""
-    from ..joint_check.check_joint import check_joint, load_joint
+    from ..joint_check.check_joint import check_joint
+    from ..joint_check.loading import load_joint
 
     report = check_joint(load_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)])
     report.print(sys.stdout)

@@ -1,4 +1,4 @@
-"""Options of commands that take files of other tools: what those files do not say."""
+"""Options of commands that take files: joint types of one's own, and what files of other tools do not say."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..console import complain
 from ..reading.supplied import LEFT_OUT, Supplied
+from .house import add_joint_types
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 def add_options(command: argparse.ArgumentParser) -> None:
     """Add the options to a command's parser."""
+    add_joint_types(command)
     points = command.add_argument_group("hardpoints", "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv).")
     points.add_argument(
         "--template", metavar="NAME", help="mcpherson, double_wishbone or five_link, where the file does not say it"

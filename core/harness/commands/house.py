@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Status(IntEnum):
-    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work."""
+    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work, or part of it."""
 
     WITHIN = 0
     DEVIATES = 1
@@ -75,23 +75,24 @@ class House:
         try:
             require_driven(case.mechanism)
         except SolveError as error:  # it names the mechanism; the file is what the reader has to open
-            raise KincheckError(f"{name}: {error}") from error
+            raise KincheckError(f"{name}: {'drivers' if case.mechanism.moving else 'bodies'}: {error}") from error
         return case
 
     def find_cases(
-        self, names: Sequence[str], problems: list[str], found: Sequence[Case] = (), supplied: Supplied = NOTHING
+        self, names: Sequence[str], unread: dict[str, str], found: Sequence[Case] = (), supplied: Supplied = NOTHING
     ) -> list[Case]:
-        """The cases found already and those named; what is wrong with any of them is added to the problems."""
+        """The cases found already and those named; what is wrong with the others is put beside their names as given."""
         cases = {case.name: case for case in found}
         for name in dict.fromkeys(names):
             try:
                 case = self.find_case(name, supplied)
             except KincheckError as error:
-                problems += str(error).splitlines()
+                unread[name] = str(error)
                 continue
             if case.name in cases:
-                problems.append(f"{name}: there are two cases named {case.name!r}; results go by name: rename one")
-            cases[case.name] = case
+                unread[name] = f"{name}: there are two cases named {case.name!r}; results go by name: rename one"
+            else:
+                cases[case.name] = case
         return list(cases.values())
 
     def find_engines(self, names: Sequence[str], problems: list[str], mode: str | None = None) -> list[Engine]:
@@ -115,6 +116,18 @@ class House:
             return self.engine(name) if mode == "projection" else self.engine(name, mode)
         except Exception as error:
             return Unloadable(name, f"{type(error).__name__}: {error}", mode)
+
+
+def add_joint_types(command: argparse.ArgumentParser) -> None:
+    """Add the option to a command that takes case files; `main` loads what it names."""
+    command.add_argument(
+        "--joint-type",
+        action="append",
+        default=[],
+        metavar="MODULE:CLASS",
+        help="a joint type of your own, which case files may name then, in a module of this folder or an installed one; may be "
+        "repeated; check-joint checks it",
+    )
 
 
 def unknown(what: str, name: str, known: Sequence[str]) -> str:

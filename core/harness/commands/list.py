@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from ..console import how_to_install
-from .house import House, Status
+from .house import House, Status, add_joint_types
 
 
 def add(commands: Any) -> None:
@@ -18,6 +18,7 @@ def add(commands: Any) -> None:
     listing.add_argument("--schema", action="store_true", help="list the keys of a case file, and of a file of variations")
     listing.add_argument("--joints", action="store_true", help="list the types a case file can name: joints, drivers, motions")
     listing.add_argument("--outputs", action="store_true", help="list the types of outputs a case file can name, with their signs")
+    add_joint_types(listing)
 
 
 def _list(options: argparse.Namespace, house: House) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
 from ..visible import file_name
-from .house import House, Status, whole
+from .house import House, Status, add_joint_types, whole
 from .run import TOL
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def add(commands: Any) -> None:
     proving.add_argument(
         "case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases"
     )
+    add_joint_types(proving)
     proving.add_argument(
         "--out", type=Path, metavar="DIR", help="write CASE.reference.json there, for run --reference or a case file"
     )
@@ -53,8 +54,9 @@ def _prove(options: argparse.Namespace, house: House) -> int:
     from ..record import to_json
     from ..writing import unwritable, write
 
-    problems: list[str] = []
-    cases = house.find_cases(options.case or [*house.cases()], problems)
+    unread: dict[str, str] = {}
+    cases = house.find_cases(options.case or [*house.cases()], unread)
+    problems = [*unread.values()]
     if options.out is not None:
         try:
             options.out.mkdir(parents=True, exist_ok=True)

@@ -8,12 +8,14 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
-from ..console import complain, lacking, progress
+from ..console import complain, lacking, progress, unsolved
+from ..visible import visible
 from . import foreign, isolation
 from .house import House, Status
 
@@ -98,23 +100,43 @@ def positive(text: str) -> float:
     return tol
 
 
+@dataclass(frozen=True)
+class _Plan:
+    """What is to be run.
+
+    Attributes:
+        baseline: what to compare with, where that is not among the engines.
+        unread: cases that make no sense, by their names as given, and why: the others are run all the same.
+    """
+
+    cases: Sequence[Case]
+    engines: Sequence[Engine]
+    baseline: Engine | None
+    unread: dict[str, str]
+
+
 def _run(options: argparse.Namespace, house: House) -> int:
-    """Solve every case with every engine, judge each, print a table and write what was asked for."""
+    """Solve every case with every engine, judge each, print a table and write what was asked for.
+
+    Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a crash, 2 the tool could not do
+    its work: a case cannot be read (the others are run), a file cannot be written, a required engine is missing, or nothing at all
+    was solved.
+    """
     from ..reporting import deliver as delivery
 
     to = delivery.Destinations.of(options)
-    cases, engines, baseline = _planned(options, house, to)
+    plan = _planned(options, house, to)
     precision: Any = None
     if options.bench is not None:
         from ..bench.engines import efforts_in
 
         precision = efforts_in(options.bench)
     with delivery.json_only() if to.json == "-" else nullcontext():
-        results, problems, keeping = _solved(options, cases, engines, baseline)
+        results, problems, keeping = _solved(options, plan)
     if to.out or to.json or keeping:
         from ..scene import with_scenes
 
-        results = with_scenes(results, cases)
+        results = with_scenes(results, plan.cases)
     history: Any = None
     if keeping:
         keeping.end(results, interrupted=bool(problems))
@@ -124,19 +146,20 @@ def _run(options: argparse.Namespace, house: House) -> int:
     if options.explain:
         from ..explain import explain
 
-        print(*(line for case in cases for line in explain(case)), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
-    problems += lacking(results, options.require)
+        lines = (line for case in plan.cases for line in explain(case))
+        print(*lines, sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
+    problems += lacking(results, options.require) + unsolved(results)
     complain(problems)
-    if problems:
+    if problems or plan.unread:
         return Status.FAILED
     return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
 
 
-def _planned(options: argparse.Namespace, house: House, to: Destinations) -> tuple[list[Case], list[Engine], Engine | None]:
-    """The cases, the engines, and what to compare with where that is not among them.
+def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Plan:
+    """What is to be run; cases that make no sense are told at once, before anything is computed.
 
     Raises:
-        KincheckError: what cannot be done, all of it, and before anything is computed.
+        KincheckError: what cannot be done, all of it, where no case is left or an option is wrong.
     """
     from ..probe import probes
 
@@ -148,29 +171,34 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> tup
     _return_cases(options, house)
     foreign.return_cases(options)
     named: list[str] = options.case or ([] if options.joints else [*house.cases()])
-    cases = house.find_cases(named, problems, list(probes()) if options.joints else [], foreign.supplied(options))
+    unread: dict[str, str] = {}
+    cases = house.find_cases(named, unread, list(probes()) if options.joints else [], foreign.supplied(options))
     foreign.tell_left_out(cases)
     if options.reference and not problems:
         from ..references import judged_by
 
-        cases = judged_by(cases, options.reference)
+        try:
+            cases = judged_by(cases, options.reference)
+        except KincheckError as error:
+            problems += str(error).splitlines()
     engines, baseline = _engines(options, house, problems)
     problems += to.problems(history=options.history)
     problems = problems or isolation.unreachable(options)
-    if problems:
-        raise KincheckError("\n".join(problems))
-    return cases, engines, baseline
+    if problems or not cases:
+        raise KincheckError("\n".join([*unread.values(), *problems]))
+    complain(line for message in unread.values() for line in message.splitlines())
+    return _Plan(cases, engines, baseline, {visible(name): visible(message, also="\n") for name, message in unread.items()})
 
 
-def _solved(
-    options: argparse.Namespace, cases: Sequence[Case], engines: Sequence[Engine], baseline: Engine | None
-) -> tuple[Results, list[str], Keeping | None]:
+def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str], Keeping | None]:
     """The results, those made before an interrupt too, what interrupted them if something did, and their place in the history."""
     from .. import run as running
     from ..workers.distributed import ClusterError
 
-    solver, settings = isolation.solver(options, engines)
-    keeping = _keeping(options, cases, engines, settings)
+    solver, settings = isolation.solver(options, plan.engines)
+    if plan.unread:
+        settings["unread"] = plan.unread
+    keeping = _keeping(options, plan, settings)
     made = [*keeping.made] if keeping else []
     records: list[Record] = [*made]
     tell = progress(records)
@@ -184,27 +212,26 @@ def _solved(
         from ..circumstances import conditions
 
         settings |= conditions()
-    common: dict[str, Any] = {"tol": options.tol, "command": options.command, "facts": keeping.facts if keeping else settings}
-    started = datetime.now(UTC)
+    about: dict[str, Any] = {"tol": options.tol, "command": options.command, "facts": keeping.facts if keeping else settings}
+    started, unread = datetime.now(UTC), [*plan.unread]
     try:
-        return running.run(cases, engines, progress=keep, baseline=baseline, solver=solver, made=made, **common), [], keeping
+        how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver, "made": made, "unread": unread, **about}
+        return running.run(plan.cases, plan.engines, progress=keep, **how), [], keeping
     except (KeyboardInterrupt, ClusterError) as reason:
-        plan = running.planned(cases, engines)
-        records.sort(key=lambda each: plan.index((each.case, each.engine, each.mode)))
-        problem = f"{str(reason) or 'interrupted'}: {len(records)} of {len(plan)} records were made and are kept"
-        return running.results(cases, records, started=started, plan=plan, **common), [problem], keeping
+        pairs = running.planned(plan.cases, plan.engines, unread)
+        records.sort(key=lambda each: pairs.index((each.case, each.engine, each.mode)))
+        problem = f"{str(reason) or 'interrupted'}: {len(records)} of {len(pairs)} records were made and are kept"
+        return running.results(plan.cases, records, started=started, plan=pairs, **about), [problem], keeping
 
 
-def _keeping(
-    options: argparse.Namespace, cases: Sequence[Case], engines: Sequence[Engine], settings: dict[str, Any]
-) -> Keeping | None:
+def _keeping(options: argparse.Namespace, plan: _Plan, settings: dict[str, Any]) -> Keeping | None:
     """The run in its history, where there is one."""
     if options.history is None:
         return None
     from ..history.keeping import keep
 
     about: dict[str, Any] = {"tol": options.tol, "command": options.command, "settings": settings}
-    keeping = keep(Path(options.history), cases, engines, resume=options.resume, **about)
+    keeping = keep(Path(options.history), plan.cases, plan.engines, unread=[*plan.unread], resume=options.resume, **about)
     if options.resume:
         print(
             f"kincheck: run {keeping.run} goes on, {len(keeping.made)} records are there"

@@ -65,19 +65,21 @@ def keep(
     command: str,
     settings: Mapping[str, Any],
     resume: bool,
+    unread: Sequence[str] = (),
 ) -> Keeping:
     """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits, versions, machine and files.
 
     Args:
         settings: further circumstances.
         resume: take up one that has no end; where there is none, a new one begins.
+        unread: names of cases that were asked for and make no sense.
 
     Raises:
         HistoryError: the file cannot be read or written.
     """
     started = datetime.now(UTC)
     facts = circumstances(cases, started=started, tol=tol, command=command) | plain({**settings, **conditions()})
-    plan = planned(cases, engines)
+    plan = planned(cases, engines, unread)
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
     git: Mapping[str, Any] = facts["git"] or {}
     code = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed", "edits")]

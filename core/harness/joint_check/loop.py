@@ -48,18 +48,19 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
     yield from _rates(case)
     reference = {output.name: output_series(case, output, native) for output in case.outputs}
     other: Case | None = None
+    without = "there is no equivalent() to solve instead"
     try:
         other = _equivalent(case)
         if other is not None:
             yield _compared("loop: native, equivalent", other, _solved(other), reference)
     except Exception as error:
-        other = None
+        other, without = None, "equivalent() fails, see native"
         yield Finding("loop: native, equivalent", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
     if not engines:
         yield Finding("loop: simulators", Verdict.SKIP, message="no engines were given")
     for engine in engines:
         if engine.name != NATIVE:
-            yield _simulated(engine, case, other, reference)
+            yield _simulated(engine, case, other or without, reference)
 
 
 def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
@@ -111,16 +112,16 @@ def _equivalent(case: Case) -> Case | None:
     return replace(case, name=f"{case.name}_equivalent", mechanism=mechanism)
 
 
-def _simulated(engine: Engine, case: Case, other: Case | None, reference: dict[str, Series]) -> Finding:
-    """An engine's answer compared with the native one, or the reason why there is none."""
+def _simulated(engine: Engine, case: Case, other: Case | str, reference: dict[str, Series]) -> Finding:
+    """An engine's answer compared with the native one, or why there is none; `other` is the equivalent, or why there is none."""
     name = f"loop: {engine.name}"
     if engine.version() is None:
         return Finding(name, Verdict.SKIP, message="not installed")
     reason = engine.unsupported(case)
     chosen = case
     if reason is not None:
-        if other is None:
-            return Finding(name, Verdict.SKIP, message=f"{reason}; there is no equivalent() to solve instead")
+        if isinstance(other, str):
+            return Finding(name, Verdict.SKIP, message=f"{reason}; {other}")
         unknown = engine.unsupported(other)
         if unknown is not None:
             return Finding(name, Verdict.SKIP, message=f"{reason}; nor its equivalent: {unknown}")

@@ -84,6 +84,9 @@ def _check(file: Path, sweep: SweepKeys, named: bool, drivers: Mapping[str, Any]
     if sweep.start == sweep.stop and sweep.steps > 1:
         problem = f"found the start {sweep.start!r} again with {sweep.steps} steps, expected another value"
         raise fault(file, "sweep.stop", f"{problem}; give steps = 1 for a single sample")
+    if sweep.start != sweep.stop and sweep.steps == 1:
+        problem = f"found 1 with start {sweep.start!r} and stop {sweep.stop!r}, expected 2 or more samples, both ends among them"
+        raise fault(file, "sweep.steps", f"{problem}; give more, or stop = start for a single sample")
 
 
 def _motion(file: Path, mechanism: Mechanism, name: str, value: object, length: Convert, angle: Convert) -> Motion:

@@ -52,12 +52,13 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class _Samples:
-    """Columns by name, rows with the place to name in messages, and the convention that a comment names."""
+    """Columns by name, rows with the place to name in messages, the key of all of them, and the convention that a comment names."""
 
     file: Path
     header: str
     columns: Sequence[str]
     rows: Sequence[tuple[str, Sequence[float]]]
+    key: str = ""
     signs: str = ""
 
 
@@ -130,8 +131,9 @@ def _inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> _Sa
     if keys.rows is None:
         raise fault(file, "reference", "found neither file nor rows, expected one of them; name a CSV file or give the rows")
     columns = keys.columns or ["driver", *(output.name for output in outputs if not output.name.endswith(PER_TRAVEL))]
-    rows = [(f"reference.rows[{k}]", row) for k, row in enumerate(keys.rows)]
-    samples = _Samples(file, "reference.columns", columns, rows)
+    key = "reference.rows"
+    rows = [(f"{key}[{k}]", row) for k, row in enumerate(keys.rows)]
+    samples = _Samples(file, "reference.columns", columns, rows, key)
     for where, row in rows:
         _check_width(samples, where, len(row))
     return samples
@@ -153,7 +155,7 @@ def _from_csv(case_file: Path, keys: ReferenceKeys) -> _Samples:
         for cells in filter(None, reader):
             where = f"line {reader.line_num}"
             if samples is None:
-                samples = _Samples(file, where, [cell.strip() for cell in cells], rows, signs)
+                samples = _Samples(file, where, [cell.strip() for cell in cells], rows, signs=signs)
                 continue
             _check_width(samples, where, len(cells))
             # numbers at once: the cells of a large file as texts would take many times its size
@@ -241,4 +243,4 @@ def _check_grid(samples: _Samples, found: Sequence[float], values: Array) -> Non
             raise fault(samples.file, where, problem)
     if len(found) != len(values):
         problem = f"found {len(found)} rows, expected {len(values)}, the steps of the sweep; {advice}"
-        raise fault(samples.file, "", problem)
+        raise fault(samples.file, samples.key, problem)

@@ -36,6 +36,7 @@ class _About(msgspec.Struct):
 
     source: str = ""
     signs: str = ""
+    notes: list[str] = []
     driver: _Driver = _Driver()
     motions: dict[str, _Driver] = {}
 
@@ -61,6 +62,7 @@ def read_results(file: Path) -> Results:
         raise fault(file, "", f"found {error}, expected results; {_ADVICE}") from None
     _convert(file, "run.cases", results.run.get("cases", {}), dict[str, _About])
     _convert(file, "run.missing", results.run.get("missing", []), list[tuple[str, str, str]])
+    _convert(file, "run.unread", results.run.get("unread", {}), dict[str, str])
     samples: dict[str, int] = {}
     for k, record in enumerate(results.records):
         _check_record(file, f"records[{k}]", record, samples)

@@ -14,18 +14,21 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
     [bodies.NAME]        (origin) = [0, 0, 0], (euler_parameters) = [1, 0, 0, 0], e0..e3, body to global; (fixed) = false
                          the body "ground" is there without being declared
     [joints.NAME]        type, bodies = [first, second], and what the type asks for: point, axis, lengths, ...
+                         a type of your own: --joint-type MODULE:CLASS on the command line has it known
                          type, joints = [first, second], where it couples two other joints: gear (ratio), rack_pinion (radius)
                          a joint's rotation and displacement are those of its second body relative to its first, about and
                          along its axis by the right-hand rule, zero at design
     [points.NAME]        body, position: a point that is compared, or driven
     [drivers.NAME]       type = "point_coordinate": point, direction, (relative) = true
-                         type = "joint_angle" or "joint_displacement": joint, (relative) = true
+                         type = "joint_angle" or "joint_displacement": joint, (relative) = true; of joints that have a rotation
+                         or a translation: revolute, cylindrical, screw, planar (its turn), translational
                          values are measured from the design position; relative = false: absolute, which for joints is the same
     [drivers.NAME.motion]   how it goes with time; without, it holds its design value unless it is swept
                          type = "ramp": rate, per second
                          type = "sine": amplitude, frequency [Hz], (phase) = 0: amplitude sin(2 pi frequency t + phase)
                          type = "table": times [s], values: the natural cubic spline through them, which must cover the sweep
-    [sweep]              (driver), start, stop, steps: samples with both ends; (rate) = 1, in driver units per second
+    [sweep]              (driver), start, stop, steps: samples with both ends, 1 where they are the same; (rate) = 1, in driver
+                         units per second
                          driver: its samples from start to stop; it moves at the rate, whose sign says which way, and has its design
                          value at time zero
                          no driver, or "time": start and stop are times [s], there is no rate, and the motions move everything

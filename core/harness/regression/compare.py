@@ -17,6 +17,9 @@ from .subject import Subject
 CIRCUMSTANCES = ("kincheck", "python", "numpy", "tol", "host", "processor", "platform")
 PHASES = ("build", "first", "warm", "compare")
 
+References = Mapping[str, Mapping[str, OutputSeries]]
+"""True values by case and output."""
+
 
 def compare(now: Subject, before: Subject, history: History, slowest: float) -> list[Finding]:
     """What differs, in the order of the records.
@@ -36,6 +39,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
         findings += _lost(record, old)
         findings += _moved(record, old)
         findings += _errors(record, old)
+        findings += _references(record, now.results.references, before.results.references)
         entries = history.pairs.get(pair, ())
         findings += _slower(
             record, _usual(before, old, entries, history, same_machine(now.facts, before.facts)), now.facts, slowest
@@ -47,8 +51,10 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
 
 def unmade(now: Subject) -> list[Finding]:
     """The pairs that the run was to make and did not: whatever it is compared with, nothing checks them."""
-    pairs = now.results.missing
-    return [Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=UNMADE) for case, engine, mode in pairs]
+    pairs, why = now.results.missing, now.results.unread
+    return [
+        Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE)) for case, engine, mode in pairs
+    ]
 
 
 def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:
@@ -180,6 +186,18 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                 told = f"{output} {motion} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
                 yield _finding(Kind.DRIFTED, now, told, before=a.max_abs, now=b.max_abs, ratio=ratio, limit=DRIFT, **about)
+
+
+def _references(record: Record, now: References, before: References) -> Iterator[Finding]:
+    """True values that are not what they were; those that came or went show in what is compared."""
+    for output, old in before.get(record.case, {}).items():
+        new = now.get(record.case, {}).get(output)
+        for motion in MOTIONS:
+            was, off = _values(old, motion), _apart(_values(old, motion), _values(new, motion))
+            if off > SAME_SAMPLE * max((abs(x) for x in was if x is not None), default=0.0):
+                told = f"{output} {motion} differs by up to {number(off)} {motion_unit(old.unit, motion)} from what it was"
+                yield _finding(Kind.REFERENCE, record, told, now=off, output=output, motion=motion)
+                break
 
 
 def _usual(

@@ -19,6 +19,7 @@ class Kind(StrEnum):
     SLOWER = "slower"
     FIXED = "fixed"
     TOLERANCE = "tolerance changed"
+    REFERENCE = "reference changed"
     ADDED = "new in this run"
     ABSENT = "not in this run"
 
@@ -36,6 +37,7 @@ WHY: Mapping[Kind, str] = {
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
     Kind.FIXED: "they failed in the run compared with",
     Kind.TOLERANCE: "what passes now need not have passed before, or the reverse",
+    Kind.REFERENCE: "what passes now is judged by other true values than it was: somebody has edited them, or the case",
     Kind.ADDED: "nothing to compare with",
     Kind.ABSENT: "not asked for, or gone from the library: nothing is known of them",
 }

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ..case import Truth
 from ..record import Outcome, Record, Results
 from .axis import SAMPLES
-from .wording import engine_name, product
+from .wording import engine_name, notes, product
 
 COMPARED = (Outcome.PASS, Outcome.FAIL)
 
@@ -32,12 +32,15 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         say(f"In-house oracle: {names}", "This project computed the reference. Agreement with our own oracle is not validation.")
     if names := cases(lambda record: record.truth == Truth.CONSENSUS_ONLY):
         say(f"Consensus only: {names}", "There is no reference. Engines that agree with the native one may be wrong together.")
+    for case, note in notes(results.run):
+        say(f"Geometry of {case}", f"{note[:1].upper()}{note[1:]}.")
     for outcome in Outcome:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
         if pairs and outcome not in COMPARED:
             say(f"{outcome.value.capitalize()}: {len(pairs)}", f"Nothing is said about {'; '.join(pairs)}.")
-    if results.missing:
-        pairs = [f"{product(engine, mode)} on {case}" for case, engine, mode in results.missing]
+    for case, why in results.unread.items():
+        say(f"Not read: {case}", f"{why}. Nothing is said about it.")
+    if pairs := [f"{product(engine, mode)} on {case}" for case, engine, mode in results.missing if case not in results.unread]:
         say(f"Never made: {len(pairs)}", f"The run ended before them, and nothing is said about {'; '.join(pairs)}.")
     for record in records:
         if record.solved is not None and record.samples is not None and record.solved < record.samples:

@@ -27,7 +27,7 @@ def to_junit(results: Results) -> bytes:
                 test = ElementTree.SubElement(
                     suite, "testcase", classname=f"{case}.{engine}.{mode}", name="never made", time="0.000000"
                 )
-                ElementTree.SubElement(test, "error", message=UNMADE)
+                ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
         for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
             suite.set(count, str(sum(1 for _ in suite.iter(tag))))
     ElementTree.indent(root)

@@ -12,7 +12,7 @@ from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
 from .table import COLOURS, QUANTITIES, messages, print_messages, print_signs, worst
-from .wording import signs
+from .wording import notes, signs
 
 NOT_ASKED = "–"
 
@@ -46,6 +46,7 @@ def to_markdown(results: Results) -> str:
         cells = (escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escaped(_reading(results))}."]
+    lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
     lines += [
         escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()

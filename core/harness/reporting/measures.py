@@ -64,8 +64,15 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
 
     errors = figure({(each.engine, each.run): _finite(each.max_error) for each in history})
     times = figure({(each.engine, each.run): _finite(each.us_per_step) for each in history})
-    times["layout"]["yaxis"] = TIMES
+    times["layout"]["yaxis"] = TIMES | _decade([value for trace in times["data"] for value in trace["y"] if value])
     return {"error": _floored(errors), "time": times}
+
+
+def _decade(values: Sequence[float]) -> Figure:
+    """The range of a log axis, where values are closer than a decade: drawn as large as the page a tenth would look like a step."""
+    low, high = (math.log10(end(values, default=1.0)) for end in (min, max))
+    middle = 0.5 * (low + high)
+    return {"range": [middle - 0.5, middle + 0.5]} if high - low < 0.9 else {}
 
 
 def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> Figure:

@@ -79,7 +79,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
             unjudged=sum(record.outcome in COMPARED and not judged([record]) for record in records),
             problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
             not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
-            circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing")},
+            circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
             settings=_settings(records),
             styles=styles,
             cases=cases,
@@ -121,7 +121,8 @@ def packed(text: str) -> str:
 
 def headline(results: Results) -> str:
     """The run in one sentence."""
-    records, missing = results.records, len(results.missing)
+    records, unread = results.records, len(results.unread)
+    missing = sum(case not in results.unread for case, _, _ in results.missing)
     compared, broken = [record for record in records if judged([record]) or _lost(record)], _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
     within = [record for record in failed if all(each.within for each in record.errors.values())]  # where there is a deviation
@@ -143,6 +144,7 @@ def headline(results: Results) -> str:
             else "The one comparison is within tolerance"
         )
     said += f", {broken} could not be completed" if broken else ""
+    said += f"; {unread} {'case' if unread == 1 else 'cases'} could not be read" if unread else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
 
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from .. import printing
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
-from .wording import signs
+from .wording import notes, signs
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
@@ -52,7 +52,9 @@ def print_signs(run: Mapping[str, Any], console: Console) -> None:
 
 
 def print_messages(results: Results, console: Console) -> None:
-    """Print every message, and a count of outcomes."""
+    """Print notes on the cases, every message, and a count of outcomes."""
+    for case, note in notes(results.run):
+        console.print(Text(visible(f"note: {case}: {note}")), soft_wrap=True)
     for (engine, outcome, message), cases in messages(results).items():
         console.print(Text(visible(f"{outcome}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)

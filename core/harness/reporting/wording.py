@@ -17,7 +17,7 @@ TRUTHS = {
 }
 
 UNMADE = "asked for and never made: the run ended before it"
-"""Of a pair that has no record."""
+"""Of a pair that has no record, unless its case cannot be read."""
 
 _LABELS = {"half_track_change": "half-track change", "wheelbase_change": "wheel-base change"}
 
@@ -44,6 +44,11 @@ def signs(run: Mapping[str, Any]) -> list[str]:
         if words := facts.get("signs"):
             said.setdefault(words, []).append(case)
     return [f"Signs of {', '.join(cases)}: {words}" for words, cases in said.items()]
+
+
+def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Cases and what is to be known of their geometry, by the circumstances of a run."""
+    return [(case, note) for case, facts in run.get("cases", {}).items() for note in facts.get("notes", ())]
 
 
 def motion_unit(unit: str, motion: str) -> str:
