@@ -143,7 +143,7 @@ class PinocchioModel:
             i, j = (self.carrier[body] for body in joint.bodies)
             self._close(joint, i, j, ends_of(mechanism, joint), joint.name in named)
         for each in mechanism.couplers:
-            self.conditions.append(self._linear(*zip(each.joints, each.freedoms, each.coefficients, strict=True)))
+            self.conditions.append(self._linear(*each.terms))
         for driver in mechanism.drivers:
             if isinstance(driver, PointCoordinate):
                 point = mechanism.point(driver.point)

@@ -21,7 +21,7 @@ from ..core.joints import Distance, Fixed, Joint, Spherical
 from ..core.mechanism import GROUND, Mechanism, Vector
 from ..core.topology import Branch, SpanningTree
 from ..core.trajectory import Array, Trajectory
-from .chains import CHAINS, Link, relations
+from .chains import CHAINS, Link, end_of_loop, relations
 from .closures import CLOSURES, ends_of
 from .jointed import fits, jointed
 from .pinocchio import Pinocchio, PinocchioModel
@@ -162,10 +162,8 @@ class _Model(PinocchioModel):
 
     def _hang(self, joint: Joint, i: int, P: Vector) -> None:
         """The slides and hinges of a closure, on what joint i carries; a ball at their end is left to the constraint."""
-        links, point, tied = CHAINS[type(joint)](joint, P), P, Fixed
-        if links and links[-1].move == "ball":
-            links, point, tied = links[:-1], links[-1].point, Spherical
-        self.hung[joint.name] = self._add_links(i, joint, links, 1), point, tied
+        links, point, turns = end_of_loop(CHAINS[type(joint)](joint, P), P)
+        self.hung[joint.name] = self._add_links(i, joint, links, 1), point, Spherical if turns else Fixed
 
     def _close(self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool) -> None:
         i, point, tied = self.hung[joint.name]

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, cross, quat, vec
 from ..core.joints import Joint
+from ..core.joints.base import triad
 from ..core.mechanism import GROUND, Body, Mechanism, Vector
 from ..core.trajectory import Array, BodyMotion
 from .chains import Link
@@ -44,6 +45,17 @@ class Displacement:
         """What a hinge adds that this displacement carries along; its unit axis and a point on it are those at design."""
         turn = self.turn * about(axis, angle)
         return Displacement(turn, self.of(P) - rotated(turn, P))
+
+
+def frame_along(axis: Sequence[float], column: int) -> Array:
+    """A right-handed frame that has the axis, made a unit vector, in this column; shape (3, 3)."""
+    return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
+
+
+def middle(mechanism: Mechanism, body: Body) -> Array:
+    """The mean of a body's joint points, or its origin where it has none; global at design [m], shape (3,)."""
+    points = [at for joint in mechanism.joints if body.name in joint.bodies for at in joint.points_on(body.name)]
+    return np.mean(points, axis=0) if points else np.array(body.origin)
 
 
 def attitude(body: Body) -> Quat:

@@ -145,8 +145,7 @@ def constraints(
         composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
         found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
     for coupler in mechanism.couplers:
-        terms = zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)
-        found.append(_relation(coupler.name, {f"{joint}.{freedom}": k for joint, freedom, k in terms}, frame))
+        found.append(_relation(coupler.name, {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}, frame))
     found += [_driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed) for each in mechanism.drivers]
     return _restyled(found, style)
 
