@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...algebra import Vec3, cross
+from ...errors import shortened
 from ...mechanism import Vector
 from ...primitives.base import Twist
 from ...trajectory import Array
@@ -84,8 +85,7 @@ def free_motions(matrix: Array) -> Array:
 
 def described(found: Sequence[Screw], most: int = 4) -> str:
     """The motions of the fastest bodies, in words."""
-    more = f" and {len(found) - most} more" if len(found) > most else ""
-    return ", ".join(map(str, found[:most])) + more
+    return shortened([*map(str, found)], most)
 
 
 def _screw(name: str, twist: Twist, at: Configuration, frame: Frames, fastest: float) -> Screw:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import shortened
 from ...trajectory import Array
 from ..continuity import EPSILON
 from ..system import System
@@ -84,8 +85,7 @@ class Singularity:
 
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence, the first few."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
+    return shortened(names, NAMED)
 
 
 def examine(system: System, state: Array, sample: Array) -> Singularity:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError, SolveError
+from ...errors import KincheckError, SolveError, unknown
 from ..reading.supplied import NOTHING, Supplied
 
 if TYPE_CHECKING:
@@ -115,12 +114,6 @@ class House:
             return self.engine(name) if mode == "projection" else self.engine(name, mode)
         except Exception as error:
             return Unloadable(name, f"{type(error).__name__}: {error}", mode)
-
-
-def unknown(what: str, name: str, known: Sequence[str]) -> str:
-    """What to say of a name that is none of the known ones."""
-    close = difflib.get_close_matches(name, known, n=1)
-    return f"there is no {what} {name!r}; " + (f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}")
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> str:

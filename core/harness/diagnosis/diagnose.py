@@ -9,7 +9,7 @@ from ...analysis.diagnosis.conditioning import Conditioning, conditioning
 from ...analysis.diagnosis.rank import Blocked, Component, Dependency, Ranks, Row, Violation
 from ...analysis.diagnosis.screws import Screw, described
 from ...analysis.equations.geometry import places
-from ...errors import SolveError
+from ...errors import SolveError, shortened
 from ..case import MARKER, ORDERS, Case
 from ..explain import explain
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
@@ -186,8 +186,4 @@ def _remedy(ranks: Ranks) -> str:
 
 
 def _violations(rows: tuple[Violation, ...] | list[Violation], most: int = 4) -> str:
-    more = f" and {len(rows) - most} more" if len(rows) > most else ""
-    return (
-        ", ".join(f"{each.row} by {abs(each.amount):.2g} {'m' if 'along' in each.row.holds else 'rad'}" for each in rows[:most])
-        + more
-    )
+    return shortened([f"{each.row} by {abs(each.amount):.2g} {'m' if 'along' in each.row.holds else 'rad'}" for each in rows], most)

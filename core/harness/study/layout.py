@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable
 from enum import Enum
 
 from ...analysis.equations.geometry import kinds, places
+from ...errors import remedy
 from ...mechanism import Mechanism
 from ..case import MARKER
 
@@ -59,9 +59,7 @@ class Geometry:
             and (place.startswith(f"{name}.") or place.partition(".")[2].startswith(f"{name}."))
         ]
         if not found:
-            close = difflib.get_close_matches(name, self.named, n=1)
-            names = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(self.named)}"
-            raise PlaceError(f"expected a position, direction or length of the case; {names}")
+            raise PlaceError(f"expected a position, direction or length of the case; {remedy(name, self.named)}")
         if any(place not in self.together(found[0]) for place in found):
             raise PlaceError(f"which may be {' or '.join(found)}, expected one place; write it in full")
         return found[0]
