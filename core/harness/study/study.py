@@ -17,12 +17,10 @@ from ...analysis.route import Route
 from ...analysis.variants import solve_variants
 from ...jet import Jet
 from ...motions import Path
-from ...trajectory import Array
+from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..case import Case, Quantity
 from .reduce import Summary, merged, summary
 from .variation import CHUNK, Mode, Stream, Variation, generator
-
-MOTIONS = ("position", "velocity", "acceleration")
 
 # Bytes of motions at once, of one thread: many samples of many points are solved in parts of a chunk.
 ROOM = 64_000_000
@@ -40,12 +38,12 @@ class Row:
     @property
     def name(self) -> str:
         """That of the output, and of its derivative as in reference tables."""
-        return self.output.name + (f".{MOTIONS[self.derivative]}" if self.derivative else "")
+        return self.output.name + (f".{QUANTITIES[self.derivative]}" if self.derivative else "")
 
     @property
     def unit(self) -> str:
         """SI."""
-        return self.output.unit + ("", "/s", "/s^2")[self.derivative]
+        return self.output.unit + PER_TIME[self.derivative]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +168,7 @@ class Ready:
         numbers = self._numbers
         unknown = np.full((1, 1), np.nan)
         for name in self.study.case.points:
-            known = [kept[self.model.rows[f"{label} {name}"]] for label in MOTIONS[: self.model.orders]]
+            known = [kept[self.model.rows[f"{label} {name}"]] for label in QUANTITIES[: self.model.orders]]
             x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
             at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
             place = f"points.{name}.position"
