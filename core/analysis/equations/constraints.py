@@ -64,7 +64,7 @@ class Frames:
 def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
     """The length unit, unless it is given, and the internal origins: at the joint by which the spanning tree reaches a body."""
     if length_unit is None:
-        length_unit = 2.0 ** round(math.log2(_size(mechanism)))
+        length_unit = unit_near(_size(mechanism))
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
     touching: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
@@ -86,9 +86,8 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
     for joint in mechanism.joints:
         for body in joint.bodies:
             points[body] += joint.points_on(body)
-    extents = [max(max(axis) - min(axis) for axis in zip(*points[body], strict=True)) for body in whole.moving if points[body]]
-    sizes = sorted(extent for extent in extents if extent > 0.0)
-    unit = 2.0 ** round(math.log2(sizes[len(sizes) // 2])) if sizes else whole.unit
+    sizes = sorted(size for body in whole.moving if (size := extent(points[body])) > 0.0)
+    unit = unit_near(sizes[len(sizes) // 2]) if sizes else whole.unit
     return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
 
 
@@ -100,10 +99,20 @@ def _size(mechanism: Mechanism) -> float:
     """
     joints = [point for joint in mechanism.joints for point in joint.points_on()]
     for places in (joints, joints + [point.position for point in mechanism.points]):
-        extent = max((max(axis) - min(axis) for axis in zip(*places, strict=True)), default=0.0)
-        if extent > 0.0:
-            return extent
+        size = extent(places)
+        if size > 0.0:
+            return size
     return 1.0
+
+
+def extent(points: Sequence[Sequence[float]]) -> float:
+    """Return the largest extent of points along a global axis [m]; zero where there are none."""
+    return max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=0.0)
+
+
+def unit_near(length: float) -> float:
+    """Return the power of two nearest to a positive length [m]: measured in it, lengths keep all their digits."""
+    return 2.0 ** round(math.log2(length))
 
 
 class Style(StrEnum):
