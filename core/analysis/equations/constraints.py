@@ -130,20 +130,17 @@ class Style(StrEnum):
 
 
 def constraints(
-    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE, *, keep_fixed: bool = False
+    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE
 ) -> list[Constraint | Relation]:
     """All constraints: joints in order, then couplers, then drivers in order.
 
     Args:
         drives: the motion of each driver by name; drivers not named hold their design value.
         style: how rows are written. MIXED and RELATIVE name the coordinates of all axial joints, the others those of couplers.
-        keep_fixed: fixed bodies move in principle and are held by ground rows, as in the paper's count; else they are ground.
     """
     mixed = style in (Style.MIXED, Style.RELATIVE)
-    coupled = {f"{joint}.{freedom}" for c in mechanism.couplers for joint, freedom in zip(c.joints, c.freedoms, strict=True)}
+    coupled = {f"{joint}.{freedom}" for coupler in mechanism.couplers for joint, freedom, _ in coupler.terms}
     found: list[Constraint | Relation] = []
-    if keep_fixed:
-        found += [Constraint(body.name, p.Ground(), GROUND, body.name) for body in mechanism.bodies if body.fixed]
     for original in mechanism.joints:
         if isinstance(original, AxialJoint):
             found += _axial(original, frame, coupled, mixed=mixed, fixed_last=mechanism.is_fixed(original.j))
