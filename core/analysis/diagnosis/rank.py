@@ -29,6 +29,9 @@ OWED = 1e-9
 NEARLY = 1e-3
 # Rows with less than this part of the largest share of a contradiction are not its cause.
 SHARE = 0.1
+# The way to the pose nearest to an assembly: no step is longer than this [units of the mechanism's size, rad], within which rows
+# are near to linear, and there are enough to go around the mechanism several times.
+STEP, STEPS = 0.1, 200
 
 
 @dataclass(frozen=True)
@@ -209,14 +212,14 @@ class Ranks:
         """The rows that do not hold in the pose nearest to an assembly, with the drivers at design; empty where it closes."""
         exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
         state = exact.design
-        for _ in range(200):
+        for _ in range(STEPS):
             at = exact.configuration(state)
             phi = np.array(exact.phi(at))
             if np.abs(phi).max(initial=0.0) <= CONSISTENT:
                 break
             step = np.linalg.lstsq(jacobian(exact, at), -phi, rcond=RANK_TOLERANCE)[0]
             size = float(np.abs(step).max())
-            state = exact.retract(at, (step * min(1.0, 0.1 / size) if size else step).tolist())
+            state = exact.retract(at, (step * min(1.0, STEP / size) if size else step).tolist())
             if size < CONSISTENT:
                 break
         phi = np.array(self.formulation.phi(self.formulation.configuration(state)))
