@@ -36,7 +36,7 @@ class Nearly(msgspec.Struct, frozen=True):
 
 
 class Sample(msgspec.Struct, frozen=True):
-    """How well a pose of the sweep is determined; see `diagnosis.conditioning.Pose`. condition is null where it is singular."""
+    """How well a pose of the sweep is determined; see `PoseConditioning`. condition is null where it is singular."""
 
     value: float
     smallest: float
