@@ -41,7 +41,7 @@ NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Row:
+class Equation:
     """An equation: a row of an object of Exudyn keeps a value [m or -]."""
 
     item: int
@@ -75,7 +75,7 @@ class Rows:
         self.ground = int(mbs.AddObject(items.ObjectGround()))
         self.bodies = {GROUND: (self.ground, np.zeros(3))}
         self.nodes: list[int] = []
-        self.rows: list[Row] = []
+        self.rows: list[Equation] = []
         self.following: list[Following] = []
         self.turning: dict[int, tuple[int, int]] = {}
         self.values = len(mechanism.drivers)
@@ -119,7 +119,7 @@ class Rows:
     def connect(self, item: Any, indices: Sequence[int], keeps: float = 0.0) -> int:
         """Add an object of which these rows are equations; the last keeps a value. Returns the place of the last row."""
         number = self.mbs.AddObject(item)
-        self.rows += [Row(number, index, keeps if index == indices[-1] else 0.0) for index in indices]
+        self.rows += [Equation(number, index, keeps if index == indices[-1] else 0.0) for index in indices]
         return len(self.rows) - 1
 
     def connect_generic(self, markers: Sequence[int], axes: Sequence[int], keeps: float = 0.0) -> int:

@@ -23,7 +23,7 @@ from ..core.harness.case import Case
 from ..core.harness.engine import Floor
 from ..core.trajectory import Array
 from .floors import floor_of
-from .mujoco_spec import JOINTS, Closure, Sketch, coordinate
+from .mujoco_spec import JOINTS, Equality, Sketch, coordinate
 from .own_frame import in_own_frame
 from .projection_engine import ProjectionEngine
 
@@ -174,7 +174,7 @@ class MuJoCoModel:
             for site, J in zip(self.watched, map(self.slope, self.watched), strict=True)
         ]
 
-    def gap(self, closure: Closure) -> Array | float:
+    def gap(self, closure: Equality) -> Array | float:
         """Residual of an equality that MuJoCo leaves out: of a weld only between parts of one rigid body, so it is zero."""
         i, j = closure.ends
         span = self.d.site_xpos[i] - self.d.site_xpos[j]

@@ -29,7 +29,7 @@ def coordinate(joint: str, name: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Closure:
+class Equality:
     """An equality constraint and the two sites it ties (their ids are known once the spec is compiled); length of a tendon [m]."""
 
     kind: str
@@ -49,7 +49,7 @@ class Sketch:
         self.spec.option.disableflags |= mj.mjtDisableBit.mjDSBL_CONTACT | mj.mjtDisableBit.mjDSBL_AUTORESET
         fixed = [GROUND, *(body.name for body in mechanism.bodies if body.fixed)]
         self.bodies = dict[str, Any].fromkeys(fixed, self.spec.worldbody)
-        self.closures: list[Closure] = []
+        self.closures: list[Equality] = []
         self.tree: dict[str, str] = {}  # what carries each body
         self.means: dict[str, str] = {}  # what closes each cut joint
         self.relations: list[str] = []  # what ties coordinates to one another
@@ -132,7 +132,7 @@ class Sketch:
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_TENDON, name1=rod.name)
         # the length is that at design plus a polynomial of another tendon; there is none, which leaves its constant
         equality.data = [rod.rod_length - rod.design_distance, *[0.0] * (len(equality.data) - 1)]
-        self.closures.append(Closure("tendon", ends, rod.rod_length))
+        self.closures.append(Equality("tendon", ends, rod.rod_length))
 
     def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
@@ -141,7 +141,7 @@ class Sketch:
         equality.objtype = self.mj.mjtObj.mjOBJ_JOINT
         # one is a polynomial of the other, of which only the linear term is wanted
         equality.data = [0.0, factor, *[0.0] * (len(equality.data) - 2)]
-        self.closures.append(Closure("joint"))
+        self.closures.append(Equality("joint"))
         self.relations.append(f"joint equality: {one} = {factor:.9g} {other}")
 
     def join(self, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
@@ -149,4 +149,4 @@ class Sketch:
         ends = self.site(i, position), self.site(j, position)
         equality = {"connect": self.mj.mjtEq.mjEQ_CONNECT, "weld": self.mj.mjtEq.mjEQ_WELD}[kind]
         self.spec.add_equality(type=equality, name1=ends[0].name, name2=ends[1].name, objtype=self.mj.mjtObj.mjOBJ_SITE)
-        self.closures.append(Closure(kind, ends))
+        self.closures.append(Equality(kind, ends))

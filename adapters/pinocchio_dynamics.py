@@ -25,7 +25,7 @@ from .chains import CHAINS, Link, end_of_loop, relations
 from .closures import CLOSURES, ends_of
 from .jointed import fits, jointed
 from .pinocchio import Pinocchio, PinocchioModel
-from .simulation import Leg, Pose, SimulationEndedError, simulated, start_of
+from .simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 
 # Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its motion by a billionth.
 ARMATURE = 1e9
@@ -172,7 +172,7 @@ class _Model(PinocchioModel):
         self.closures[joint.name] = f"rigid constraint, {CLOSURES[tied].text}"
         self.conditions += CLOSURES[tied].conditions(joint, self._add_frame(i, point), self._add_frame(j, point))
 
-    def run(self, leg: Leg) -> Iterator[Pose]:
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """The poses of a leg."""
         q, v = self.start.configuration, leg.sign * self.start.v
         yield self.pose(*self.put(q, v, leg.drive(leg.times[:1])[..., 0]), 0)
@@ -219,7 +219,7 @@ class _Model(PinocchioModel):
         weights = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
         return self.pin.integrate(self.model, q, h * (weights @ np.array(rates))), v + h * (weights @ np.array(accelerations))
 
-    def pose(self, q: Array, v: Array, tau: Array, steps: int) -> Pose:
+    def pose(self, q: Array, v: Array, tau: Array, steps: int) -> SimulatedPose:
         """What Pinocchio says of this moment."""
         self.q = q
         a = self.acceleration(q, v, tau)
@@ -229,4 +229,4 @@ class _Model(PinocchioModel):
             self.pin.log6(found.c1Mc2).vector[: model.residualSize()]
             for found, model in zip(self.found, self.constraints, strict=True)
         ]
-        return Pose(points, max((float(np.abs(gap).max()) for gap in gaps), default=0.0), steps)
+        return SimulatedPose(points, max((float(np.abs(gap).max()) for gap in gaps), default=0.0), steps)

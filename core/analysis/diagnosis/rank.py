@@ -35,7 +35,7 @@ STEP, STEPS = 0.1, 200
 
 
 @dataclass(frozen=True)
-class Row:
+class NamedRow:
     """A row by name.
 
     Attributes:
@@ -56,12 +56,12 @@ class Row:
 class Dependency:
     """A row that others say already: the sum of the others times their weights."""
 
-    row: Row
-    repeats: tuple[tuple[float, Row], ...]
+    row: NamedRow
+    repeats: tuple[tuple[float, NamedRow], ...]
 
 
 @dataclass(frozen=True)
-class Component:
+class ComponentCount:
     """Bodies that joints, couplers or drivers tie together, with their share of the count; drivers are not among the rows."""
 
     bodies: tuple[str, ...]
@@ -80,7 +80,7 @@ class Component:
 class Violation:
     """A row that cannot be met, and by how much: residual [m or rad], or its rate by the driver's."""
 
-    row: Row
+    row: NamedRow
     amount: float
 
 
@@ -108,14 +108,14 @@ class Ranks:
         return account(self.mechanism, self.frame)
 
     @cached_property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[NamedRow]:
         """All rows by name."""
-        found: list[Row] = []
+        found: list[NamedRow] = []
         for c in self.formulation.constraints:
             count = c.primitive.n if isinstance(c, Constraint) else 1
             kind = type(c.primitive).__name__ if isinstance(c, Constraint) else "Relation"
             found += [
-                Row(c.owner, kind, self._holds(len(found) + k, c.j if isinstance(c, Constraint) else "")) for k in range(count)
+                NamedRow(c.owner, kind, self._holds(len(found) + k, c.j if isinstance(c, Constraint) else "")) for k in range(count)
             ]
         return found
 
@@ -143,18 +143,18 @@ class Ranks:
         return found
 
     @cached_property
-    def nearly(self) -> list[tuple[float, list[Row]]]:
+    def nearly(self) -> list[tuple[float, list[NamedRow]]]:
         """Combinations of joint rows that are nearly redundant: their size, which is a singular value, and the rows in them."""
         u, values = np.linalg.svd(self.matrix[: self.joint_rows], full_matrices=False)[:2]
         scale = values.max(initial=0.0)
-        found: list[tuple[float, list[Row]]] = []
+        found: list[tuple[float, list[NamedRow]]] = []
         for k in np.flatnonzero((values > RANK_TOLERANCE * scale) & (values < NEARLY * scale)):
             share = np.abs(u[:, k])
             found.append((float(values[k]), [self.rows[row] for row in _largest_first(share) if share[row] > SHARE * share.max()]))
         return found
 
     @cached_property
-    def components(self) -> list[Component]:
+    def components(self) -> list[ComponentCount]:
         """The parts of the mechanism that nothing ties together."""
         groups: list[set[int]] = []  # of columns
         for row in self.matrix:
@@ -168,13 +168,13 @@ class Ranks:
         groups += [set(range(c, c + COLUMNS)) for c in sorted(loose) if c % COLUMNS == 0]
         return [self._component(sorted(group)) for group in sorted((g for g in groups if g), key=min)]
 
-    def _component(self, columns: Sequence[int]) -> Component:
+    def _component(self, columns: Sequence[int]) -> ComponentCount:
         own = np.flatnonzero(np.abs(self.matrix[:, columns]).max(axis=1) > 0.0)
         joints, drivers = own[own < self.joint_rows], own[own >= self.joint_rows]
         bodies = tuple(name for name, first in self.formulation.columns.items() if first in columns)
         names = tuple(self.rows[int(k)].owner for k in drivers)
         rank = len(independent_rows(self.matrix[joints][:, columns], 0))
-        return Component(bodies, len(columns), len(joints), rank, names)
+        return ComponentCount(bodies, len(columns), len(joints), rank, names)
 
     @cached_property
     def free(self) -> list[list[Screw]]:

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from ...analysis.diagnosis.conditioning import Conditioning, conditioning
-from ...analysis.diagnosis.rank import Blocked, Component, Dependency, Ranks, Row, Violation
+from ...analysis.diagnosis.rank import Blocked, ComponentCount, Dependency, NamedRow, Ranks, Violation
 from ...analysis.diagnosis.screws import Screw, described
 from ...analysis.equations.geometry import places
 from ...errors import SolveError, shortened
@@ -32,7 +32,7 @@ class Nearly(msgspec.Struct, frozen=True):
     """Rows of which a combination nearly vanishes: its size, which is a singular value of the joint rows."""
 
     size: float
-    rows: list[Row]
+    rows: list[NamedRow]
 
 
 class Sample(msgspec.Struct, frozen=True):
@@ -60,7 +60,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     case: str
     findings: list[str]
     freedom: Freedom
-    components: list[Component]
+    components: list[ComponentCount]
     redundant: list[Dependency]
     nearly_redundant: list[Nearly]
     free: list[list[Screw]]

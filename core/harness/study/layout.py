@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from enum import Enum
 
 from ...analysis.equations.geometry import kinds, places
 from ...errors import remedy
+from ...joints import Kind
 from ...mechanism import Mechanism
 from ..case import MARKER
 
 # Positions closer than this are one hardpoint [m]: tables are measured to about a micrometre at best.
 SAME = 1e-6
-
-
-class Kind(Enum):
-    """What varies at a place."""
-
-    POSITION = "a position"
-    DIRECTION = "a direction"
-    LENGTH = "a length"
 
 
 class PlaceError(ValueError):
@@ -37,7 +29,7 @@ class Geometry:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.values = places(mechanism)
-        self.kinds = {place: Kind[kind.name] for place, kind in kinds(mechanism).items()}
+        self.kinds = kinds(mechanism)
 
     @property
     def named(self) -> list[str]:

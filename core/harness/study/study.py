@@ -29,7 +29,7 @@ MOST_MESSAGES = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class ReducedQuantity:
     """One quantity that is reduced: an output, or its first or second derivative by time."""
 
     output: Quantity
@@ -76,10 +76,10 @@ class Study:
         return -(-self.samples // CHUNK)
 
     @cached_property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[ReducedQuantity, ...]:
         """What is reduced: outputs, each with its derivatives as far as wanted and known."""
         return tuple(
-            Row(output, derivative)
+            ReducedQuantity(output, derivative)
             for output in self.case.outputs
             for derivative in range(min(self.order + 1, output.orders))
         )  # fmt: skip
