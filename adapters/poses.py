@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, cross, quat, vec
+from ..core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, angle_about, cross, quat, vec
 from ..core.joints import Joint
 from ..core.joints.base import triad
 from ..core.mechanism import GROUND, Body, Mechanism, Vector
@@ -130,11 +130,11 @@ def _turns(axes: Sequence[Vec3], q: Quat) -> list[Array]:
         case []:
             return []
         case [a]:
-            return [2.0 * np.arctan2(a @ q.e, q.e0)]
+            return [angle_about(a, q)]
         case [a, b]:  # the second turns nothing that is along it, so the first alone takes b where q does
             first = _angle(a, b, rotated(q, b))
             rest = about(a, -first) * q
-            return [first, 2.0 * np.arctan2(b @ rest.e, rest.e0)]
+            return [first, angle_about(b, rest)]
         case [n, m, _, _]:  # bends alike, N(x) M(2y) N(x): its Euler parameters are cos x cos y, along n sin x cos y, along m sin y
             x, y = np.arctan2(n @ q.e, q.e0), np.arcsin(np.clip(m @ q.e, -1.0, 1.0))
             return [x, y, y, x]
