@@ -68,7 +68,7 @@ class Solver:
         return Exudyn().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or the joint, driver or grid of samples that has no counterpart here."""
+        """Return the joint, driver or grid of samples that has no counterpart here, or None."""
         reason = Exudyn().unsupported(case)
         if reason is not None:
             return reason
@@ -86,13 +86,13 @@ class Solver:
         return None
 
     def efforts(self) -> Mapping[str, Solver]:
-        """By the tolerance of Newton, or the number of steps."""
+        """Return the efforts by the tolerance of Newton, or by the number of steps."""
         if self.kind == "static":
             return {f"Newton to {tol:g}": replace(self, tolerance=tol) for tol in (1e-2, 1e-4, 1e-8, 1e-12, 1e-14)}
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
     def floor(self, case: Case) -> None:
-        """None: its loop is its own."""
+        """Return None: its loop is its own."""
 
     def build(self, case: Case) -> _Solved:
         """Exudyn's system, and where it sets off."""

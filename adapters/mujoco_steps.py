@@ -84,17 +84,17 @@ class Stepping:
         return MuJoCo().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or the joint or driver that has no counterpart here."""
+        """Return the joint or driver that has no counterpart here, or None."""
         return MuJoCo().unsupported(case)
 
     def efforts(self) -> Mapping[str, Stepping]:
-        """By the number of steps."""
+        """Return the efforts by the number of steps."""
         counts = (1, 2, 3, 5, 8) if self.kind == "projecting" else (1, 2, 4, 8, 16)
         what = "times the default number of steps" if self.kind == "default" else "steps a sample"
         return {f"{n} {what}": replace(self, effort=n) for n in counts}
 
     def floor(self, case: Case) -> None:
-        """None: its steps are its own."""
+        """Return None: its steps are its own."""
 
     def build(self, case: Case) -> _Steps:
         """The compiled model, its settings and where it sets off."""

@@ -69,7 +69,7 @@ class Dynamics:
         return Pinocchio().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or which joint or driver has no counterpart here."""
+        """Return which joint or driver has no counterpart here, or None."""
         if (self.version() or "").startswith("3."):
             return "Pinocchio 3 calls its constraintDynamics in another way; install Pinocchio 4"
         for joint in case.mechanism.joints:
@@ -82,11 +82,11 @@ class Dynamics:
         return Pinocchio().unsupported(case)
 
     def efforts(self) -> Mapping[str, Dynamics]:
-        """By the number of steps."""
+        """Return the efforts by the number of steps."""
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8)}
 
     def floor(self, case: Case) -> None:
-        """None: its steps are Python's; a bound would be that of projection."""
+        """Return None: its steps are Python's; a bound would be that of projection."""
 
     def build(self, case: Case) -> _Model:
         """Tree and constraints, and where it sets off."""
@@ -201,7 +201,7 @@ class _Model(PinocchioModel):
         return q, v, tau
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
-        """Of the coordinates."""
+        """Return the accelerations of the coordinates, shape (unknowns,)."""
         pin = self.pin
         return pin.constraintDynamics(self.model, self.dynamics, q, v, tau, self.constraints, self.found, self.proximal)
 

@@ -64,7 +64,7 @@ def attitude(body: Body) -> Quat:
 
 
 def displacements(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> dict[str, Displacement]:
-    """Of every body, fixed ones and the ground included, from the motion of the moving ones."""
+    """Return the displacement of every body, fixed ones and the ground included, from the motion of the moving ones."""
     found = {body.name: Displacement() for body in mechanism.bodies} | {GROUND: Displacement()}
     for body in mechanism.moving:
         turn = quat(way[body.name].p.T) * attitude(body).conjugate()

@@ -71,7 +71,7 @@ class Leg:
 
     @property
     def times(self) -> Array:
-        """Of the samples, in the time of the case [s]."""
+        """The times of the samples, in the time of the case [s]."""
         return self.case.sweep.path.times[self.samples]
 
     def drive(self, times: Array) -> Array:

@@ -166,7 +166,7 @@ class Tracer:
         return self._outputs(v, a, rates)
 
     def outputs_of_rates(self) -> Program:
-        """As `outputs`, for rates that are given."""
+        """Return the program of `outputs` for rates that are given, instead of those that solve the mechanism's equations."""
         return self._outputs(self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns), {})
 
     def _outputs(self, v: Sequence[Scalar], a: Sequence[Scalar], rates: Mapping[int, Scalar]) -> Program:

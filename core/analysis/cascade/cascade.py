@@ -205,7 +205,7 @@ class Lanes:
         return [model.samples(times, path.drive(names, times)) if names else alone for model, names in driven]
 
     def attempt_at(self, tables: Sequence[Array]) -> Array:
-        """As `attempt`, of what is given at the times."""
+        """Attempt all components as `attempt` does, from the tables that `sampled` gives of the times."""
         count = tables[0].shape[1]
         self.last = count - 1
         for table, samples in zip(tables, self._samples, strict=True):

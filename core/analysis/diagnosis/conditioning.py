@@ -213,7 +213,7 @@ class _Geometry:
         self.slopes = {place: tuple(Slope(x, next(rows)) for x in value) for place, value in values.items()}
 
     def derivatives_of(self, x: Any) -> Array:
-        """Of a number by all numbers of the places, shape (numbers,); zero where it depends on none."""
+        """Return the derivatives of a number by all numbers of the places, shape (numbers,); zero where it depends on none."""
         return np.broadcast_to(derivatives(x), (len(self.numbers),))
 
 

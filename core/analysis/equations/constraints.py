@@ -57,7 +57,7 @@ class Frames:
     moving: tuple[str, ...]
 
     def arm(self, body: str, position: Sequence[float]) -> Vec3:
-        """From the internal origin of the body to a point, at design [units]."""
+        """Return the vector from the internal origin of the body to a point, global at design [units]."""
         return (1.0 / self.unit) * vec(position) - self.origins[body]
 
 

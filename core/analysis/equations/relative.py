@@ -157,7 +157,7 @@ class TreeConfiguration(Configuration):
     tree: tree.Posed
 
     def arm(self, name: str, column: tree.Column, origins: Mapping[str, Vec3]) -> Vec3:
-        """From the column's point P to the body's origin, now."""
+        """Return the vector from the column's point P to the body's origin, now, global axes [units]."""
         return (origins[name] - column.P_design) + (self.poses[name].u - column.P)
 
 

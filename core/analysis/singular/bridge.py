@@ -50,7 +50,7 @@ class Bridge:
 
 
 def onward(route: Route, lane: Array, times: Array) -> Route:
-    """From where a lane stands on a route to other times."""
+    """Return the route to other times that sets off where a lane stands on this one."""
     since = float(lane[route.model.slots[FROM + TIME]])
     return Route(route.model, Path(route.path.motions, times, route.path.design), arrived(route.model, lane), since)
 

@@ -117,7 +117,7 @@ class House:
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> str:
-    """Those of the options that were given, to be named in a message; they have no default, or false, or no names."""
+    """Return those of the options that were given, to be named in a message; they have no default, or false, or no names."""
     found = (name for name in names if getattr(options, name) not in ([], None) and getattr(options, name) is not False)
     return ", ".join(f"--{name.replace('_', '-')}" for name in found)
 

@@ -19,7 +19,7 @@ from .truth import Reach, Truth
 
 
 class Verdict(StrEnum):
-    """Of one sample. Every sample gets exactly one."""
+    """What is said of one sample. Every sample gets exactly one."""
 
     RIGHT = "right"
     REFUSED_RIGHTLY = "refused, right reason"

@@ -37,12 +37,12 @@ class ReducedQuantity:
 
     @property
     def name(self) -> str:
-        """That of the output, and of its derivative as in reference tables."""
+        """The name of the output, with that of its derivative as in reference tables."""
         return self.output.name + (f".{QUANTITIES[self.derivative]}" if self.derivative else "")
 
     @property
     def unit(self) -> str:
-        """SI."""
+        """The unit, SI."""
         return self.output.unit + PER_TIME[self.derivative]
 
 
@@ -247,6 +247,6 @@ def request(study: Study) -> Request:
 
 
 def largest(changes: Array) -> Array:
-    """Of changes, shape (rows, n, V), the one of the largest size over the samples, signed, shape (rows, V); NaN without any."""
+    """Return of changes, shape (rows, n, V), the largest in size over the samples, signed, shape (rows, V); NaN without any."""
     sizes = np.nan_to_num(np.abs(changes), nan=-1.0)
     return np.take_along_axis(changes, sizes.argmax(axis=1)[:, None, :], axis=1)[:, 0]
