@@ -12,9 +12,9 @@ R carries the second shaft, which is the first one seen half a turn about b, wit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from ..core.joints import (
     AxialJoint,
@@ -112,11 +112,41 @@ CHAINS: dict[type[Joint], Callable[[Any, Vector], list[Link]]] = {
 """By exact joint type: the joint and its point (where it has none, any point near) -> links. A distance is no chain."""
 
 
-def relations(joint: Joint) -> Sequence[Mapping[str, float]]:
-    """Linear relations between the coordinates of a joint's links: coefficients by name, whose weighted sum stays zero."""
+def relations(joint: Joint) -> list[list[tuple[str, str, float]]]:
+    """The linear relations between the coordinates of a joint's links, each as joint, freedom and weight of its terms.
+
+    The weighted sum of the terms stays zero, as that of `Coupler.terms` does.
+    """
+    found: Sequence[Mapping[str, float]] = ()
     if isinstance(joint, ConstantVelocity):
-        return {"first": 1.0, "fourth": -1.0}, {"second": 1.0, "third": -1.0}
-    return joint.relations if isinstance(joint, AxialJoint) else ()
+        found = {"first": 1.0, "fourth": -1.0}, {"second": 1.0, "third": -1.0}
+    elif isinstance(joint, AxialJoint):
+        found = joint.relations
+    return [[(joint.name, freedom, weight) for freedom, weight in relation.items()] for relation in found]
+
+
+Coordinate = TypeVar("Coordinate")
+
+
+def dependence(terms: Iterable[tuple[Coordinate, float]]) -> tuple[Coordinate, Coordinate, float]:
+    """Solve a relation of two coordinates for one: `one`, `other` and the factor of one = factor * other.
+
+    The one is that of the larger weight, so the factor is at most one in size.
+    """
+    (other, small), (one, large) = sorted(terms, key=lambda term: abs(term[1]))
+    return one, other, -small / large
+
+
+def end_of_loop(links: Sequence[Link], P: Vector) -> tuple[Sequence[Link], Vector, bool]:
+    """What closes a loop by a joint's chain: the links that remain, and the point where the last of their bodies is tied.
+
+    Returns:
+        The links, the point (P, or the centre of a ball), and whether the bodies may turn about it: a ball at the end of a chain
+        is no link, because a tie of points alone leaves the same free.
+    """
+    if links and links[-1].move == "ball":
+        return links[:-1], links[-1].point, True
+    return links, P, False
 
 
 def _unit(axis: Sequence[float]) -> Vector:

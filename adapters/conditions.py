@@ -32,27 +32,27 @@ class Frame(Protocol):
 
     @property
     def position(self) -> Array:
-        """Of the point [m], shape (3,)."""
+        """Where the point is [m], shape (3,)."""
         ...
 
     @property
     def rotation(self) -> Array:
-        """Of the body since design, shape (3, 3)."""
+        """The rotation matrix of the body since design, shape (3, 3)."""
         ...
 
     @property
     def jacobian(self) -> Array:
-        """Of the point over that of the rotation, shape (6, unknowns)."""
+        """The Jacobian of the point over that of the rotation, shape (6, unknowns)."""
         ...
 
     @property
     def velocity(self) -> Array:
-        """Of the point [m/s] and angular [rad/s], shape (6,)."""
+        """The velocity of the point [m/s] and the angular one [rad/s], shape (6,)."""
         ...
 
     @property
     def acceleration(self) -> Array:
-        """Of the point [m/s^2] and angular [rad/s^2], shape (6,); where the coordinates have none, it is Jdot v."""
+        """The acceleration of the point [m/s^2] and the angular one [rad/s^2], shape (6,); Jdot v where coordinates have none."""
         ...
 
 
@@ -101,7 +101,7 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """From the point of frame i to that of frame j [m]."""
+    """The vector from the point of frame i to that of frame j [m]."""
 
     i: Frame
     j: Frame

@@ -36,7 +36,7 @@ class Exudyn(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Its bodies, and what its solver evaluates."""
+        """What Exudyn's bodies are, and what its solver evaluates."""
         return {
             "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
             "residual": "ComputeAlgebraicEquations",
@@ -49,7 +49,7 @@ class Exudyn(ProjectionEngine):
         return ExudynModel(in_own_frame(case))
 
     def floor(self, case: Case) -> Floor:
-        """Of the residual and Jacobian of its static solver; rates take two more Jacobians, the fewest that make a difference."""
+        """Bound it by the static solver's residual and Jacobian; rates take two more Jacobians, which a difference needs."""
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
         _container, mbs, settings, solver = _least()

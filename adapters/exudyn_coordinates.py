@@ -19,7 +19,7 @@ from ..core.mechanism import GROUND
 from .exudyn_rows import Rows
 
 
-class Table:
+class DriverTable:
     """Values and rates of the drivers at every step of a leg; Exudyn asks for them by its time."""
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class Coordinates(Rows):
         angles: relative angles, whose turns are counted: which driver's value each is, or None.
     """
 
-    def __init__(self, mbs: Any, items: Any, case: Case, table: Table) -> None:
+    def __init__(self, mbs: Any, items: Any, case: Case, table: DriverTable) -> None:
         self.table = table
         self.angles: list[int | None] = []
         super().__init__(mbs, items, case.mechanism)

@@ -30,9 +30,10 @@ import numpy as np
 
 from ..core import joints
 from ..core.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
-from ..core.joints.base import triad, unit
+from ..core.joints.base import unit
 from ..core.mechanism import GROUND, Mechanism
 from ..core.trajectory import Array
+from .poses import frame_along, middle
 
 # Constrained axes of a generic joint.
 X, Y, Z, ABOUT_X, ABOUT_Y, ABOUT_Z = range(6)
@@ -40,7 +41,7 @@ NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Row:
+class Equation:
     """An equation: a row of an object of Exudyn keeps a value [m or -]."""
 
     item: int
@@ -74,7 +75,7 @@ class Rows:
         self.ground = int(mbs.AddObject(items.ObjectGround()))
         self.bodies = {GROUND: (self.ground, np.zeros(3))}
         self.nodes: list[int] = []
-        self.rows: list[Row] = []
+        self.rows: list[Equation] = []
         self.following: list[Following] = []
         self.turning: dict[int, tuple[int, int]] = {}
         self.values = len(mechanism.drivers)
@@ -84,7 +85,7 @@ class Rows:
             for relation in joint.relations if isinstance(joint, joints.AxialJoint) else ():
                 self.relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
         for coupler in mechanism.couplers:
-            self.relate(list(zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)))
+            self.relate(coupler.terms)
         for value, driver in enumerate(mechanism.drivers):
             self.drive(driver, value)
 
@@ -95,8 +96,7 @@ class Rows:
                 continue
             # Points and axes are given in global coordinates, so every node starts parallel to the global axes. It stands amid
             # the body's joints: case files may leave the origin far away, and long arms cost digits of the differences.
-            points = [q for joint in self.mechanism.joints if body.name in joint.bodies for q in joint.points_on(body.name)]
-            origin = np.mean(points, axis=0) if points else np.array(body.origin)
+            origin = middle(self.mechanism, body)
             node = self.mbs.AddNode(self.items.NodeRigidBodyEP(referenceCoordinates=[*origin, *NO_ROTATION]))
             # Exudyn asks for a mass and inertias; kinematics does not depend on them.
             rigid = self.items.ObjectRigidBody(mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0], nodeNumber=node)
@@ -119,7 +119,7 @@ class Rows:
     def connect(self, item: Any, indices: Sequence[int], keeps: float = 0.0) -> int:
         """Add an object of which these rows are equations; the last keeps a value. Returns the place of the last row."""
         number = self.mbs.AddObject(item)
-        self.rows += [Row(number, index, keeps if index == indices[-1] else 0.0) for index in indices]
+        self.rows += [Equation(number, index, keeps if index == indices[-1] else 0.0) for index in indices]
         return len(self.rows) - 1
 
     def connect_generic(self, markers: Sequence[int], axes: Sequence[int], keeps: float = 0.0) -> int:
@@ -132,9 +132,9 @@ class Rows:
         """A row that is the rotation about or the translation along the axis of a joint, for it to follow a value."""
         joint: Any = self.mechanism.joint(name)
         if freedom == "translation":
-            return self.connect_generic(self.markers(joint, joint.point, _frame(joint.axis, 0)), (X,))
+            return self.connect_generic(self.markers(joint, joint.point, frame_along(joint.axis, 0)), (X,))
         # exchanged, so that the row is the sine of the angle and not of its negative
-        first, second = self.markers(joint, joint.point, _frame(joint.axis, 2))
+        first, second = self.markers(joint, joint.point, frame_along(joint.axis, 2))
         row = self.connect_generic((second, first), (ABOUT_Z,))
         self.turning[row] = first, second
         return row
@@ -168,16 +168,11 @@ def turned(angle: float) -> Array:
     return frame
 
 
-def _frame(axis: Sequence[float], column: int) -> Array:
-    """A rotation matrix that has the axis, made a unit vector, in this column."""
-    return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
-
-
 def _generic(*axes: int, along: int = 2) -> Callable[[Rows, Any], None]:
     """A joint that is a generic joint with these axes constrained, its axis being x (0), y or z of the frame."""
 
     def add(rows: Rows, joint: Any) -> None:
-        rows.connect_generic(rows.markers(joint, getattr(joint, "point", (0.0, 0.0, 0.0)), _frame(joint.axis, along)), axes)
+        rows.connect_generic(rows.markers(joint, getattr(joint, "point", (0.0, 0.0, 0.0)), frame_along(joint.axis, along)), axes)
 
     return add
 
@@ -187,12 +182,12 @@ def _spherical(rows: Rows, joint: joints.Spherical | joints.ConstantVelocity) ->
 
 
 def _revolute(rows: Rows, joint: joints.Revolute) -> None:
-    markers = rows.markers(joint, joint.point, _frame(joint.axis, 2))
+    markers = rows.markers(joint, joint.point, frame_along(joint.axis, 2))
     rows.connect(rows.items.ObjectJointRevoluteZ(markerNumbers=markers), range(5))
 
 
 def _translational(rows: Rows, joint: joints.Translational) -> None:
-    markers = rows.markers(joint, joint.point, _frame(joint.axis, 0))
+    markers = rows.markers(joint, joint.point, frame_along(joint.axis, 0))
     rows.connect(rows.items.ObjectJointPrismaticX(markerNumbers=markers), range(5))
 
 
@@ -207,17 +202,17 @@ def _perpendicular_axes(rows: Rows, joint: joints.PerpendicularAxes) -> None:
 def _cross(rows: Rows, joint: joints.Universal | joints.PerpendicularAxes, point: Sequence[float], axes: Sequence[int]) -> None:
     # The last row is x0 . y1, the cosine of the cross: an angle the table has rounded stays as it is.
     first, second = joint.axes
-    markers = [rows.marker(joint.i, point, _frame(first, 0)), rows.marker(joint.j, point, _frame(second, 1))]
+    markers = [rows.marker(joint.i, point, frame_along(first, 0)), rows.marker(joint.j, point, frame_along(second, 1))]
     rows.connect_generic(markers, axes, keeps=unit(first) @ unit(second))
 
 
 def _constant_velocity(rows: Rows, joint: joints.ConstantVelocity) -> None:
     _spherical(rows, joint)
     h, k = (np.array(tuple(unit(axis))) for axis in joint.axes)
-    first = _frame(joint.axes[0], 2)
+    first = frame_along(joint.axes[0], 2)
     # The shortest turn from h to k is two reflections, in the plane across h and in the plane between the shafts, across h + k.
-    middle = (h + k) / np.linalg.norm(h + k)
-    second = first - 2.0 * np.outer(middle, middle @ first)
+    between = (h + k) / np.linalg.norm(h + k)
+    second = first - 2.0 * np.outer(between, between @ first)
     second[:, 2] = k
     i, j = rows.marker(joint.i, joint.point, first), rows.marker(joint.j, joint.point, second)
     # x0 . y1 - x1 . y0 stays zero: both products keep to the same unknown, and so do not twist
@@ -233,7 +228,7 @@ def _distance(rows: Rows, joint: joints.Distance) -> None:
 def _revolute_spherical(rows: Rows, joint: joints.RevoluteSpherical) -> None:
     link = np.subtract(joint.points[1], joint.points[0])
     _rod(rows, joint, float(np.linalg.norm(link)))
-    frame = _frame(joint.axis, 0)
+    frame = frame_along(joint.axis, 0)
     markers = [rows.marker(body, point, frame) for body, point in zip(joint.bodies, joint.points, strict=True)]
     rows.connect_generic(markers, (X,), keeps=float(frame[:, 0] @ link))
 
@@ -253,7 +248,7 @@ def _orientation_lock(rows: Rows, joint: joints.OrientationLock) -> None:
 
 
 def _point_coordinate(rows: Rows, driver: PointCoordinate) -> int:
-    point, frame = rows.mechanism.point(driver.point), _frame(driver.direction, 0)
+    point, frame = rows.mechanism.point(driver.point), frame_along(driver.direction, 0)
     return rows.connect_generic([rows.marker(body, point.position, frame) for body in (GROUND, point.body)], (X,))
 
 

@@ -17,8 +17,8 @@ from ..core.harness.case import Case
 from ..core.joints.base import unit
 from ..core.trajectory import Array, Trajectory
 from .exudyn import Exudyn, ExudynModel
-from .exudyn_coordinates import Coordinates, Table
-from .simulation import Leg, Pose, SimulationEndedError, simulated, start_of
+from .exudyn_coordinates import Coordinates, DriverTable
+from .simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 
 # Where a row keeps a number other than zero, Exudyn's objects do not; this much is round-off, and below what a residual may be.
 NOTHING = 1e-12
@@ -68,7 +68,7 @@ class Solver:
         return Exudyn().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or the joint, driver or grid of samples that has no counterpart here."""
+        """Return the joint, driver or grid of samples that has no counterpart here, or None."""
         reason = Exudyn().unsupported(case)
         if reason is not None:
             return reason
@@ -86,13 +86,13 @@ class Solver:
         return None
 
     def efforts(self) -> Mapping[str, Solver]:
-        """By the tolerance of Newton, or the number of steps."""
+        """Return the efforts by the tolerance of Newton, or by the number of steps."""
         if self.kind == "static":
             return {f"Newton to {tol:g}": replace(self, tolerance=tol) for tol in (1e-2, 1e-4, 1e-8, 1e-12, 1e-14)}
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
     def floor(self, case: Case) -> None:
-        """None: its loop is its own."""
+        """Return None: its loop is its own."""
 
     def build(self, case: Case) -> _Solved:
         """Exudyn's system, and where it sets off."""
@@ -140,7 +140,7 @@ class _Solved:
         self.container: Any = self.exu.SystemContainer()
         mbs = self.mbs = self.container.AddSystem()
         items: Any = importlib.import_module("exudyn.itemInterface")
-        self.table = Table()
+        self.table = DriverTable()
         rows = Coordinates(mbs, items, case, self.table)
         self.angles = rows.angles
         kinds = self.exu.OutputVariableType
@@ -181,7 +181,7 @@ class _Solved:
         alpha.computeInitialAccelerations = False  # it would take the drivers, which it knows by their values, for unaccelerated
         return settings
 
-    def run(self, leg: Leg) -> Iterator[Pose]:
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """The poses of a leg."""
         steps = self.how.steps
         n = (len(leg.samples) - 1) * steps
@@ -192,7 +192,7 @@ class _Solved:
             known = self.start.points.copy()
             if self.how.kind == "static":
                 known[1:] = np.nan
-            yield Pose(known, self.start.residual, 0)
+            yield SimulatedPose(known, self.start.residual, 0)
             return
         self.table.rows = driven.tolist()
         self.set_off(leg, driven)
@@ -229,7 +229,7 @@ class _Solved:
             solver = solvers.TrapezoidalIndex2 if self.how.kind == "trapezoidal" else solvers.GeneralizedAlpha
             self.mbs.SolveDynamic(self.settings, solverType=solver, showHints=False)
 
-    def poses(self, driven: Array) -> Iterator[Pose]:
+    def poses(self, driven: Array) -> Iterator[SimulatedPose]:
         """What Exudyn has stored, sample by sample; the residual is that of the last one, where drift is largest."""
         steps = self.how.steps
         stored = [[self.stored(sensor)[::steps] for sensor in sensors] for sensors in self.sensors]
@@ -245,7 +245,7 @@ class _Solved:
             for order, values in enumerate(quantities):
                 points[order, :, k] = values
         for k in range(last + 1):
-            yield Pose(points[:, k], residual, steps if k else 0)
+            yield SimulatedPose(points[:, k], residual, steps if k else 0)
 
     def stored(self, sensor: int) -> Array:
         """All that a sensor has stored, without the times."""

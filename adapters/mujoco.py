@@ -23,7 +23,7 @@ from ..core.harness.case import Case
 from ..core.harness.engine import Floor
 from ..core.trajectory import Array
 from .floors import floor_of
-from .mujoco_spec import JOINTS, Closure, Sketch, coordinate
+from .mujoco_spec import JOINTS, Equality, Sketch, coordinate
 from .own_frame import in_own_frame
 from .projection_engine import ProjectionEngine
 
@@ -37,7 +37,7 @@ class MuJoCo(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Its equalities."""
+        """What of MuJoCo's equalities is used, and how."""
         return {
             "residual": "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers: units or rad",
             "jacobian": "efc_J, dense",
@@ -53,7 +53,7 @@ class MuJoCo(ProjectionEngine):
         return model
 
     def floor(self, case: Case) -> Floor:
-        """Of `mj_kinematics` and what else a pose takes."""
+        """Bound it by `mj_kinematics` and what else a pose takes."""
         mj = mujoco()
         model = self.build(case)
         trajectory = self.solve(model, case, 1e-12)
@@ -174,20 +174,20 @@ class MuJoCoModel:
             for site, J in zip(self.watched, map(self.slope, self.watched), strict=True)
         ]
 
-    def gap(self, closure: Closure) -> Array | float:
+    def gap(self, closure: Equality) -> Array | float:
         """Residual of an equality that MuJoCo leaves out: of a weld only between parts of one rigid body, so it is zero."""
         i, j = closure.ends
         span = self.d.site_xpos[i] - self.d.site_xpos[j]
         return {"connect": span, "tendon": math.sqrt(span @ span) - closure.length, "weld": 0.0}[closure.kind]
 
     def slope(self, site: int) -> Array:
-        """Jacobian of a site's position, shape (3, unknowns)."""
+        """Return the Jacobian of a site's position, shape (3, unknowns)."""
         J = np.zeros((3, self.m.nv))
         self.mj.mj_jacSite(self.m, self.d, J, None, site)
         return J
 
     def slope_rate(self, site: int) -> Array:
-        """Its rate at the velocity last set, shape (3, unknowns)."""
+        """Return the rate of that Jacobian at the velocity last set, shape (3, unknowns)."""
         J = np.zeros((3, self.m.nv))
         self.mj.mj_jacDot(self.m, self.d, J, None, self.d.site_xpos[site], self.m.site_bodyid[site])
         return J

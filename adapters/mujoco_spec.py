@@ -13,12 +13,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..core.joints import Distance, Joint
 from ..core.mechanism import GROUND, Mechanism, Vector
 from ..core.topology import spanning_tree
-from .chains import CHAINS, Link, free, relations
+from .chains import CHAINS, Link, dependence, end_of_loop, free, relations
+from .poses import middle
 
 JOINTS = (*CHAINS, Distance)
 """The joint types that have a counterpart here, exactly these: a subclass may mean something else."""
@@ -30,7 +29,7 @@ def coordinate(joint: str, name: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Closure:
+class Equality:
     """An equality constraint and the two sites it ties (their ids are known once the spec is compiled); length of a tendon [m]."""
 
     kind: str
@@ -50,7 +49,7 @@ class Sketch:
         self.spec.option.disableflags |= mj.mjtDisableBit.mjDSBL_CONTACT | mj.mjtDisableBit.mjDSBL_AUTORESET
         fixed = [GROUND, *(body.name for body in mechanism.bodies if body.fixed)]
         self.bodies = dict[str, Any].fromkeys(fixed, self.spec.worldbody)
-        self.closures: list[Closure] = []
+        self.closures: list[Equality] = []
         self.tree: dict[str, str] = {}  # what carries each body
         self.means: dict[str, str] = {}  # what closes each cut joint
         self.relations: list[str] = []  # what ties coordinates to one another
@@ -60,7 +59,9 @@ class Sketch:
             body = self.bodies[branch.child] = self.body(self.bodies[branch.parent])
             self.tree[branch.child] = "free" if branch.joint is None else str(branch.joint)
             if branch.joint is None:
-                self.attach(body, free(self.middle(branch.child)))
+                # a body that turns about its middle is predicted best by a tangent
+                x, y, z = middle(mechanism, mechanism.body(branch.child)).tolist()
+                self.attach(body, free((x, y, z)))
             elif branch.child == branch.joint.j:
                 self.carry(body, branch.joint, self.links(branch.joint))
             else:
@@ -68,8 +69,7 @@ class Sketch:
         for joint in tree.cut:
             self.close(joint, self.bodies[joint.i], self.bodies[joint.j])
         for coupler in mechanism.couplers:
-            signed = [self.signs[joint] * weight for joint, weight in zip(coupler.joints, coupler.coefficients, strict=True)]
-            self.relate(zip(map(coordinate, coupler.joints, coupler.freedoms), signed, strict=True))
+            self.relate((joint, freedom, self.signs[joint] * weight) for joint, freedom, weight in coupler.terms)
 
     def body(self, parent: Any) -> Any:
         """A body on its parent's frame. Mass and inertia do not enter kinematics, but MuJoCo wants them positive definite."""
@@ -80,13 +80,6 @@ class Sketch:
     def site(self, body: Any, position: Sequence[float]) -> Any:
         """A new site of a body."""
         return body.add_site(name=str(len(self.spec.sites)), pos=list(position))
-
-    def middle(self, name: str) -> Vector:
-        """The mean of a body's joint points: a body that turns about it is predicted best by a tangent."""
-        points = [self.mechanism.body(name).origin]
-        found = [_point(joint, name) for joint in self.mechanism.joints if name in joint.bodies]
-        x, y, z = np.mean([point for point in found if point] or points, axis=0).tolist()
-        return x, y, z
 
     def near(self, joint: Joint) -> Vector:
         """The joint's point, or where it has none, the origin of a moving body, which serves as well."""
@@ -113,7 +106,7 @@ class Sketch:
         self.attach(body, links, joint.name)
         self.signs[joint.name] = sign  # it is that of all the joint's coordinates, so their relations need none
         for relation in relations(joint):
-            self.relate([(coordinate(joint.name, name), weight) for name, weight in relation.items()])
+            self.relate(relation)
 
     def close(self, joint: Joint, i: Any, j: Any) -> None:
         """Express a cut joint of bodies i and j by an equality constraint."""
@@ -121,10 +114,8 @@ class Sketch:
             self.means[joint.name] = "tendon"
             self.span(joint, i, j)
             return
-        links = self.links(joint)
-        kind, point = "weld", self.near(joint)
-        if links and links[-1].move == "ball":
-            kind, links, point = "connect", links[:-1], links[-1].point
+        links, point, turns = end_of_loop(self.links(joint), self.near(joint))
+        kind = "connect" if turns else "weld"
         self.means[joint.name] = kind
         if links:
             i = self.body(i)
@@ -141,27 +132,21 @@ class Sketch:
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_TENDON, name1=rod.name)
         # the length is that at design plus a polynomial of another tendon; there is none, which leaves its constant
         equality.data = [rod.rod_length - rod.design_distance, *[0.0] * (len(equality.data) - 1)]
-        self.closures.append(Closure("tendon", ends, rod.rod_length))
+        self.closures.append(Equality("tendon", ends, rod.rod_length))
 
-    def relate(self, terms: Iterable[tuple[str, float]]) -> None:
-        """Keep the weighted sum of two coordinates at zero."""
-        (other, small), (one, large) = sorted(terms, key=lambda term: abs(term[1]))
+    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
+        """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
+        one, other, factor = dependence((coordinate(joint, freedom), weight) for joint, freedom, weight in terms)
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_JOINT, name1=one, name2=other)
         equality.objtype = self.mj.mjtObj.mjOBJ_JOINT
         # one is a polynomial of the other, of which only the linear term is wanted
-        equality.data = [0.0, -small / large, *[0.0] * (len(equality.data) - 2)]
-        self.closures.append(Closure("joint"))
-        self.relations.append(f"joint equality: {one} = {-small / large:.9g} {other}")
+        equality.data = [0.0, factor, *[0.0] * (len(equality.data) - 2)]
+        self.closures.append(Equality("joint"))
+        self.relations.append(f"joint equality: {one} = {factor:.9g} {other}")
 
     def join(self, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
         """Tie two bodies at a position. The default data stays: it holds the scale of a weld's rotation rows."""
         ends = self.site(i, position), self.site(j, position)
         equality = {"connect": self.mj.mjtEq.mjEQ_CONNECT, "weld": self.mj.mjtEq.mjEQ_WELD}[kind]
         self.spec.add_equality(type=equality, name1=ends[0].name, name2=ends[1].name, objtype=self.mj.mjtObj.mjOBJ_SITE)
-        self.closures.append(Closure(kind, ends))
-
-
-def _point(joint: Joint, body: str) -> Vector | None:
-    """The joint's point on a body, where it has one."""
-    pair = getattr(joint, "points", None)
-    return pair[joint.bodies.index(body)] if pair else getattr(joint, "point", None)
+        self.closures.append(Equality(kind, ends))

@@ -20,7 +20,7 @@ from ..core.motions import Ramp
 from ..core.trajectory import Array, Trajectory
 from .jointed import jointed
 from .mujoco import MuJoCo, MuJoCoModel, mujoco
-from .simulation import Leg, Pose, SimulationEndedError, simulated, start_of
+from .simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 
 # Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its motion by a billionth.
 ARMATURE = 1e9
@@ -84,17 +84,17 @@ class Stepping:
         return MuJoCo().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or the joint or driver that has no counterpart here."""
+        """Return the joint or driver that has no counterpart here, or None."""
         return MuJoCo().unsupported(case)
 
     def efforts(self) -> Mapping[str, Stepping]:
-        """By the number of steps."""
+        """Return the efforts by the number of steps."""
         counts = (1, 2, 3, 5, 8) if self.kind == "projecting" else (1, 2, 4, 8, 16)
         what = "times the default number of steps" if self.kind == "default" else "steps a sample"
         return {f"{n} {what}": replace(self, effort=n) for n in counts}
 
     def floor(self, case: Case) -> None:
-        """None: its steps are its own."""
+        """Return None: its steps are its own."""
 
     def build(self, case: Case) -> _Steps:
         """The compiled model, its settings and where it sets off."""
@@ -158,7 +158,7 @@ class _Steps:
         finally:
             self.mj.set_mju_user_warning(before)
 
-    def run(self, leg: Leg) -> Iterator[Pose]:
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """The poses of a leg."""
         mj, m, d = self.mj, self.m, self.of.d
         mj.mj_resetData(m, d)
@@ -203,7 +203,7 @@ class _Steps:
         d.qpos[self.q], d.qvel[self.v] = self.sign * c, self.sign * c_t
         d.qfrc_applied[self.v] = ARMATURE * self.sign * c_tt
 
-    def pose(self, driven: Array, steps: int) -> Pose:
+    def pose(self, driven: Array, steps: int) -> SimulatedPose:
         """What MuJoCo says of this moment."""
         mj, m, d = self.mj, self.m, self.of.d
         self.set(*driven)
@@ -218,4 +218,4 @@ class _Steps:
                     rate(m, d, mj.mjtObj.mjOBJ_SITE, site, self.twist, 0)
                     points[order, k] = self.twist[3:]
         points[0] = d.site_xpos[self.of.watched]
-        return Pose(points, float(np.abs(d.efc_pos[: d.ne]).max(initial=0.0)), steps)
+        return SimulatedPose(points, float(np.abs(d.efc_pos[: d.ne]).max(initial=0.0)), steps)

@@ -53,7 +53,7 @@ class Native:
         return VERSION
 
     def unsupported(self, case: Case) -> str | None:
-        """Never: a joint is supported by being composed of primitives."""
+        """Return None always: a joint is supported by being composed of primitives."""
         return None
 
     def build(self, case: Case) -> Solver:
@@ -66,8 +66,8 @@ class Native:
         return model(tol if self.last_iteration <= LAST_ITERATION else math.inf)
 
     def efforts(self) -> Mapping[str, Native]:
-        """By how near to the solution Newton's last step starts; the predictor is the same."""
+        """Return the efforts by how near to the solution Newton's last step starts; the predictor is the same."""
         return {label: Native(last) for label, last in EFFORTS.items()}
 
     def floor(self, case: Case) -> None:
-        """None: its loop is compiled."""
+        """Return None: its loop is compiled."""

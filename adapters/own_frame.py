@@ -6,13 +6,13 @@ kilometres from the origin no residual is that small: they stopped there, or wen
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from ..core.analysis.equations.constraints import unit_near
 from ..core.harness.case import Case
 from ..core.harness.compare import size
 from ..core.joints import Kind
@@ -51,7 +51,7 @@ GLOBAL = OwnFrame(1.0, (0.0, 0.0, 0.0))
 
 def own_frame(case: Case) -> OwnFrame:
     """The frame of a case; about the global origin where the mechanism's middle is within half a unit of it along every axis."""
-    mechanism, unit = case.mechanism, 2.0 ** round(math.log2(size(case)))
+    mechanism, unit = case.mechanism, unit_near(size(case))
     positions = [at for joint in mechanism.joints for at in joint.points_on()] + [point.position for point in mechanism.points]
     # a multiple of the unit: what is on such a grid is moved without being rounded
     x, y, z = (unit * round(0.5 * (min(axis) + max(axis)) / unit) for axis in zip(*positions, strict=True))

@@ -50,7 +50,7 @@ class Pinocchio(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Its tree, and what closes the loops."""
+        """What Pinocchio's tree is, and what closes the loops."""
         return {
             "coordinates": "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer",
             "closures": "conditions on frame placements, Jacobians and classical accelerations",
@@ -65,7 +65,7 @@ class Pinocchio(ProjectionEngine):
         return PinocchioModel(importlib.import_module("pinocchio"), in_own_frame(case))
 
     def floor(self, case: Case) -> Floor:
-        """Of the Jacobians and placements of joints and frames."""
+        """Bound it by the Jacobians and placements of joints and frames."""
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
         pin, least = model.pin, model.pin.Model()
@@ -143,7 +143,7 @@ class PinocchioModel:
             i, j = (self.carrier[body] for body in joint.bodies)
             self._close(joint, i, j, ends_of(mechanism, joint), joint.name in named)
         for each in mechanism.couplers:
-            self.conditions.append(self._linear(*zip(each.joints, each.freedoms, each.coefficients, strict=True)))
+            self.conditions.append(self._linear(*each.terms))
         for driver in mechanism.drivers:
             if isinstance(driver, PointCoordinate):
                 point = mechanism.point(driver.point)

@@ -21,11 +21,11 @@ from ..core.joints import Distance, Fixed, Joint, Spherical
 from ..core.mechanism import GROUND, Mechanism, Vector
 from ..core.topology import Branch, SpanningTree
 from ..core.trajectory import Array, Trajectory
-from .chains import CHAINS, Link, relations
+from .chains import CHAINS, Link, end_of_loop, relations
 from .closures import CLOSURES, ends_of
 from .jointed import fits, jointed
 from .pinocchio import Pinocchio, PinocchioModel
-from .simulation import Leg, Pose, SimulationEndedError, simulated, start_of
+from .simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 
 # Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its motion by a billionth.
 ARMATURE = 1e9
@@ -69,7 +69,7 @@ class Dynamics:
         return Pinocchio().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or which joint or driver has no counterpart here."""
+        """Return which joint or driver has no counterpart here, or None."""
         if (self.version() or "").startswith("3."):
             return "Pinocchio 3 calls its constraintDynamics in another way; install Pinocchio 4"
         for joint in case.mechanism.joints:
@@ -82,11 +82,11 @@ class Dynamics:
         return Pinocchio().unsupported(case)
 
     def efforts(self) -> Mapping[str, Dynamics]:
-        """By the number of steps."""
+        """Return the efforts by the number of steps."""
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8)}
 
     def floor(self, case: Case) -> None:
-        """None: its steps are Python's; a bound would be that of projection."""
+        """Return None: its steps are Python's; a bound would be that of projection."""
 
     def build(self, case: Case) -> _Model:
         """Tree and constraints, and where it sets off."""
@@ -162,10 +162,8 @@ class _Model(PinocchioModel):
 
     def _hang(self, joint: Joint, i: int, P: Vector) -> None:
         """The slides and hinges of a closure, on what joint i carries; a ball at their end is left to the constraint."""
-        links, point, tied = CHAINS[type(joint)](joint, P), P, Fixed
-        if links and links[-1].move == "ball":
-            links, point, tied = links[:-1], links[-1].point, Spherical
-        self.hung[joint.name] = self._add_links(i, joint, links, 1), point, tied
+        links, point, turns = end_of_loop(CHAINS[type(joint)](joint, P), P)
+        self.hung[joint.name] = self._add_links(i, joint, links, 1), point, Spherical if turns else Fixed
 
     def _close(self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool) -> None:
         i, point, tied = self.hung[joint.name]
@@ -174,7 +172,7 @@ class _Model(PinocchioModel):
         self.closures[joint.name] = f"rigid constraint, {CLOSURES[tied].text}"
         self.conditions += CLOSURES[tied].conditions(joint, self._add_frame(i, point), self._add_frame(j, point))
 
-    def run(self, leg: Leg) -> Iterator[Pose]:
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """The poses of a leg."""
         q, v = self.start.configuration, leg.sign * self.start.v
         yield self.pose(*self.put(q, v, leg.drive(leg.times[:1])[..., 0]), 0)
@@ -203,7 +201,7 @@ class _Model(PinocchioModel):
         return q, v, tau
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
-        """Of the coordinates."""
+        """Return the accelerations of the coordinates, shape (unknowns,)."""
         pin = self.pin
         return pin.constraintDynamics(self.model, self.dynamics, q, v, tau, self.constraints, self.found, self.proximal)
 
@@ -221,7 +219,7 @@ class _Model(PinocchioModel):
         weights = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
         return self.pin.integrate(self.model, q, h * (weights @ np.array(rates))), v + h * (weights @ np.array(accelerations))
 
-    def pose(self, q: Array, v: Array, tau: Array, steps: int) -> Pose:
+    def pose(self, q: Array, v: Array, tau: Array, steps: int) -> SimulatedPose:
         """What Pinocchio says of this moment."""
         self.q = q
         a = self.acceleration(q, v, tau)
@@ -231,4 +229,4 @@ class _Model(PinocchioModel):
             self.pin.log6(found.c1Mc2).vector[: model.residualSize()]
             for found, model in zip(self.found, self.constraints, strict=True)
         ]
-        return Pose(points, max((float(np.abs(gap).max()) for gap in gaps), default=0.0), steps)
+        return SimulatedPose(points, max((float(np.abs(gap).max()) for gap in gaps), default=0.0), steps)

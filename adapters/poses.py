@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, cross, quat, vec
+from ..core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, angle_about, cross, quat, vec
 from ..core.joints import Joint
+from ..core.joints.base import triad
 from ..core.mechanism import GROUND, Body, Mechanism, Vector
 from ..core.trajectory import Array, BodyMotion
 from .chains import Link
@@ -46,13 +47,24 @@ class Displacement:
         return Displacement(turn, self.of(P) - rotated(turn, P))
 
 
+def frame_along(axis: Sequence[float], column: int) -> Array:
+    """A right-handed frame that has the axis, made a unit vector, in this column; shape (3, 3)."""
+    return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
+
+
+def middle(mechanism: Mechanism, body: Body) -> Array:
+    """The mean of a body's joint points, or its origin where it has none; global at design [m], shape (3,)."""
+    points = [at for joint in mechanism.joints if body.name in joint.bodies for at in joint.points_on(body.name)]
+    return np.mean(points, axis=0) if points else np.array(body.origin)
+
+
 def attitude(body: Body) -> Quat:
     """The rotation of a body's frame at design, body -> global."""
     return quat(body.euler_parameters)
 
 
 def displacements(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> dict[str, Displacement]:
-    """Of every body, fixed ones and the ground included, from the motion of the moving ones."""
+    """Return the displacement of every body, fixed ones and the ground included, from the motion of the moving ones."""
     found = {body.name: Displacement() for body in mechanism.bodies} | {GROUND: Displacement()}
     for body in mechanism.moving:
         turn = quat(way[body.name].p.T) * attitude(body).conjugate()
@@ -118,11 +130,11 @@ def _turns(axes: Sequence[Vec3], q: Quat) -> list[Array]:
         case []:
             return []
         case [a]:
-            return [2.0 * np.arctan2(a @ q.e, q.e0)]
+            return [angle_about(a, q)]
         case [a, b]:  # the second turns nothing that is along it, so the first alone takes b where q does
             first = _angle(a, b, rotated(q, b))
             rest = about(a, -first) * q
-            return [first, 2.0 * np.arctan2(b @ rest.e, rest.e0)]
+            return [first, angle_about(b, rest)]
         case [n, m, _, _]:  # bends alike, N(x) M(2y) N(x): its Euler parameters are cos x cos y, along n sin x cos y, along m sin y
             x, y = np.arctan2(n @ q.e, q.e0), np.arcsin(np.clip(m @ q.e, -1.0, 1.0))
             return [x, y, y, x]

@@ -60,7 +60,7 @@ class _Sample:
 def without_counterpart(
     case: Case, simulator: str, joints: Collection[type[Joint]], drivers: Collection[type[Driver]]
 ) -> str | None:
-    """None, or the joint or driver of the case whose exact type is not among these; a subclass may mean something else."""
+    """Say which joint or driver of the case is of none of these exact types, or None; a subclass may mean something else."""
     for what, known in (*((joint, joints) for joint in case.mechanism.joints), *((d, drivers) for d in case.mechanism.drivers)):
         if type(what) not in known:
             who = str(what) if isinstance(what, Joint) else f"driver {what.name!r} ({what.type})"

@@ -58,11 +58,11 @@ class ProjectionEngine(ABC):
             return None
 
     def version_of(self, simulator: Any) -> str | None:
-        """That of the imported package; None where it is another package of that name."""
+        """Return the version of the imported package; None where it is another package of that name."""
         return str(simulator.__version__)
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or the joint or driver that has no counterpart here."""
+        """Return the joint or driver that has no counterpart here, or None."""
         return without_counterpart(case, self.title, self.joints, DRIVERS)
 
     @abstractmethod
@@ -74,7 +74,7 @@ class ProjectionEngine(ABC):
         return solve_by_projection(model, case, tol, model.details, self.corrections, own_frame(case))
 
     def efforts(self) -> Mapping[str, Self]:
-        """By the number of Newton steps."""
+        """Return the efforts by the number of Newton steps."""
         return {label: type(self)(corrections) for label, corrections in EFFORTS.items()}
 
     @abstractmethod

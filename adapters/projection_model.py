@@ -22,7 +22,7 @@ class ProjectionModel(Protocol):
     def details(self) -> Mapping[str, Any]: ...
 
     def reset(self) -> None:
-        """Back to the design configuration."""
+        """Go back to the design configuration."""
         ...
 
     def save(self) -> Any:
@@ -30,7 +30,7 @@ class ProjectionModel(Protocol):
         ...
 
     def restore(self, saved: Any) -> None:
-        """Back to a saved configuration."""
+        """Go back to a saved configuration."""
         ...
 
     def move(self, dx: Array) -> None:

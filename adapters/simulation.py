@@ -71,7 +71,7 @@ class Leg:
 
     @property
     def times(self) -> Array:
-        """Of the samples, in the time of the case [s]."""
+        """The times of the samples, in the time of the case [s]."""
         return self.case.sweep.path.times[self.samples]
 
     def drive(self, times: Array) -> Array:
@@ -82,7 +82,7 @@ class Leg:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class SimulatedPose:
     """What a simulator gives at a sample, as its leg sees it.
 
     Attributes:
@@ -96,7 +96,7 @@ class Pose:
     steps: int
 
 
-Simulator = Callable[[Leg], Iterator[Pose]]
+Simulator = Callable[[Leg], Iterator[SimulatedPose]]
 """Gives the poses of a leg, that of the start first; raises SimulationEndedError where it cannot go on."""
 
 

@@ -19,12 +19,12 @@ import numpy as np
 from ..core import joints as j
 from ..core.algebra import vec
 from ..core.errors import KincheckError
-from ..core.joints.base import triad, unit
+from ..core.joints.base import unit
 from ..core.mechanism import GROUND, Body, Mechanism
 from ..core.trajectory import Array, BodyMotion
-from .chains import CHAINS, relations
+from .chains import CHAINS, dependence, relations
 from .closures import ends_of
-from .poses import Displacement, displacements, link_coordinates, link_motions
+from .poses import Displacement, displacements, frame_along, link_coordinates, link_motions
 
 # Round-off of a right angle between unit vectors; a generic joint leaves as much as a residual.
 RIGHT_ANGLE = 1e-15
@@ -132,9 +132,9 @@ class _Script:
         for joint in self.mechanism.joints:
             self.joint(joint)
             for relation in relations(joint):
-                self.relate(joint.name, [(joint.name, freedom, weight) for freedom, weight in relation.items()])
+                self.relate(joint.name, relation)
         for coupler in self.mechanism.couplers:
-            self.relate(coupler.name, list(zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)))
+            self.relate(coupler.name, coupler.terms)
         for point in self.mechanism.points:
             self.lines.append(f"points[{point.name!r}] = bodies[{point.body!r}], {self.arm(point.body, point.position)}")
         return BEGINNING + "\n".join(self.lines) + "\n" + END
@@ -171,12 +171,12 @@ class _Script:
             case j.Spherical():
                 self.add(joint, "ObjectJointSpherical")
             case j.Revolute():
-                self.add(joint, "ObjectJointRevoluteZ", _axes(joint.axis, 2))
+                self.add(joint, "ObjectJointRevoluteZ", frame_along(joint.axis, 2))
             case j.Translational():
-                self.add(joint, "ObjectJointPrismaticX", _axes(joint.axis, 0))
+                self.add(joint, "ObjectJointPrismaticX", frame_along(joint.axis, 0))
             case j.Universal() | j.PerpendicularAxes():
                 point = int(isinstance(joint, j.Universal))
-                first, second = _axes(joint.axes[0], 0), _axes(joint.axes[1], 1)
+                first, second = frame_along(joint.axes[0], 0), frame_along(joint.axes[1], 1)
                 self.generic(joint, (point, point, point, 0, 0, 1), first, second=second)
             case j.Fixed():
                 self.generic(joint, (1, 1, 1, 1, 1, 1))
@@ -189,16 +189,16 @@ class _Script:
                 link = vec(ball) - vec(hinge)
                 self.add(joint, "ObjectConnectorDistance", distance=float(np.hypot.reduce([*link])))
                 foot = [*(vec(hinge) + (unit(axis) @ link) * unit(axis))]
-                self.generic(joint, (1, 0, 0, 0, 0, 0), _axes(axis, 0), ends=(foot, ball))
+                self.generic(joint, (1, 0, 0, 0, 0, 0), frame_along(axis, 0), ends=(foot, ball))
             case _:
                 axis: Sequence[float] = vars(joint)["axis"]
                 column, constrained = GENERIC[type(joint)]
-                self.generic(joint, constrained, _axes(axis, column))
+                self.generic(joint, constrained, frame_along(axis, column))
 
     def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        (*other, small), (*one, large) = sorted(terms, key=lambda term: abs(term[2]))
-        self.call("relation", name, self.coordinate(*one), self.coordinate(*other), -small / large)
+        one, other, factor = dependence(((joint, freedom), weight) for joint, freedom, weight in terms)
+        self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
 
     def coordinate(self, name: str, freedom: str) -> str:
         """The name of a joint's coordinate, which is measured from now on."""
@@ -227,11 +227,6 @@ def _text(value: Any) -> str:
     return repr(value) if isinstance(value, str | int) else repr(float(value) + 0.0)
 
 
-def _axes(axis: Sequence[float], column: int) -> Array:
-    """A right-handed frame that has the axis in this column."""
-    return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
-
-
 def _spelled_out(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> tuple[Mechanism, Mapping[str, BodyMotion]]:
     """The mechanism and its way with joints that Exudyn lacks as hinges between further bodies."""
     placed, way = displacements(mechanism, way), dict(way)
@@ -258,7 +253,7 @@ def _spelled_out(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> tuple[M
         )
         by_name = dict(zip((link.name for link, _ in hinges), names, strict=True))
         for relation in relations(joint):
-            (one, weight), (other, opposite) = relation.items()
+            (_, one, weight), (_, other, opposite) = relation
             couplers.append(j.Gear(f"{by_name[one]} alike", (by_name[one], by_name[other]), -opposite / weight))
     return replace(mechanism, bodies=bodies, joints=joints, couplers=couplers, drivers=()), way
 

@@ -17,7 +17,7 @@ from ..core.joints import Distance, Joint
 from ..core.mechanism import GROUND, Body, Mechanism
 from ..core.topology import spanning_tree
 from ..core.trajectory import BodyMotion
-from .chains import CHAINS, Link, relations
+from .chains import CHAINS, Link, dependence, end_of_loop, relations
 from .closures import ends_of
 from .poses import attitude, backwards, direction, displacements, link_coordinates, local, rotated
 from .xml_text import document, link_names, numbers
@@ -73,8 +73,7 @@ class _Model:
         for joint in tree.cut:
             self.close(joint)
         for coupler in mechanism.couplers:
-            named = zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)
-            self.relate((self.coordinates[joint, freedom], self.signs[joint] * weight) for joint, freedom, weight in named)
+            self.relate((joint, freedom, self.signs[joint] * weight) for joint, freedom, weight in coupler.terms)
         for point in mechanism.points:
             self.add_site(point.name, point.body, point.position)
 
@@ -129,7 +128,7 @@ class _Model:
             self.coordinates[joint.name, link.name] = name
         self.signs[joint.name] = sign  # it is that of all the joint's coordinates, so their relations need none
         for relation in relations(joint):
-            self.relate((self.coordinates[joint.name, freedom], weight) for freedom, weight in relation.items())
+            self.relate(relation)
 
     def close(self, joint: Joint) -> None:
         """Express a joint that closes a loop by an equality."""
@@ -142,24 +141,22 @@ class _Model:
             change = numbers([joint.rod_length - joint.design_distance, 0, 0, 0, 0])
             ET.SubElement(self.equalities, "tendon", tendon1=joint.name, polycoef=change)
             return
-        links, kind, point = self.links(joint), "weld", ends_of(self.mechanism, joint)[0]
-        if links and links[-1].move == "ball":
-            kind, point = "connect", links.pop().point
+        links, point, turns = end_of_loop(self.links(joint), ends_of(self.mechanism, joint)[0])
         carrier = joint.i
         if links:
             carrier = f"{joint.name}.auxiliary"
             self.add_body(replace(self.frames[joint.i], name=carrier), joint.i)
             self.carry(carrier, joint, links)
         one, two = self.add_ends(joint.name, (carrier, joint.j), (point, point))
-        ET.SubElement(self.equalities, kind, name=joint.name, site1=one, site2=two)
+        ET.SubElement(self.equalities, "connect" if turns else "weld", name=joint.name, site1=one, site2=two)
 
     def add_ends(self, joint: str, bodies: Sequence[str], points: Sequence[Sequence[float]]) -> list[str]:
         """A site at either end of what closes a loop."""
         ends = zip(("first", "second"), bodies, points, strict=True)
         return [self.add_site(f"{joint}.{which}", body, point, aligned=True) for which, body, point in ends]
 
-    def relate(self, terms: Iterable[tuple[str, float]]) -> None:
-        """Keep the weighted sum of two coordinates at zero."""
-        (other, small), (one, large) = sorted(terms, key=lambda term: abs(term[1]))
-        polynomial = numbers([0, -small / large, 0, 0, 0])
+    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
+        """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
+        one, other, factor = dependence((self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms)
+        polynomial = numbers([0, factor, 0, 0, 0])
         ET.SubElement(self.equalities, "joint", joint1=one, joint2=other, polycoef=polynomial)

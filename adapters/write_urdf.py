@@ -121,8 +121,7 @@ class _Model:
         for joint in (each for each in mechanism.joints if each in cut):
             self.close(joint, on_copy=joint.name in coupled or bool(relations(joint)))
         for coupler in mechanism.couplers:
-            named = zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)
-            self.relate(coupler.name, [(joint, freedom, weight) for joint, freedom, weight in named])
+            self.relate(coupler.name, coupler.terms)
         for point in mechanism.points:
             self.attach(f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed")
 
@@ -173,7 +172,7 @@ class _Model:
         if not chain:
             self.attach(end, at, ends_of(self.mechanism, joint)[0], joint.name)
         for relation in relations(joint):
-            self.relate(joint.name, [(joint.name, freedom, weight) for freedom, weight in relation.items()])
+            self.relate(joint.name, relation)
 
     def close(self, joint: Joint, on_copy: bool) -> None:
         """The conditions of a joint that is not in the tree; where its coordinates must count turns, it moves a copy."""

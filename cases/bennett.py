@@ -18,7 +18,7 @@ TRACER = (0.2, 0.3, 0.1)  # from the crank's pin: along the coupler, across it, 
 
 
 def motion(turn: Jet) -> Motion:
-    """Both hinges of the coupler and a point it carries, the crank turned by `turn` [rad] from the design, where q = 90 degrees."""
+    """Return both hinges of the coupler and a point it carries, the crank `turn` [rad] from the design, where q = 90 degrees."""
     c, s = -sin(turn), cos(turn)  # of q
     x, z = fixed((1.0, 0.0, 0.0), turn), fixed((0.0, 0.0, 1.0), turn)
     x = c * x + s * cross(z, x)

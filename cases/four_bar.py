@@ -36,5 +36,5 @@ def motion(turn: Jet) -> Motion:
 
 
 def in_space(point: Vec) -> Vec:
-    """In-plane coordinates to global ones."""
+    """Return the global coordinates of in-plane ones."""
     return fixed(A, point.x) + Vec(*(e1 * point.x + e2 * point.y for e1, e2 in zip(E1, E2, strict=True)))

@@ -139,6 +139,14 @@ def quat(values: Iterable[Scalar]) -> Quat:
     return Quat(e0, Vec3(x, y, z))
 
 
+def angle_about(axis: Vec3, q: Quat) -> Any:
+    """Return the angle of a rotation that is about a unit axis, along it [rad], from less than a turn back to one on.
+
+    The rotations q and -q are one, and their angles a turn apart.
+    """
+    return 2.0 * np.arctan2(axis @ q.e, q.e0)
+
+
 def turned_by(q: Quat, half: Vec3) -> Quat:
     """The unit quaternion (1, half) q / |(1, half) q|: q turned by about 2 half, global axes.
 

@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
+QUANTITIES = ("position", "velocity", "acceleration")
+"""What is known of a motion: each is the rate of the one before."""
+PER_TIME = ("", "/s", "/s^2")
+"""What their units end in."""
+
 
 @dataclass(frozen=True, eq=False)
 class PointMotion:

@@ -133,9 +133,9 @@ def test_without_estimates_it_closes_from_the_design():
 
 @pytest.mark.parametrize("close", [assemble, find_assemblies])
 def test_names_that_are_not_there_are_told(close):
-    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no moving body 'crnk'; known: .*crank"):
+    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no moving body 'crnk'; did you mean 'crank'\?"):
         close(four_bar(), {"crnk": (np.zeros((1, 3)), np.zeros((1, 4)))})
-    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no driver 'trn'; known: "):
+    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no driver 'trn'; did you mean 'turn'\?"):
         close(four_bar(), {}, {"trn": 0.1})
 
 

@@ -132,7 +132,7 @@ def test_a_motion_without_singular_poses():
         ({"longest": np.nan}, "longest is nan"),
         ({"tol": 0.0}, "tol is 0.0"),
         ({"style": "dads"}, "no style 'dads'; known: native, paper"),
-        ({"points": ["hub"]}, "no point 'hub'; known: wheel, rod_end"),
+        ({"points": ["hub"]}, "no point 'hub'; known: rod_end, wheel"),
     ],
 )
 def test_what_makes_no_sense(arguments, message):

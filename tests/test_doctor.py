@@ -3,6 +3,7 @@
 import importlib.metadata
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ from kincheck.core.program import disk_cache
 @pytest.fixture
 def without_imports(monkeypatch):
     """Nothing is imported in processes of their own: that takes seconds."""
-    monkeypatch.setattr(doctor, "_imported", lambda found: found)
+    monkeypatch.setattr(doctor, "_imported", lambda found, modules: found)
 
 
 def missing(monkeypatch, *names):
@@ -33,6 +34,7 @@ def missing(monkeypatch, *names):
 def test_a_sound_installation_is_found_able(without_imports, tmp_path, capsys):
     assert main(["doctor", "--json", str(tmp_path / "found.json")]) == 0
     out = capsys.readouterr().out
+    assert re.search(r"pin +\S+ +engine +ok", out)
     assert "self-check mcpherson_strut: pass" in out
     assert "kincheck can do its work" in out
     found = json.loads((tmp_path / "found.json").read_text())
@@ -86,17 +88,16 @@ def test_a_missing_essential_is_an_obstacle(without_imports, monkeypatch, capsys
     ],
 )
 def test_what_is_installed_and_broken_is_told_from_what_works(imported, said, monkeypatch):
-    monkeypatch.setattr(doctor, "MODULES", {"numpy": imported})
     monkeypatch.setattr(doctor, "PATIENCE", 5.0 if "sleep" not in imported else 0.5)
     part = doctor.Part("numpy", "1.0", "kincheck", True, "", "")
-    (found,) = doctor._imported([part])
+    (found,) = doctor._imported([part], {"numpy": imported})
     assert said in found.problem
     assert found.remedy == "pip install --force-reinstall numpy"
 
 
 def test_a_sound_module_has_no_problem():
     part = doctor.Part("msgspec", "1.0", "kincheck", True, "", "")
-    assert doctor._imported([part]) == [part]
+    assert doctor._imported([part], {}) == [part]
 
 
 def test_a_cache_that_cannot_be_written_is_said(without_imports, monkeypatch, tmp_path, capsys):

@@ -20,11 +20,12 @@ from kincheck.core import (
     Universal,
 )
 from kincheck.core.analysis.equations.cartesian import Cartesian
-from kincheck.core.analysis.equations.constraints import constraints, frames
+from kincheck.core.analysis.equations.constraints import Constraint, constraints, frames
 from kincheck.core.analysis.solve import solve
 from kincheck.core.analysis.structure.freedom import account
 from kincheck.core.analysis.structure.redundancy import independent_rows
-from kincheck.core.primitives import Drive, Twist
+from kincheck.core.mechanism import GROUND
+from kincheck.core.primitives import Drive, Ground, Twist
 
 from .mechanisms import CRANK, D0, ROD, four_bar, mcpherson, placed, slider_crank
 
@@ -217,8 +218,8 @@ def test_a_mechanism_that_does_not_close():
 
 
 def with_ground_rows(mechanism, drives):
-    found = constraints(mechanism, frames(mechanism), drives, keep_fixed=True)
-    return Cartesian(found, [body.name for body in mechanism.bodies])
+    held = [Constraint(body.name, Ground(), GROUND, body.name) for body in mechanism.bodies if body.fixed]
+    return Cartesian([*held, *constraints(mechanism, frames(mechanism), drives)], [body.name for body in mechanism.bodies])
 
 
 def test_ground_rows_leave_the_rank():

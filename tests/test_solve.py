@@ -264,7 +264,7 @@ def test_of_no_values_there_are_no_samples(name):
     ("arguments", "message"),
     [
         ({"driver": "steer"}, "there is no driver 'steer'; known: stroke"),
-        ({"points": ["hub"]}, "there is no point 'hub'; known: wheel"),
+        ({"points": ["hub"]}, "there is no point 'hub'; known: rod_end, wheel"),
         ({"bodies": ["hub"]}, "there is no body 'hub'; known: "),
         ({"order": 3}, "order is 3, expected 0, 1 or 2"),
         ({"rate": 0.0}, "rate is 0.0, expected driver units"),

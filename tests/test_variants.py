@@ -178,7 +178,7 @@ def test_designs_are_solved_as_one_by_one():
 @pytest.mark.parametrize(
     ("geometry", "message"),
     [
-        ({"joints.tie_rod.end": np.zeros((4, 3))}, "no place to vary 'joints.tie_rod.end'; known: joints.lca_pivot.point, "),
+        ({"joints.tie_rod.end": np.zeros((4, 3))}, "no place to vary 'joints.tie_rod.end'; did you mean 'joints.tie_rod.points.1'"),
         ({"joints.ball.point": np.zeros((4, 2))}, r"has shape \(4, 2\), expected \(designs, 3\)"),
         ({"joints.ball.point": np.full((4, 3), np.nan)}, "is not finite everywhere"),
         ({"joints.ball.point": np.ones((4, 3)), "joints.strut_top.point": np.ones((5, 3))}, r"found \[4, 5\] designs"),

@@ -169,7 +169,7 @@ FAULTS = [
     ),
     (
         {"tip": {"at": "tip", "sigma": 1}, "lines": {"a": {"axis": "pivot", "through": ["pivot", "tip"]}}},
-        "lines.a.axis: found joints.pivot.point, a position, expected a direction",
+        "lines.a.axis: found joints.pivot.point, a point [x, y, z], expected a direction",
     ),
 ]
 

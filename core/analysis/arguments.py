@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SolveError
+from ..errors import SolveError, unknown
 from ..given import finite
 from ..trajectory import Array
 
@@ -20,7 +20,7 @@ def require_positive(who: str, what: str, number: Any) -> None:
 
 def no_such(who: str, what: str, name: str, known: Sequence[str]) -> SolveError:
     """The error that there is nothing of a name."""
-    return SolveError(f"{who}: there is no {what} {name!r}; known: {', '.join(known) or 'none'}")
+    return SolveError(f"{who}: {unknown(what, name, known)}")
 
 
 def real(who: str, what: str, given: Any, expected: str) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Motion
-from ..trajectory import Array, PointMotion
+from ..trajectory import QUANTITIES, Array, PointMotion
 from .arguments import no_such, real
 from .equations.geometry import places
 from .route import recent_route
@@ -87,7 +87,7 @@ def solve_designs(
     (count,) = counts
     route = recent_route(mechanism, replace(request, varied=tuple(geometry)), path)
     rows, lanes, n = route.model.rows, np.concatenate(numbers), len(path.times)
-    labels = ("position", "velocity", "acceleration")[: request.order + 1]
+    labels = QUANTITIES[: request.order + 1]
     motion: dict[str, dict[str, Any]] = {name: {label: np.empty((count, n, 3)) for label in labels} for name in request.points}
     solved, messages = np.empty((count, n), dtype=np.bool_), dict[int, str]()
     for first in range(0, count, LANES):

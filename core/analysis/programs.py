@@ -29,6 +29,7 @@ from ..program import (
     minimum,
     program,
 )
+from ..trajectory import QUANTITIES
 from .continuity import EPSILON
 from .equations.carried import motion_of_frame, motion_of_point
 from .equations.cartesian import Cartesian, Given
@@ -165,7 +166,7 @@ class Tracer:
         return self._outputs(v, a, rates)
 
     def outputs_of_rates(self) -> Program:
-        """As `outputs`, for rates that are given."""
+        """Return the program of `outputs` for rates that are given, instead of those that solve the mechanism's equations."""
         return self._outputs(self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns), {})
 
     def _outputs(self, v: Sequence[Scalar], a: Sequence[Scalar], rates: Mapping[int, Scalar]) -> Program:
@@ -188,7 +189,7 @@ class Tracer:
 
         for name in self.request.points:
             point = self.mechanism.point(name)
-            self._store_motion(out, ("position", "velocity", "acceleration"), name, of_point(point.body, point.position))
+            self._store_motion(out, QUANTITIES, name, of_point(point.body, point.position))
         for name in self.request.bodies:
             body = self.mechanism.body(name)
             self._store_motion(out, ("r", "rdot", "rddot"), name, of_point(name, body.origin))

@@ -57,7 +57,7 @@ class Route:
 
     @cached_property
     def back(self) -> NDArray[np.intp] | slice:
-        """From the samples by time to the order wanted."""
+        """What puts samples that are sorted by time back into the order wanted."""
         n = len(self.path.times)
         for simple in (AS_THEY_ARE, slice(None, None, -1)):
             if (self.order == np.arange(n)[simple]).all():

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..errors import KincheckError
-from ..trajectory import Array, Trajectory
+from ..trajectory import QUANTITIES, Array, Trajectory
 from .case import Case, Series
 from .circumstances import plain, readable
 from .compare import output_series
@@ -206,7 +206,7 @@ def check(case: Case, engine: str, trajectory: Trajectory) -> None:
         if point not in trajectory.points:
             raise BadTrajectoryError(f"{engine}: no motion of point {point!r}; found: {', '.join(trajectory.points) or 'none'}")
         motion = trajectory.points[point]
-        for quantity in ("position", "velocity", "acceleration"):
+        for quantity in QUANTITIES:
             values: Array | None = getattr(motion, quantity)
             if values is None and quantity != "position":
                 continue

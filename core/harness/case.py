@@ -159,7 +159,7 @@ class Output:
 
     @property
     def signs(self) -> str:
-        """None but the case's own axes."""
+        """The convention of signs of the outputs: none but the case's own axes."""
         return ""
 
     @property

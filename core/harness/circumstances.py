@@ -180,7 +180,7 @@ def readable(text: str) -> str:
 
 
 def truth_of(case: Case) -> Truth:
-    """Without a reference there is only consensus, whatever the case claims."""
+    """Return the kind of truth of a case: without a reference there is only consensus, whatever it claims."""
     return case.truth if case.reference else Truth.CONSENSUS_ONLY
 
 

@@ -29,7 +29,7 @@ from ..algebra import Vec3
 from ..errors import CaseError
 from ..jet import Jet
 from ..mechanism import Vector
-from ..trajectory import Array, PointMotion, Trajectory
+from ..trajectory import PER_TIME, QUANTITIES, Array, PointMotion, Trajectory
 from .case import MARKER, ORDERS, Case, Quantity, Series
 from .record import Deviation, Deviations, OutputSeries
 
@@ -77,7 +77,7 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
     solved = trajectory.solved
     position, *rates = (np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a))
     motions = [trajectory.points[name] for name in output.points]
-    given = 1 + sum(all(getattr(each, quantity) is not None for each in motions) for quantity in ("velocity", "acceleration"))
+    given = 1 + sum(all(getattr(each, quantity) is not None for each in motions) for quantity in QUANTITIES[1:])
     known = given - (ORDERS - output.orders)  # the value of a derivative takes what the engine gives as a rate
     return Series(position, *(rate if order < known else None for order, rate in enumerate(rates, 1)), possible=known > 0)
 
@@ -96,7 +96,7 @@ def _standing(position: Vector) -> Vec3:
 def as_numbers(series: Series, output: Quantity) -> OutputSeries:
     """The series as plain numbers, null for NaN, with the reason for what is missing."""
     reasons = [] if np.isfinite(series.position).all() else ["samples without a value are null"]
-    reasons += [f"there is no {name}" for name in ("velocity", "acceleration") if getattr(series, name) is None]
+    reasons += [f"there is no {name}" for name in QUANTITIES[1:] if getattr(series, name) is None]
     return OutputSeries(
         position=_numbers(series.position),
         velocity=None if series.velocity is None else _numbers(series.velocity),
@@ -125,7 +125,7 @@ def deviations(
     compared: dict[str, Deviation | None] = {}
     reasons: list[str] = []
     losses = 0
-    for order, quantity in enumerate(("position", "velocity", "acceleration")):
+    for order, quantity in enumerate(QUANTITIES):
         values: Array | None = getattr(found, quantity)
         known: list[tuple[str, Array]] = [
             (name, getattr(series, quantity)) for name, series in standards if getattr(series, quantity) is not None
@@ -186,7 +186,7 @@ def describe(output: str, quantity: str, worst: Deviation, driver: str, values: 
     """One line that says how far off an output is, and where, or that it has no value somewhere; `unit` is the output's."""
     if worst.max_abs <= worst.tolerance:
         return f"{output}: {quantity} has no value at samples where {worst.against} has one"
-    unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[quantity]
+    unit += PER_TIME[QUANTITIES.index(quantity)]
     return (
         f"{output}: {quantity} is off by {worst.max_abs:.3g} {unit} at sample {worst.worst_step} ({driver} = "
         f"{values[worst.worst_step]:.9g}), tolerance {worst.tolerance:.3g} {unit}, against {worst.against}"

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import UTC, datetime
 
 import msgspec
@@ -25,18 +25,15 @@ from .record import Outcome, Record
 from .run import run
 
 SCHEMA = "kincheck-doctor/1"
-# Extra of the package -> what it is for. What the package itself requires is essential.
+# Extra of the package -> what it is for, but for those of engines. What the package itself requires is essential.
 PURPOSES = {
-    "mujoco": "engine",
-    "pinocchio": "engine",
-    "exudyn": "engine",
     "fast": "machine code",
     "proofs": "proved references",
     "parquet": "history as Parquet",
     "distributed": "runs on many machines",
 }
-# What is imported of distributions that are not imported by their own name.
-MODULES = {"pin": "pinocchio", "python-flint": "flint", "llvmlite": "llvmlite.binding"}
+# What is imported of distributions that are not imported by their own name; of a simulator's it is the engine's name.
+MODULES = {"python-flint": "flint", "llvmlite": "llvmlite.binding"}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -100,8 +97,8 @@ class Examination(msgspec.Struct, frozen=True):
         return self.check.outcome == Outcome.PASS and not any(part.essential and part.problem for part in self.parts)
 
 
-def examine(case: Case, native: Engine, tol: float) -> Examination:
-    """Look at the installation, and solve a case with the native engine."""
+def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) -> Examination:
+    """Look at the installation, of the engines of these names too, and solve a case with the native engine."""
     problem = _cache_problem()
     about = circumstances([], started=datetime.now(UTC), tol=tol, command="kincheck doctor")
     machine = Machine(
@@ -115,24 +112,31 @@ def examine(case: Case, native: Engine, tol: float) -> Examination:
         0 if problem else disk_cache.size(),
         problem,
     )
-    return Examination(SCHEMA, about["kincheck"], parts(), machine, _check(case, native, tol))
+    return Examination(SCHEMA, about["kincheck"], parts(engines), machine, _check(case, native, tol))
 
 
-def parts() -> list[Part]:
-    """Everything that kincheck requires or can use, from its own metadata, and a browser."""
+def parts(engines: Collection[str]) -> list[Part]:
+    """Everything that kincheck requires or can use, from its own metadata, and a browser.
+
+    Args:
+        engines: by name; an engine's simulator is the extra of that name.
+    """
+    purposes, modules = PURPOSES | dict.fromkeys(engines, "engine"), dict(MODULES)
     found: list[Part] = []
     for requirement in importlib.metadata.requires("kincheck") or []:
         extra = re.search(r"""extra == ['"]([\w-]+)['"]""", requirement)
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         group = extra[1] if extra else ""
-        if group in PURPOSES or not extra:
+        if group in purposes or not extra:
+            if group in engines:
+                modules[name] = group
             version = _version(name)
             remedy = how_to_install(group) if group else f"pip install '{requirement.split(';')[0].strip()}'"
             problem = "not installed" if version is None else ""
-            found.append(Part(name, version, PURPOSES.get(group, "kincheck"), not extra, problem, remedy if problem else ""))
+            found.append(Part(name, version, purposes.get(group, "kincheck"), not extra, problem, remedy if problem else ""))
     browser = next((path for path in map(shutil.which, BROWSERS) if path), None)
     missing = ("", "") if browser else ("not installed", "apt install chromium")
-    return [*_imported(found), Part("chromium", browser, "tests of the report", False, *missing)]
+    return [*_imported(found, modules), Part("chromium", browser, "tests of the report", False, *missing)]
 
 
 def _version(name: str) -> str | None:
@@ -142,11 +146,11 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _imported(found: Sequence[Part]) -> list[Part]:
-    """The parts, with what goes wrong when they are imported: in processes of their own, which a broken library may end."""
+def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
+    """The parts, with what goes wrong when their modules are imported, in processes of their own: a broken library may end one."""
     running = {
         part.name: subprocess.Popen(
-            [sys.executable, "-c", f"import {MODULES.get(part.name, part.name)}"],
+            [sys.executable, "-c", f"import {modules.get(part.name, part.name)}"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -36,7 +36,7 @@ class Engine(Protocol):
         ...
 
     def unsupported(self, case: Case) -> str | None:
-        """None, or the reason why this engine cannot express the case, naming the joint or driver."""
+        """Return the reason why this engine cannot express the case, naming the joint or driver; None where it can."""
         ...
 
     def build(self, case: Case) -> Any:

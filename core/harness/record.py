@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from ..trajectory import QUANTITIES
 from .case import Truth
 
 
@@ -81,7 +82,7 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
 
     def items(self) -> list[tuple[str, Deviation]]:
         """Quantity and deviation of what was compared."""
-        every = (("position", self.position), ("velocity", self.velocity), ("acceleration", self.acceleration))
+        every = zip(QUANTITIES, (self.position, self.velocity, self.acceleration), strict=True)
         return [(quantity, deviation) for quantity, deviation in every if deviation is not None]
 
 

@@ -12,7 +12,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from ..trajectory import Array
+from ..trajectory import QUANTITIES, Array
 from .case import Case, Quantity, Series, Truth
 from .reading.document import fault, read_text, shown
 
@@ -136,7 +136,7 @@ def series(file: Path, found: Reference, values: Array, outputs: Sequence[Quanti
 
 
 def _series(file: Path, name: str, found: ProvedSeries, count: int) -> Series:
-    columns = {quantity: getattr(found, quantity) for quantity in ("position", "velocity", "acceleration")}
+    columns = {quantity: getattr(found, quantity) for quantity in QUANTITIES}
     position, *derivatives = (_numbers(file, f"outputs.{name}.{each}", columns[each], count) for each in columns)
     return Series(position, *(column if np.isfinite(column).any() else None for column in derivatives))
 

@@ -12,7 +12,7 @@ from .case import Case
 
 @dataclass(frozen=True)
 class Unloadable:
-    """In the place of an engine whose own module fails when it is imported: its pairs are errors, which say why."""
+    """What stands in the place of an engine whose own module fails when it is imported: its pairs are errors, which say why."""
 
     name: str
     reason: str

@@ -77,7 +77,7 @@ class Attachment:
     origin: Vec3
 
     def arm(self, P: Vec3) -> Vec3:
-        """From the body's origin to P, at design."""
+        """Return the vector from the body's origin to P, global at design [m]."""
         return P - self.origin
 
 
@@ -154,12 +154,12 @@ class Joint(ABC):
         return self.i, self.j
 
     def geometry(self) -> Sequence[tuple[str, Kind, Any]]:
-        """Name, kind and value of every geometry field that is given."""
+        """Return name, kind and value of every geometry field that is given."""
         found = [(each.name, each.metadata.get("kind"), getattr(self, each.name)) for each in fields(self)]
         return [(name, kind, value) for name, kind, value in found if kind is not None and value is not None]
 
     def parts(self, body: str | None = None) -> Sequence[tuple[str, Kind, Any]]:
-        """Likewise every single one, of a pair as "points.0" and "points.1"; only what is on the body if one is named."""
+        """Return the same of every single one, of a pair as "points.0" and "points.1"; only what is on the body if one is named."""
         found = list[tuple[str, Kind, Any]]()
         for name, kind, value in self.geometry():
             if kind.pair:
@@ -169,26 +169,26 @@ class Joint(ABC):
         return found
 
     def points_on(self, body: str | None = None) -> list[tuple[float, float, float]]:
-        """Its points, global at design [m]; only those on the body if one is named."""
+        """Return its points, global at design [m]; only those on the body if one is named."""
         return [value for _, kind, value in self.parts(body) if kind is Kind.POSITION]
 
     def mapped(self, ways: Mapping[Kind, Callable[[Any], Any]]) -> dict[str, Any]:
-        """Its geometry fields, each point, direction or length sent through the way for its kind, where there is one."""
+        """Return its geometry fields, each point, direction or length sent through the way for its kind, where there is one."""
         given = [(name, kind.pair, ways[kind.single], value) for name, kind, value in self.geometry() if kind.single in ways]
         return {name: tuple(map(way, value)) if pair else way(value) for name, pair, way, value in given}
 
     def reversed(self) -> Self:
-        """The same joint seen from its second body: i and j exchanged, and so every pair."""
+        """Return the same joint seen from its second body: i and j exchanged, and so every pair."""
         swapped = {name: value[::-1] for name, kind, value in self.geometry() if kind.pair}
         return self.changed(i=self.j, j=self.i, **swapped)
 
     def scaled(self, factor: float) -> Self:
-        """The same joint with all lengths multiplied by the factor."""
+        """Return the same joint with all lengths multiplied by the factor."""
         times = partial(_times, factor)
         return self.changed(**self.mapped({Kind.POSITION: times, Kind.LENGTH: times}))
 
     def changed(self, **values: Any) -> Self:
-        """The same joint with other fields, not checked again: as good as this one, or of numbers that are known only later."""
+        """Return the joint with other fields, not checked again: as good as this one, or of numbers that are known only later."""
         other = copy(self)
         for name, value in values.items():
             object.__setattr__(other, name, value)
@@ -207,7 +207,7 @@ class Joint(ABC):
 
     @abstractmethod
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[Primitive]:
-        """The primitives this joint is composed of; each sees body i first."""
+        """Return the primitives this joint is composed of; each sees body i first."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ class AxialJoint(Joint):
     axis: tuple[float, float, float] = direction()
 
     def measured(self, freedom: str, i: Attachment, j: Attachment) -> Primitive:
-        """The primitive that ties one of its coordinates, "rotation" or "translation", to a drive."""
+        """Return the primitive that ties one of its coordinates, "rotation" or "translation", to a drive."""
         P, h = vec(self.point), unit(self.axis)
         if freedom == "rotation":
             return DrivenAngle(h)
@@ -230,7 +230,7 @@ class AxialJoint(Joint):
         return LockedDisplacement(h, i.arm(P) - j.arm(P))
 
     def mixed(self, i: Attachment, j: Attachment) -> Sequence[tuple[Primitive, str]]:
-        """The joint with its coordinates named: TraX and RotX of formulation section 4, each with the coordinate it takes."""
+        """Return the joint with its coordinates named: TraX and RotX of formulation section 4, and the coordinate each takes."""
         P, h = vec(self.point), unit(self.axis)
         slide = NamedSlide(i.arm(P), j.arm(P), h=h) if "translation" in self.freedoms else SphericalCondition(i.arm(P), j.arm(P))
         turn = NamedTurn(h) if "rotation" in self.freedoms else Dot12()
@@ -252,7 +252,7 @@ def _times(factor: float, value: float | Sequence[float]) -> Any:
 
 
 def unit(a: Sequence[Scalar]) -> Vec3:
-    """The direction of a, length one."""
+    """Return the direction of a, length one."""
     v = vec(a)
     return (1.0 / root(v @ v)) * v
 
@@ -273,7 +273,7 @@ def require_perpendicular(joint: Joint, axes: Sequence[Sequence[float]]) -> None
 
 
 def triad(axis: Sequence[Scalar]) -> tuple[Vec3, Vec3, Vec3]:
-    """f, g, h: right-handed orthonormal, h along the axis (f x g = h)."""
+    """Return f, g, h: right-handed orthonormal, h along the axis (f x g = h)."""
     h = unit(axis)
     # the global axis most nearly perpendicular to h gives the best conditioned f
     nearest = X

@@ -63,6 +63,11 @@ class Coupler(ABC):
         return replace(self, **{name: factor * getattr(self, name) for name in lengths})
 
     @property
+    def terms(self) -> tuple[tuple[str, str, float], ...]:
+        """Joint, freedom and weight of the two coordinates."""
+        return tuple(zip(self.joints, self.freedoms, self.coefficients, strict=True))
+
+    @property
     @abstractmethod
     def coefficients(self) -> tuple[float, float]:
         """Weights of the two coordinates [m, rad]; their weighted sum stays zero."""

@@ -62,18 +62,18 @@ class LockedDisplacement(Primitive):
 
 
 def along(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Scalar:
-    """The change of a . e since design."""
+    """Return the change of a . e since design [m]."""
     du = j.u - i.u
     return i.swing(a) @ (e0 + du) + a @ du
 
 
 def along_row(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Row:
-    """Its row."""
+    """Return the row of a . e."""
     a_now = i.turn(a)
     return Row(-a_now, cross(a_now, e0 + (j.u - i.u)), a_now, ZERO)
 
 
 def along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> Scalar:
-    """Its right-hand side in the acceleration equation."""
+    """Return the right-hand side of a . e in the acceleration equation [m/s^2]."""
     a_dot = cross(vi.w, i.turn(a))
     return -(cross(vi.w, a_dot) @ (e0 + (j.u - i.u)) + 2.0 * (a_dot @ (vj.v - vi.v)))

@@ -74,7 +74,7 @@ class Elimination:
 
     @cached_property
     def sigmas(self) -> Sequence[Scalar]:
-        """Likewise of each block that is not constant, or one where all are; at most one.
+        """The same estimate of each block that is not constant, or one where all are; at most one.
 
         It is the least stretch of the cores' upper triangles, and no more than any pivot. The smallest pivot alone may stay where
         it is while the matrix becomes singular: two rows of small pivots, tied by a large entry. Lower triangles hold no more than

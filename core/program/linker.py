@@ -98,7 +98,7 @@ class Linker:
 
 
 def numbers(rows: slice) -> Rows:
-    """Of rows that were given out."""
+    """Return the numbers of rows that were given out."""
     return np.arange(rows.start, rows.stop, dtype=np.intp)
 
 

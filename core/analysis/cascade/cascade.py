@@ -32,7 +32,7 @@ SOUND = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class ComponentType:
     """Components that are built alike: one model, and numbers for each.
 
     Attributes:
@@ -87,7 +87,7 @@ class Cascade:
         alike: dict[object, list[int]] = {}
         for k, each in enumerate(sections):
             alike.setdefault(each.signature, []).append(k)
-        self.kinds: list[Kind] = []
+        self.kinds: list[ComponentType] = []
         self.rows = 0
         for members in alike.values():
             kind = self._kind([sections[k] for k in members], members)
@@ -105,7 +105,7 @@ class Cascade:
         wanted = [self.mechanism.body(name) for name in part.bodies if name in self.request.bodies]
         return section(part, self.unit, origins, points, wanted)
 
-    def _kind(self, sections: Sequence[Section], members: Sequence[int]) -> Kind:
+    def _kind(self, sections: Sequence[Section], members: Sequence[int]) -> ComponentType:
         first, values = sections[0], [places(each.mechanism) for each in sections]
         varied = tuple(place for place, value in values[0].items() if any(each[place] != value for each in values))
         m, part = first.mechanism, self.parts[members[0]]
@@ -129,7 +129,7 @@ class Cascade:
             )
         source, target = np.array(model.plan.carried).T
         lanes[target] = lanes[source]
-        return Kind(model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), self.rows)
+        return ComponentType(model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), self.rows)
 
     def body_rows(self, name: str) -> list[int]:
         """Rows of the world that tell how a body moves, in the order of `GIVEN`."""
@@ -205,7 +205,7 @@ class Lanes:
         return [model.samples(times, path.drive(names, times)) if names else alone for model, names in driven]
 
     def attempt_at(self, tables: Sequence[Array]) -> Array:
-        """As `attempt`, of what is given at the times."""
+        """Attempt all components as `attempt` does, from the tables that `sampled` gives of the times."""
         count = tables[0].shape[1]
         self.last = count - 1
         for table, samples in zip(tables, self._samples, strict=True):

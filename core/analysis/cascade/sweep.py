@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...motions import Path, outwards
 from ...program import ITERATIONS
-from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ...trajectory import QUANTITIES, Array, BodyMotion, PointMotion, Trajectory, largest_found
 from ..division import MOST_PARTS, TOO_MANY, part_of_step
 from ..model import CLOSED
 from ..request import SIGMA, accept_by
@@ -25,7 +25,6 @@ from .cascade import WORST, Cascade, Lanes
 # tried in vain; and what a large chain takes its time for is memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8
 # one of 16 loops takes 1.3 times as long.
 LANES = 16
-POINT = ("position", "velocity", "acceleration")
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
 STILL = 0.0, 0.0, 0.0
 
@@ -68,11 +67,11 @@ class CascadeSweep:
         for name in cascade.request.points:
             point = m.point(name)
             if point.body not in cascade.part_of:
-                still |= {f"{label} {name}": STILL for label in POINT} | {f"position {name}": point.position}
+                still |= {f"{label} {name}": STILL for label in QUANTITIES} | {f"position {name}": point.position}
                 continue
             kind, member = cascade.place[cascade.part_of[point.body]]
             own = f"p{cascade.points[cascade.part_of[point.body]].index(name)}"
-            found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in POINT}
+            found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in QUANTITIES}
         for name in cascade.request.bodies:
             if name not in cascade.part_of:
                 body = m.body(name)
@@ -224,7 +223,7 @@ class CascadeSweep:
         found |= {name: np.where(solved[:, None], value, np.nan) for name, value in self._still.items()}
 
         def motion(name: str) -> PointMotion:
-            series = [found[f"{label} {name}"] for label in POINT[:order]]
+            series = [found[f"{label} {name}"] for label in QUANTITIES[:order]]
             return PointMotion(*series, *[None] * (3 - len(series)))
 
         def body(name: str) -> BodyMotion:

@@ -14,12 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ...algebra import Vec3, vec
 from ...joints import Kind
-from ...mechanism import Mechanism
+from ...mechanism import Mechanism, Point
 from ...motions import Path
 from ...primitives.base import GROUND_POSE, Drive, Twist
 from ...trajectory import Array, Trajectory
@@ -57,8 +58,8 @@ class Gradient:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
-    """A sample: how well its pose is determined.
+class PoseConditioning:
+    """How well the pose at a sample is determined.
 
     Attributes:
         value: of the swept driver or time, as the sweep has it.
@@ -96,7 +97,7 @@ class Conditioning:
     """
 
     trajectory: Trajectory
-    poses: Sequence[Pose]
+    poses: Sequence[PoseConditioning]
     numbers: Sequence[tuple[str, int, float]]
 
 
@@ -121,9 +122,9 @@ def conditioning(
     reached = np.flatnonzero(found.solved)
     at = {int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()}
     at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
-    geometry = _slopes(mechanism, varied)
-    elsewhere = placed(mechanism, geometry)
-    looked, matrices = list[Pose](), list[Array]()
+    geometry = _Geometry(mechanism, varied)
+    elsewhere = placed(mechanism, geometry.slopes)
+    looked, matrices = list[PoseConditioning](), list[Array]()
     seen = sorted(at & set(reached.tolist()))
     for k in seen:
         change = dict(zip(drivers, drive[:, k].tolist(), strict=True))
@@ -139,32 +140,26 @@ def conditioning(
         U, sizes, V = np.linalg.svd(solved)
         inverse = (V.T / sizes) @ U.T
         metres = inverse / np.where(_is_length(formulation, solved), frame.unit, 1.0)
-        changed = Cartesian.of(elsewhere, frame, _held(mechanism, elsewhere, drives, frame))
-        phi = changed.phi(configuration)
-        by_geometry = np.array([np.broadcast_to(derivatives(x), (_count(mechanism, varied),)) for x in phi])
+        phi = Cartesian.of(elsewhere, frame, _held(mechanism, elsewhere, drives, frame)).phi(configuration)
+        by_geometry = np.array([geometry.derivatives_of(x) for x in phi])
         shift = -inverse @ by_geometry[kept]
+        dependence = _Dependence(formulation, configuration, frame, metres, shift)
         looked.append(
-            Pose(
+            PoseConditioning(
                 float(values[k]),
                 [formulation.owners[row] for row in kept],
                 float(sizes[-1]),
                 float(sizes[0]),
                 1.0,
                 screws(formulation, configuration, frame, V[-1]),
-                {name: _gradient(mechanism, frame, formulation, configuration, geometry, name, metres, shift) for name in points},
+                {name: dependence.gradient(mechanism.point(name), geometry) for name in points},
                 by_geometry[dropped] + rest @ shift,
             )
         )
-    # a derivative by the components of a direction becomes one by its angle
-    of = kinds(mechanism)
-    lengths = {place: math.hypot(*value) for place, value in _varied(mechanism, varied).items() if of[place] is Kind.DIRECTION}
-    numbers = [
-        (place, k, lengths.get(place, 1.0)) for place, value in _varied(mechanism, varied).items() for k in range(len(value))
-    ]
     still = Cartesian.of(mechanism, frame)
     nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
     turned = _orientations(matrices, jacobian(still), nearest)
-    return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], numbers)
+    return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], geometry.numbers)
 
 
 def _held(mechanism: Mechanism, elsewhere: Mechanism, drives: Mapping[str, Drive], frame: Frames) -> dict[str, Drive]:
@@ -196,49 +191,61 @@ def _is_length(formulation: Cartesian, rows: Array) -> Array:
     return np.abs(rows[:, shifts]).max(axis=1) > 0.0
 
 
-def _varied(mechanism: Mechanism, varied: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    every = places(mechanism)
-    return {place: every[place] for place in varied}
-
-
-def _count(mechanism: Mechanism, varied: Sequence[str]) -> int:
-    return sum(map(len, _varied(mechanism, varied).values()))
-
-
-def _slopes(mechanism: Mechanism, varied: Sequence[str]) -> dict[str, tuple[Slope, ...]]:
-    count = _count(mechanism, varied)
-    unit_rows = iter(np.eye(count))
-    return {place: tuple(Slope(x, next(unit_rows)) for x in value) for place, value in _varied(mechanism, varied).items()}
-
-
 def _floats(state: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
     return {name: tuple(map(float, vector)) for name, vector in state.items()}
 
 
-def _gradient(
-    mechanism: Mechanism,
-    frame: Frames,
-    formulation: Cartesian,
-    at: Configuration,
-    geometry: Mapping[str, tuple[Slope, ...]],
-    name: str,
-    inverse: Array,
-    shift: Array,
-) -> Gradient:
-    point = mechanism.point(name)
-    pose, arm = at.poses.get(point.body, GROUND_POSE), frame.arm(point.body, point.position)
-    turned = pose.turn(arm)
-    by_unknowns = np.zeros((3, formulation.unknowns))
-    if point.body in formulation.columns:
-        first = formulation.columns[point.body]
-        for k in range(6):
-            rates = [float(k == column) for column in range(6)]
-            by_unknowns[:, first + k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
-    by_unknowns *= frame.unit
-    own = geometry.get(f"points.{name}.position")
-    moved: Vec3 = vec(own) if own else vec(point.position)
-    # the body carries its point along: A times the change of where it is at design
-    design = np.array([np.broadcast_to(derivatives(x), shift.shape[1:]) for x in moved])
-    along = np.array([np.broadcast_to(derivatives(x), shift.shape[1:]) for x in pose.turn(moved)])
-    here, there = np.array([*position_of(point.position, arm, frame.unit, pose)]), np.array(point.position)
-    return Gradient(here, there, by_unknowns @ inverse, by_unknowns @ shift + along, design)
+class _Geometry:
+    """The places that are varied.
+
+    Attributes:
+        slopes: their values by place, each number with its derivatives by all of them.
+        numbers: as `Conditioning.numbers`.
+    """
+
+    def __init__(self, mechanism: Mechanism, varied: Sequence[str]) -> None:
+        every, holds = places(mechanism), kinds(mechanism)
+        values = {place: every[place] for place in varied}
+        # a derivative by the components of a direction becomes one by its angle
+        lengths = {place: math.hypot(*value) for place, value in values.items() if holds[place] is Kind.DIRECTION}
+        self.numbers = [(place, k, lengths.get(place, 1.0)) for place, value in values.items() for k in range(len(value))]
+        rows = iter(np.eye(len(self.numbers)))
+        self.slopes = {place: tuple(Slope(x, next(rows)) for x in value) for place, value in values.items()}
+
+    def derivatives_of(self, x: Any) -> Array:
+        """Return the derivatives of a number by all numbers of the places, shape (numbers,); zero where it depends on none."""
+        return np.broadcast_to(derivatives(x), (len(self.numbers),))
+
+
+@dataclass(frozen=True, eq=False)
+class _Dependence:
+    """What the unknowns at a sample owe to residuals and to geometry.
+
+    Attributes:
+        by_residuals: derivatives of the unknowns by the residuals of the solved rows [m or rad], shape (unknowns, rows).
+        by_geometry: derivatives of the unknowns by the numbers of the places, shape (unknowns, numbers).
+    """
+
+    formulation: Cartesian
+    at: Configuration
+    frame: Frames
+    by_residuals: Array
+    by_geometry: Array
+
+    def gradient(self, point: Point, geometry: _Geometry) -> Gradient:
+        """How the position of a point depends on both."""
+        pose, arm = self.at.poses.get(point.body, GROUND_POSE), self.frame.arm(point.body, point.position)
+        turned = pose.turn(arm)
+        by_unknowns = np.zeros((3, self.formulation.unknowns))
+        if point.body in self.formulation.columns:
+            first = self.formulation.columns[point.body]
+            for k in range(6):
+                rates = [float(k == column) for column in range(6)]
+                by_unknowns[:, first + k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
+        by_unknowns *= self.frame.unit
+        moved: Vec3 = vec(geometry.slopes.get(f"points.{point.name}.position", point.position))
+        # the body carries its point along: A times the change of where it is at design
+        design = np.array([geometry.derivatives_of(x) for x in moved])
+        along = np.array([geometry.derivatives_of(x) for x in pose.turn(moved)])
+        here, there = np.array([*position_of(point.position, arm, self.frame.unit, pose)]), np.array(point.position)
+        return Gradient(here, there, by_unknowns @ self.by_residuals, by_unknowns @ self.by_geometry + along, design)

@@ -29,10 +29,13 @@ OWED = 1e-9
 NEARLY = 1e-3
 # Rows with less than this part of the largest share of a contradiction are not its cause.
 SHARE = 0.1
+# The way to the pose nearest to an assembly: no step is longer than this [units of the mechanism's size, rad], within which rows
+# are near to linear, and there are enough to go around the mechanism several times.
+STEP, STEPS = 0.1, 200
 
 
 @dataclass(frozen=True)
-class Row:
+class NamedRow:
     """A row by name.
 
     Attributes:
@@ -53,12 +56,12 @@ class Row:
 class Dependency:
     """A row that others say already: the sum of the others times their weights."""
 
-    row: Row
-    repeats: tuple[tuple[float, Row], ...]
+    row: NamedRow
+    repeats: tuple[tuple[float, NamedRow], ...]
 
 
 @dataclass(frozen=True)
-class Component:
+class ComponentCount:
     """Bodies that joints, couplers or drivers tie together, with their share of the count; drivers are not among the rows."""
 
     bodies: tuple[str, ...]
@@ -77,7 +80,7 @@ class Component:
 class Violation:
     """A row that cannot be met, and by how much: residual [m or rad], or its rate by the driver's."""
 
-    row: Row
+    row: NamedRow
     amount: float
 
 
@@ -105,14 +108,14 @@ class Ranks:
         return account(self.mechanism, self.frame)
 
     @cached_property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[NamedRow]:
         """All rows by name."""
-        found: list[Row] = []
+        found: list[NamedRow] = []
         for c in self.formulation.constraints:
             count = c.primitive.n if isinstance(c, Constraint) else 1
             kind = type(c.primitive).__name__ if isinstance(c, Constraint) else "Relation"
             found += [
-                Row(c.owner, kind, self._holds(len(found) + k, c.j if isinstance(c, Constraint) else "")) for k in range(count)
+                NamedRow(c.owner, kind, self._holds(len(found) + k, c.j if isinstance(c, Constraint) else "")) for k in range(count)
             ]
         return found
 
@@ -140,18 +143,18 @@ class Ranks:
         return found
 
     @cached_property
-    def nearly(self) -> list[tuple[float, list[Row]]]:
+    def nearly(self) -> list[tuple[float, list[NamedRow]]]:
         """Combinations of joint rows that are nearly redundant: their size, which is a singular value, and the rows in them."""
         u, values = np.linalg.svd(self.matrix[: self.joint_rows], full_matrices=False)[:2]
         scale = values.max(initial=0.0)
-        found: list[tuple[float, list[Row]]] = []
+        found: list[tuple[float, list[NamedRow]]] = []
         for k in np.flatnonzero((values > RANK_TOLERANCE * scale) & (values < NEARLY * scale)):
             share = np.abs(u[:, k])
             found.append((float(values[k]), [self.rows[row] for row in _largest_first(share) if share[row] > SHARE * share.max()]))
         return found
 
     @cached_property
-    def components(self) -> list[Component]:
+    def components(self) -> list[ComponentCount]:
         """The parts of the mechanism that nothing ties together."""
         groups: list[set[int]] = []  # of columns
         for row in self.matrix:
@@ -165,13 +168,13 @@ class Ranks:
         groups += [set(range(c, c + COLUMNS)) for c in sorted(loose) if c % COLUMNS == 0]
         return [self._component(sorted(group)) for group in sorted((g for g in groups if g), key=min)]
 
-    def _component(self, columns: Sequence[int]) -> Component:
+    def _component(self, columns: Sequence[int]) -> ComponentCount:
         own = np.flatnonzero(np.abs(self.matrix[:, columns]).max(axis=1) > 0.0)
         joints, drivers = own[own < self.joint_rows], own[own >= self.joint_rows]
         bodies = tuple(name for name, first in self.formulation.columns.items() if first in columns)
         names = tuple(self.rows[int(k)].owner for k in drivers)
         rank = len(independent_rows(self.matrix[joints][:, columns], 0))
-        return Component(bodies, len(columns), len(joints), rank, names)
+        return ComponentCount(bodies, len(columns), len(joints), rank, names)
 
     @cached_property
     def free(self) -> list[list[Screw]]:
@@ -209,14 +212,14 @@ class Ranks:
         """The rows that do not hold in the pose nearest to an assembly, with the drivers at design; empty where it closes."""
         exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
         state = exact.design
-        for _ in range(200):
+        for _ in range(STEPS):
             at = exact.configuration(state)
             phi = np.array(exact.phi(at))
             if np.abs(phi).max(initial=0.0) <= CONSISTENT:
                 break
             step = np.linalg.lstsq(jacobian(exact, at), -phi, rcond=RANK_TOLERANCE)[0]
             size = float(np.abs(step).max())
-            state = exact.retract(at, (step * min(1.0, 0.1 / size) if size else step).tolist())
+            state = exact.retract(at, (step * min(1.0, STEP / size) if size else step).tolist())
             if size < CONSISTENT:
                 break
         phi = np.array(self.formulation.phi(self.formulation.configuration(state)))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...algebra import Vec3, cross
+from ...errors import shortened
 from ...mechanism import Vector
 from ...primitives.base import Twist
 from ...trajectory import Array
@@ -17,6 +18,8 @@ from ..equations.formulation import Configuration, Formulation
 
 # Parts of a motion below this share of its largest are left out: round-off of a null vector is far below, what moves is above.
 STILL = 1e-6
+# Components below this [- or m] are printed as zero: they are round-off, of which a reader would see a direction askew.
+ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True)
@@ -84,8 +87,7 @@ def free_motions(matrix: Array) -> Array:
 
 def described(found: Sequence[Screw], most: int = 4) -> str:
     """The motions of the fastest bodies, in words."""
-    more = f" and {len(found) - most} more" if len(found) > most else ""
-    return ", ".join(map(str, found[:most])) + more
+    return shortened([*map(str, found)], most)
 
 
 def _screw(name: str, twist: Twist, at: Configuration, frame: Frames, fastest: float) -> Screw:
@@ -111,4 +113,4 @@ def _tuple(a: Vec3) -> Vector:
 
 
 def _numbers(a: Sequence[float]) -> str:
-    return "(" + ", ".join(f"{x if abs(x) > 1e-9 else 0.0:.4g}" for x in a) + ")"
+    return "(" + ", ".join(f"{x if abs(x) > ROUND_OFF else 0.0:.4g}" for x in a) + ")"

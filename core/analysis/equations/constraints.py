@@ -57,14 +57,14 @@ class Frames:
     moving: tuple[str, ...]
 
     def arm(self, body: str, position: Sequence[float]) -> Vec3:
-        """From the internal origin of the body to a point, at design [units]."""
+        """Return the vector from the internal origin of the body to a point, global at design [units]."""
         return (1.0 / self.unit) * vec(position) - self.origins[body]
 
 
 def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
     """The length unit, unless it is given, and the internal origins: at the joint by which the spanning tree reaches a body."""
     if length_unit is None:
-        length_unit = 2.0 ** round(math.log2(_size(mechanism)))
+        length_unit = unit_near(_size(mechanism))
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
     touching: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
@@ -86,9 +86,8 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
     for joint in mechanism.joints:
         for body in joint.bodies:
             points[body] += joint.points_on(body)
-    extents = [max(max(axis) - min(axis) for axis in zip(*points[body], strict=True)) for body in whole.moving if points[body]]
-    sizes = sorted(extent for extent in extents if extent > 0.0)
-    unit = 2.0 ** round(math.log2(sizes[len(sizes) // 2])) if sizes else whole.unit
+    sizes = sorted(size for body in whole.moving if (size := extent(points[body])) > 0.0)
+    unit = unit_near(sizes[len(sizes) // 2]) if sizes else whole.unit
     return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
 
 
@@ -100,10 +99,20 @@ def _size(mechanism: Mechanism) -> float:
     """
     joints = [point for joint in mechanism.joints for point in joint.points_on()]
     for places in (joints, joints + [point.position for point in mechanism.points]):
-        extent = max((max(axis) - min(axis) for axis in zip(*places, strict=True)), default=0.0)
-        if extent > 0.0:
-            return extent
+        size = extent(places)
+        if size > 0.0:
+            return size
     return 1.0
+
+
+def extent(points: Sequence[Sequence[float]]) -> float:
+    """Return the largest extent of points along a global axis [m]; zero where there are none."""
+    return max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=0.0)
+
+
+def unit_near(length: float) -> float:
+    """Return the power of two nearest to a positive length [m]: measured in it, lengths keep all their digits."""
+    return 2.0 ** round(math.log2(length))
 
 
 class Style(StrEnum):
@@ -121,20 +130,17 @@ class Style(StrEnum):
 
 
 def constraints(
-    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE, *, keep_fixed: bool = False
+    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE
 ) -> list[Constraint | Relation]:
     """All constraints: joints in order, then couplers, then drivers in order.
 
     Args:
         drives: the motion of each driver by name; drivers not named hold their design value.
         style: how rows are written. MIXED and RELATIVE name the coordinates of all axial joints, the others those of couplers.
-        keep_fixed: fixed bodies move in principle and are held by ground rows, as in the paper's count; else they are ground.
     """
     mixed = style in (Style.MIXED, Style.RELATIVE)
-    coupled = {f"{joint}.{freedom}" for c in mechanism.couplers for joint, freedom in zip(c.joints, c.freedoms, strict=True)}
+    coupled = {f"{joint}.{freedom}" for coupler in mechanism.couplers for joint, freedom, _ in coupler.terms}
     found: list[Constraint | Relation] = []
-    if keep_fixed:
-        found += [Constraint(body.name, p.Ground(), GROUND, body.name) for body in mechanism.bodies if body.fixed]
     for original in mechanism.joints:
         if isinstance(original, AxialJoint):
             found += _axial(original, frame, coupled, mixed=mixed, fixed_last=mechanism.is_fixed(original.j))
@@ -145,8 +151,7 @@ def constraints(
         composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
         found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
     for coupler in mechanism.couplers:
-        terms = zip(coupler.joints, coupler.freedoms, coupler.coefficients, strict=True)
-        found.append(_relation(coupler.name, {f"{joint}.{freedom}": k for joint, freedom, k in terms}, frame))
+        found.append(_relation(coupler.name, {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}, frame))
     found += [_driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed) for each in mechanism.drivers]
     return _restyled(found, style)
 

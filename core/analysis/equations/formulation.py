@@ -117,5 +117,5 @@ class Formulation(Protocol):
 
 
 def row_names(formulation: Formulation) -> list[str]:
-    """Of every row the joint or driver, and the primitive, to read."""
+    """Return a name of every row to read: its joint or driver, and its primitive."""
     return [f"{owner}: {primitive}" for owner, primitive in formulation.owners]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import ZERO, quat, vec
+from ...algebra import ZERO, angle_about, quat, vec
 from ...drivers import JointAngle
 from ...joints import AxialJoint
 from ...joints.base import unit
@@ -51,7 +51,7 @@ def state_of(
             h, relative = unit(joint.axis), i.q.conjugate() * j.q
             s_i, s_j = (frame.arm(body, joint.point) for body in joint.bodies)
             apart = (j.u - i.u) + (j.swing(s_j) - i.swing(s_i))
-            angle: Array = np.asarray(2.0 * np.arctan2(h @ relative.e, relative.e0))
+            angle: Array = np.asarray(angle_about(h, relative))
             angle = angle + 4.0 * np.pi * np.round((driven.get(joint.name, 0.0) - angle) / (4.0 * np.pi))
             for freedom, value in (("rotation", angle), ("translation", i.turn(h) @ apart)):
                 if f"x {joint.name}.{freedom}" in state:

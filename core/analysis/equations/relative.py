@@ -86,7 +86,7 @@ class Relative:
 
     def configuration(self, state: State) -> Configuration:
         found = tree.posed(self.chains, state)
-        return Posed(state, found.poses, found)
+        return TreeConfiguration(state, found.poses, found)
 
     def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
         after = tree.retracted(self.chains, at.state, step)
@@ -130,7 +130,7 @@ class Relative:
         name = f"x {coordinate}"
         return self._tree_columns[name] if name in self._tree_columns else self._own[coordinate]
 
-    def _transformed(self, row: Mapping[int, Scalar], at: Posed) -> dict[int, Scalar]:
+    def _transformed(self, row: Mapping[int, Scalar], at: TreeConfiguration) -> dict[int, Scalar]:
         """A Cartesian row times B: only the unknowns that a body of the row depends on."""
         entries: dict[int, Scalar] = {}
         for name, first in self.closed.columns.items():
@@ -151,16 +151,16 @@ class Relative:
 
 
 @dataclass(frozen=True, eq=False)
-class Posed(Configuration):
+class TreeConfiguration(Configuration):
     """A configuration that remembers the tree it was computed with."""
 
     tree: tree.Posed
 
     def arm(self, name: str, column: tree.Column, origins: Mapping[str, Vec3]) -> Vec3:
-        """From the column's point P to the body's origin, now."""
+        """Return the vector from the column's point P to the body's origin, now, global axes [units]."""
         return (origins[name] - column.P_design) + (self.poses[name].u - column.P)
 
 
-def _posed(at: Configuration) -> Posed:
-    assert isinstance(at, Posed)
+def _posed(at: Configuration) -> TreeConfiguration:
+    assert isinstance(at, TreeConfiguration)
     return at

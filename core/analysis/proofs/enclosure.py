@@ -24,7 +24,7 @@ import numpy as np
 from ...errors import KincheckError
 from ...program.ball_executor import ORDER, Ball, evaluate, flint
 from ...trajectory import Array
-from .exact import Equations
+from .exact import ExactEquations
 
 # Radii of B that are tried, in units of the mechanism's size: the largest that succeeds says how far around the solution is alone.
 RADII = tuple(2.0**-k for k in (7, 14, 21, 28, 35, 42, 49))
@@ -57,7 +57,9 @@ class UnprovedError(KincheckError, ArithmeticError):
     """There is no proof for a sample; the message says why."""
 
 
-def enclose(equations: Equations, points: Sequence[str], pose: Array, drives: Sequence[Sequence[Ball]], bits: int) -> Enclosure:
+def enclose(
+    equations: ExactEquations, points: Sequence[str], pose: Array, drives: Sequence[Sequence[Ball]], bits: int
+) -> Enclosure:
     """Prove one sample; to be called at the precision of the equations.
 
     Args:
@@ -94,7 +96,7 @@ def enclose(equations: Equations, points: Sequence[str], pose: Array, drives: Se
 class _Sample:
     """The equations at the drivers' values of one sample; vectors are columns of balls."""
 
-    def __init__(self, equations: Equations, drives: Sequence[Sequence[Ball]]) -> None:
+    def __init__(self, equations: ExactEquations, drives: Sequence[Sequence[Ball]]) -> None:
         self._equations = equations
         arb, series = flint().arb, flint().arb_series
         self._still: list[Ball] = []

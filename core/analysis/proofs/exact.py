@@ -183,7 +183,7 @@ class _Inputs:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class ExactEquations:
     """What a proof needs of a mechanism. All programs read: the state, then the drivers, then `geometry`.
 
     Attributes:
@@ -213,7 +213,7 @@ class Equations:
         return sum(self.state.values())
 
 
-def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str], kept: Sequence[int]) -> Equations:
+def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str], kept: Sequence[int]) -> ExactEquations:
     """The programs of an exact mechanism.
 
     Args:
@@ -244,7 +244,7 @@ def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str
         for row, gradient in enumerate(jacobian(inputs.tape, residuals, state))
         for column, value in gradient.items()
     }
-    return Equations(
+    return ExactEquations(
         frame,
         {name: len(value) for name, value in design.items()},
         tuple(drivers),

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 from ...mechanism import Mechanism
 from ...motions import Path, outwards
-from ...primitives.base import GROUND_POSE, Drive, Pose
 from ...program.ball_executor import Ball, flint, precision
 from ...trajectory import Array, Trajectory
 from ..equations.cartesian import Cartesian
-from ..equations.constraints import Constraint, constraints, frames
+from ..equations.constraints import frames
 from ..equations.formulation import row_names
-from ..equations.poses import displaced
+from ..equations.poses import displaced, state_of
 from ..model import compile_model
 from ..request import Request
 from ..singular.choice import chosen_at
@@ -108,26 +106,10 @@ def _states(mechanism: Mechanism, native: Trajectory, times: Array) -> Array:
     """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies, shape (n, size)."""
     frame = frames(mechanism)
     poses = displaced(mechanism, frame, {name: (motion.r, motion.p) for name, motion in native.bodies.items()})
-    found = [x for name in frame.moving for x in poses[name].u]
-    found += [x for name in frame.moving for x in poses[name].q]
-    named = {c.coordinate: c for c in constraints(mechanism, frame, {}) if isinstance(c, Constraint) and c.coordinate}
-    found += [_coordinate(c, poses, times, native) for c in named.values()]
-    return np.stack(found, axis=1)
-
-
-def _coordinate(c: Constraint, poses: Mapping[str, Pose], times: Array, native: Trajectory) -> Array:
-    """A joint's own turn [rad] or displacement [units], from the residual that would vanish at it, shape (n,)."""
-
-    def residual(**drive: float) -> Array:
-        primitive: Any = c.primitive
-        (value,) = replace(primitive, drive=Drive(**drive)).phi(poses.get(c.i, GROUND_POSE), poses.get(c.j, GROUND_POSE))
-        return value
-
-    if c.coordinate.endswith(".translation"):
-        return residual(c=0.0)
-    turn = 2.0 * np.arctan2(residual(half_cos=1.0, half_sin=0.0), -residual(half_cos=0.0, half_sin=1.0))
-    # turns are counted from the design outwards; a sweep so coarse that they are miscounted fails to be proved
-    for side in outwards(times, 0.0):
-        outward = side[native.solved[side]]
-        turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
-    return turn
+    state = state_of(Cartesian.of(mechanism, frame), mechanism, frame, poses, {})
+    for turn in (vector[0] for name, vector in state.items() if name.startswith("x ") and name.endswith(".rotation")):
+        # turns are counted from the design outwards; a sweep so coarse that they are miscounted fails to be proved
+        for side in outwards(times, 0.0):
+            outward = side[native.solved[side]]
+            turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
+    return np.stack([x for vector in state.values() for x in vector], axis=1)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...motions import Path
-from ...trajectory import Array
+from ...trajectory import QUANTITIES, Array
 from ..continuity import AMPLIFIED, EPSILON, WORSE
 from ..march import arrived, march
 from ..model import TESTS, Model
@@ -50,7 +50,7 @@ class Bridge:
 
 
 def onward(route: Route, lane: Array, times: Array) -> Route:
-    """From where a lane stands on a route to other times."""
+    """Return the route to other times that sets off where a lane stands on this one."""
     since = float(lane[route.model.slots[FROM + TIME]])
     return Route(route.model, Path(route.path.motions, times, route.path.design), arrived(route.model, lane), since)
 
@@ -110,7 +110,7 @@ def _scales(model: Model, kept: Array, speed: float) -> Iterator[tuple[slice, fl
         label = name.split(" ")[0]
         if label in TESTS:
             continue
-        length = model.frame.unit if label in ("position", "velocity", "acceleration", "r", "rdot", "rddot") else 1.0
+        length = model.frame.unit if label in (*QUANTITIES, "r", "rdot", "rddot") else 1.0
         order = 1 if label in ("velocity", "rdot", "omega") else 2 if label in ("acceleration", "rddot", "omega_t") else 0
         own = float(np.abs(kept[rows]).max()) if order else 0.0
         yield rows, max(own, length * speed**order)

@@ -23,6 +23,9 @@ from .singularity import Singularity, examine
 
 # A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be cheap, near enough to be drawn.
 LONGEST = 0.05
+# A curve closes where it passes its beginning again, going the same way: the cosine of the two directions is above this there, and
+# below it where the curve crosses itself. In the first steps, so many of the longest, it has not left its beginning yet.
+SAME_WAY, BEGINNING = 0.9, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +180,7 @@ def _walked(walk: ArclengthWalk, first: Spot, length: float, longest: float) -> 
     for spot in walk.along(first, length, longest):
         trail.spots.append(spot)
         _note(walk, trail)
-        if spot.arc > 4.0 * longest and _back(walk.system, first, spot, longest):
+        if spot.arc > BEGINNING * longest and _back(walk.system, first, spot, longest):
             trail.closed = True
             break
     trail.events.sort(key=lambda event: event.arc)
@@ -220,4 +223,4 @@ def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
 
 def _back(system: System, first: Spot, spot: Spot, longest: float) -> bool:
     """Whether the next step would pass where the curve began: there, and going the same way."""
-    return system.apart(first.state, spot.state) < longest and float(first.dq @ spot.dq) > 0.9
+    return system.apart(first.state, spot.state) < longest and float(first.dq @ spot.dq) > SAME_WAY

@@ -60,7 +60,7 @@ class Findings:
 
     @property
     def details(self) -> dict[str, Any]:
-        """For the record; empty where nothing was found."""
+        """The findings as a record has them; empty where nothing was found."""
         found: dict[str, Any] = {}
         if self.retried:
             found |= {"retried_samples": self.retried, "smallest_singular_value": self.sigma}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import shortened
 from ...trajectory import Array
 from ..continuity import EPSILON
 from ..system import System
@@ -56,12 +57,12 @@ class Singularity:
 
     @property
     def kind(self) -> str:
-        """In a word or two."""
+        """What is singular, in a word or two."""
         return "choice of rows" if self.regular else "lock-up" if self.lock_up else "bifurcation"
 
     @property
     def words(self) -> str:
-        """To read, after a place."""
+        """What is singular and what moves there, as a message says it after a place."""
         if self.regular:
             return (
                 f"smallest singular value {self.sigma:.3g} of the rows that were chosen at the design position, of "
@@ -77,15 +78,14 @@ class Singularity:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """For a record."""
+        """The same as a record has it."""
         direction = {body: {"moves": list(v), "turns": list(w)} for body, (v, w) in self.moves.items()}
         return {"kind": self.kind, "smallest_singular_value": self.sigma, "rows_of": list(self.owners), "direction": direction}
 
 
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence, the first few."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
+    return shortened(names, NAMED)
 
 
 def examine(system: System, state: Array, sample: Array) -> Singularity:
@@ -153,7 +153,7 @@ POLISH = 12
 
 
 def smallest_singular_values(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
-    """Of the kept rows at states, and of all rows; shape (m,) each."""
+    """Return the smallest singular values of the kept rows at m states, and of all rows; shape (m,) each."""
     found = system.equations(state, sample)
     every = np.concatenate([found.jacobian, found.redundant], axis=1)
     kept, of_all = (np.linalg.svd(_finite(rows), compute_uv=False)[:, -1].astype(np.float64) for rows in (found.jacobian, every))

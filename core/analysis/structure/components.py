@@ -8,7 +8,6 @@ their geometry, and share programs.
 from __future__ import annotations
 
 import importlib
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from graphlib import TopologicalSorter
@@ -21,7 +20,7 @@ from ...errors import SolveError
 from ...joints import Joint, Kind
 from ...mechanism import GROUND, Body, Mechanism, Point, Vector
 from ..equations.cartesian import COLUMNS, Cartesian
-from ..equations.constraints import Frames
+from ..equations.constraints import Frames, extent, unit_near
 from ..equations.formulation import Formulation, row_names
 from ..equations.geometry import places
 from ..equations.poses import jacobian
@@ -50,8 +49,8 @@ class Component:
     def extent(self) -> float:
         """A power of two of metres near its size; zero where all its joints are at one point."""
         points = [point for joint in self.joints for point in joint.points_on()]
-        extent = max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=0.0)
-        return 2.0 ** round(math.log2(extent)) if extent > 0.0 else 0.0
+        size = extent(points)
+        return unit_near(size) if size > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

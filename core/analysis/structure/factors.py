@@ -102,7 +102,7 @@ class Factors:
 
     @property
     def entries(self) -> int:
-        """Of both factors."""
+        """The number of entries of both factors together."""
         return self._factors.nnz
 
     def solve(self, b: Array) -> Array:

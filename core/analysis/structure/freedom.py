@@ -23,6 +23,8 @@ from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independe
 
 COORDINATES = 7
 """Coordinates of a body in the paper's count: r and p."""
+# A body whose part of an orthonormal basis of the free motions is below this stands still: round-off of the basis is far below.
+STILL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str
     free: list[str] = []
     for k, body in enumerate(mechanism.moving):
         block = np.linalg.norm(motions[:, COLUMNS * k : COLUMNS * (k + 1)], axis=0)
-        if block.max() > 1e-6:  # far above round-off of an orthonormal basis
-            how = "move" if block[:3].max() > 1e-6 else "turn"
+        if block.max() > STILL:
+            how = "move" if block[:3].max() > STILL else "turn"
             free.append(f"{body.name!r} can {how}")
     return f"{head}; {', '.join(free)}; add a driver, or join what spins freely (a rod between two balls: use distance)"

@@ -15,7 +15,7 @@ from ...analysis.route import Route
 from ...analysis.variants import Variants, solve_variants
 from ...joints import Kind
 from ...program.llvm.compiler import available
-from ...trajectory import Array, PointMotion, Trajectory
+from ...trajectory import QUANTITIES, Array, PointMotion, Trajectory
 from ..case import Case
 from ..compare import output_series, size
 from .levels import MOTIONS, flops_of
@@ -111,10 +111,7 @@ def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float
 def _error(case: Case, model: Model, found: Variants) -> float | None:
     """Of the first variant."""
     kept = found.kept[:, :, 0]
-    points = {
-        name: PointMotion(*(kept[model.rows[f"{label} {name}"]].T for label in ("position", "velocity", "acceleration")))
-        for name in case.points
-    }
+    points = {name: PointMotion(*(kept[model.rows[f"{label} {name}"]].T for label in QUANTITIES)) for name in case.points}
     solved = found.solved[:, 0]
     whole = Trajectory(points, solved, np.zeros_like(solved, dtype=np.int64), 0.0, "", {})
     errors = [

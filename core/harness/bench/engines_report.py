@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..reporting.wording import number
+from ...trajectory import QUANTITIES
+from ..reporting.wording import motion_unit, number
 from ..run import NATIVE
 from . import cost_report as cost
 from . import levels
@@ -56,7 +57,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
             entry.setting,
             entry.loop,
             str(entry.outcome),
-            *(number(getattr(entry.errors, name)) for name in ("position", "velocity", "acceleration")),
+            *(number(getattr(entry.errors, name)) for name in QUANTITIES),
             number(entry.iterations),
             *cells(entry.us_per_sample),
         )
@@ -76,9 +77,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         "effort",
         "loop",
         "outcome",
-        "position\n[m]",
-        "velocity\n[m/s]",
-        "acceleration\n[m/s²]",
+        *(f"{name}\n[{motion_unit('m', name)}]" for name in QUANTITIES),
         f"{counted}\na sample",
     )
     diagrams = [precision_diagram(found, case, mode)] if any(entry.us_per_sample for entry in entries) else []
@@ -147,15 +146,13 @@ def _levels(found: Bench, case: str) -> Section:
     for entry in (each for each in found.levels if each.case == case):
         us = entry.us_per_sample
         part = None if us is None or whole is None else us.median / whole
-        errors = (number(getattr(entry.errors, name)) for name in ("position", "velocity", "acceleration"))
+        errors = (number(getattr(entry.errors, name)) for name in QUANTITIES)
         rows.append((entry.setting, entry.loop, str(entry.outcome), *errors, *cells(us), number(part)))
     headings = (
         "asked for",
         "loop",
         "outcome",
-        "position\n[m]",
-        "velocity\n[m/s]",
-        "acceleration\n[m/s²]",
+        *(f"{name}\n[{motion_unit('m', name)}]" for name in QUANTITIES),
         "µs",
         "quartiles",
         "part",

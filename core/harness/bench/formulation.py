@@ -7,19 +7,21 @@ from typing import Literal
 
 import msgspec
 
+from ...trajectory import QUANTITIES
 from ..case import Case
+from ..reporting.wording import motion_unit
 from . import operations as bench_operations
 from . import roundoff as bench_roundoff
 from . import whole as bench_whole
 from .operations import CONVENTIONS, Counted, Operations
 from .pages import Report, Section
 from .roundoff import DIGITS, RoundOff
-from .whole import MOTIONS, ProgramSize, SweepError
+from .whole import ProgramSize, SweepError
 
 NAME = "bench_formulation"
 STATES = 250
 """Random states by default: a rms over as many is settled to a tenth."""
-QUANTITIES = ("residual", "jacobian", "gamma")
+MEASURED = ("residual", "jacobian", "gamma")
 STAGES = ("J", "velocity", "acceleration", "gamma")
 
 
@@ -109,7 +111,7 @@ def report(found: Formulation) -> Report:
                 f"on. Largest entry of the rows in each of {found.states} random states; root mean square and maximum over these. "
                 "Arms, velocities and rates are near one [m, m/s, rad/s]; dot products as printed are multiplied out.",
             ),
-            ("", "rows", "way", "|r| [m]", *(f"{name}\n{kind}" for name in QUANTITIES for kind in ("rms", "max"))),
+            ("", "rows", "way", "|r| [m]", *(f"{name}\n{kind}" for name in MEASURED for kind in ("rms", "max"))),
             4,
             [(e.condition, e.rows, e.way, "–" if e.distance is None else f"{e.distance:.0e}", *_errors(e)) for e in found.roundoff],
         ),
@@ -117,9 +119,9 @@ def report(found: Formulation) -> Report:
             "Errors of the whole sweep",
             found.verdicts["sweeps"],
             ("Largest error over outputs and samples, against the reference of the case.",),
-            ("row style", "place", "position [m]", "velocity [m/s]", "acceleration [m/s²]"),
+            ("row style", "place", *(f"{name} [{motion_unit('m', name)}]" for name in QUANTITIES)),
             2,
-            [(s.style, s.place, *(f"{getattr(s, name):.1e}" for name in MOTIONS)) for s in found.sweeps],
+            [(s.style, s.place, *(f"{getattr(s, name):.1e}" for name in QUANTITIES)) for s in found.sweeps],
         ),
     ]
     return Report(NAME, "Operation counts and round-off of SAE 943745, measured", facts, sections)

@@ -18,7 +18,7 @@ import msgspec
 from ...algebra import IDENTITY, Mat3, Scalar, Vec3, X, Y, Z
 from ...primitives import Pose, Row, Twist
 from ...program import Tape, program
-from .textbook import Equations, Given, PrintedDot11, PrintedDot12, PrintedDot21, conditions
+from .textbook import Countable, Given, PrintedDot11, PrintedDot12, PrintedDot21, conditions
 
 CONVENTIONS = (
     "Multiplications and additions for one pair of moving bodies; signs are free; A(p) of both bodies is given. "
@@ -122,7 +122,7 @@ class Pair:
         return Pair(i, j, *(Twist(vector(), vector()) for _ in range(4)))
 
 
-def executed(equations: Sequence[Equations], pair: Pair, tally: list[int]) -> Operations:
+def executed(equations: Sequence[Countable], pair: Pair, tally: list[int]) -> Operations:
     """Operations of rows as they are executed, one after the other; the tally is what the pair's numbers add to."""
 
     def cost(values: Callable[[], Sequence[Any]]) -> tuple[int, Sequence[Any]]:
@@ -136,7 +136,7 @@ def executed(equations: Sequence[Equations], pair: Pair, tally: list[int]) -> Op
     return Operations(jacobian, jacobian + velocity, jacobian + gamma + acceleration, gamma)
 
 
-def traced(equations: Sequence[Equations]) -> Operations:
+def traced(equations: Sequence[Countable]) -> Operations:
     """Operations of the traced programs of rows."""
     tape, slots = Tape(), count()
     pair = Pair.of(lambda: tape.input(next(slots)))
@@ -190,11 +190,11 @@ def count_operations() -> list[Counted]:
     return sorted(found, key=lambda each: each.condition)  # stable: within a condition in the order in which they were counted
 
 
-def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Sequence[Equations]]]:
+def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Sequence[Countable]]]:
     """Condition, rows, way and equations of all that is printed, from a source of constants."""
     f, g, h, s_i, s_j, *constant = (vector() for _ in range(8))
     for way, formed in ((MULTIPLIED_OUT, True), (FROM_THE_LEFT, False)):
-        simplified: dict[str, Equations] = {"d11": PrintedDot11(f, g, formed=formed)}
+        simplified: dict[str, Countable] = {"d11": PrintedDot11(f, g, formed=formed)}
         if formed:  # these have no product that could go either way
             simplified |= {"d12": PrintedDot12(Mat3(*constant)), "d21": PrintedDot21(f, g)}
         for condition in conditions(f, g, h, s_i, s_j):

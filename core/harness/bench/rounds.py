@@ -30,13 +30,13 @@ class Spread(msgspec.Struct, frozen=True, kw_only=True):
     rounds: int
 
     def times(self, factor: float) -> Spread:
-        """In another unit, or of another amount."""
+        """Return the same spread in another unit, or of another amount: all times multiplied by the factor."""
         least, median, lower, upper = (factor * each for each in (self.least, self.median, self.lower, self.upper))
         return Spread(least=least, median=median, lower=lower, upper=upper, rounds=self.rounds)
 
 
 def spread(values: Sequence[float]) -> Spread:
-    """Of values, one a round."""
+    """Return the spread of values, one a round."""
     least, lower, median, upper = np.percentile(values, (0.0, 25.0, 50.0, 75.0)).tolist()
     return Spread(least=least, median=median, lower=lower, upper=upper, rounds=len(values))
 

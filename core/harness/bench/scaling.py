@@ -87,6 +87,6 @@ def _row(name: str, n: int, mechanism: Mechanism, found: Trajectory, seconds: Sp
 
 
 def exponent(small: Scaling, large: Scaling) -> float:
-    """By which power of the size the cost grows between two rows."""
+    """Return the power of the size by which the cost grows between two rows."""
     ratio = large.us_per_value.median / small.us_per_value.median
     return math.log(ratio) / math.log(large.unknowns / small.unknowns)

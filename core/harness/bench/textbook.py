@@ -27,7 +27,7 @@ from ...algebra import ZERO, Mat3, Scalar, Vec3, X, Y, Z
 from ...primitives import Dot10, Dot11, Dot12, Dot20, Dot21, Pose, Primitive, Row, Twist, conventional, paper
 
 
-class Equations(Protocol):
+class Countable(Protocol):
     """What can be counted: a primitive, or rows as printed."""
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:

@@ -13,13 +13,13 @@ from ...analysis.solve import solve
 from ...errors import SolveError
 from ...joints import Kind
 from ...mechanism import Mechanism, Vector
-from ...trajectory import Array, Trajectory
+from ...trajectory import QUANTITIES, Array, Trajectory
 from ..case import Case
 from ..compare import output_series
+from ..reporting.wording import motion_unit
 
 FAR: Vector = (0.6e6, -0.7e6, 0.39e6)
 AT_DESIGN, AWAY, BACK, DIFFERENCE = "as designed", "1e6 m away", "moved back from there", "away less moved back"
-MOTIONS = ("position", "velocity", "acceleration")
 
 
 class ProgramSize(msgspec.Struct, frozen=True):
@@ -59,7 +59,7 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
         ).details["program"]
         programs.append(ProgramSize(style.value, size["newton"]["flops"], size["tangent"]["flops"]))
         outputs = {place: _outputs(replace(case, mechanism=places[place]), each) for place, each in found.items()}
-        reference = np.array([[getattr(case.reference[output.name], name) for name in MOTIONS] for output in case.outputs])
+        reference = np.array([[getattr(case.reference[output.name], name) for name in QUANTITIES] for output in case.outputs])
         for place in places:
             sweeps.append(SweepError(style.value, place, *_largest(outputs[place] - reference)))
         sweeps.append(SweepError(style.value, DIFFERENCE, *_largest(outputs[AWAY] - outputs[BACK])))
@@ -78,7 +78,7 @@ def _swept(case: Case, mechanism: Mechanism, style: str) -> Trajectory:
 def _outputs(case: Case, found: Trajectory) -> Array:
     """Position, velocity and acceleration of all outputs, shape (outputs, 3, samples)."""
     series = [output_series(case, output, found) for output in case.outputs]
-    return np.array([[getattr(each, name) for name in MOTIONS] for each in series])
+    return np.array([[getattr(each, name) for name in QUANTITIES] for each in series])
 
 
 def _largest(differences: Array) -> list[float]:
@@ -117,8 +117,8 @@ def verdict_on_sweeps(sweeps: Iterable[SweepError]) -> list[str]:
     sweeps = list(sweeps)
 
     def errors(place: str, pick: Callable[[Iterable[float]], float] = max) -> str:
-        values = (pick(getattr(each, name) for each in sweeps if each.place == place) for name in MOTIONS)
-        return ", ".join(f"{each:.1e} {unit}" for each, unit in zip(values, ("m", "m/s", "m/s²"), strict=True))
+        values = (pick(getattr(each, name) for each in sweeps if each.place == place) for name in QUANTITIES)
+        return ", ".join(f"{each:.1e} {motion_unit('m', name)}" for each, name in zip(values, QUANTITIES, strict=True))
 
     return [
         f"Errors of the best row style: {errors(AT_DESIGN, min)}; of the worst: {errors(AT_DESIGN)}.",

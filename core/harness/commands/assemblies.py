@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError
+from ...errors import KincheckError, unknown
 from . import foreign
 from .export import keep_texts
-from .house import House, Status, given, unknown, whole
+from .house import House, Status, given, whole
 
 if TYPE_CHECKING:
     from ..assemblies import Survey

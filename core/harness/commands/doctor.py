@@ -31,7 +31,7 @@ def _doctor(options: argparse.Namespace, house: House) -> int:
     from ..doctor import examine
     from ..printing import write_json
 
-    found = examine(house.case(SAMPLE), house.engine("native"), TOL)
+    found = examine(house.case(SAMPLE), house.engine("native"), TOL, house.engines)
     write_json(found, options.json)
     _print(found, options.json)
     return Status.WITHIN if found.able else Status.FAILED

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...errors import KincheckError
+from ...errors import KincheckError, unknown
 from ..visible import file_name
 from . import foreign
-from .house import House, Status, unknown
+from .house import House, Status
 
 
 def add(commands: Any) -> None:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError
-from .house import House, Status, unknown, whole
+from ...errors import KincheckError, unknown
+from .house import House, Status, whole
 from .run import HISTORY
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError, SolveError
+from ...errors import KincheckError, SolveError, unknown
 from ..reading.supplied import NOTHING, Supplied
 
 if TYPE_CHECKING:
@@ -130,14 +129,8 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
     )
 
 
-def unknown(what: str, name: str, known: Sequence[str]) -> str:
-    """What to say of a name that is none of the known ones."""
-    close = difflib.get_close_matches(name, known, n=1)
-    return f"there is no {what} {name!r}; " + (f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}")
-
-
 def given(options: argparse.Namespace, names: Iterable[str]) -> str:
-    """Those of the options that were given, to be named in a message; they have no default, or false, or no names."""
+    """Return those of the options that were given, to be named in a message; they have no default, or false, or no names."""
     found = (name for name in names if getattr(options, name) not in ([], None) and getattr(options, name) is not False)
     return ", ".join(f"--{name.replace('_', '-')}" for name in found)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
+from ...trajectory import QUANTITIES
 from ..visible import file_name
 from .house import House, Status, add_joint_types, whole
 from .run import TOL
@@ -96,7 +97,7 @@ def _lines(found: Reference, errors: list[NativeError]) -> list[str]:
     lines += [f"  signs: {words}" for words in dict.fromkeys(each.signs for each in found.outputs.values()) if words]
     if errors:
         wide = max(len(error.output) for error in errors)
-        heads = ("native error", "position", "velocity", "acceleration")
+        heads = ("native error", *QUANTITIES)
         lines.append(f"  {heads[0]:{wide}}" + "".join(f"  {head:>20}" for head in heads[1:]))
         for error in errors:
             cells = (_cell(*pair) for pair in zip(error.largest, error.ulps, strict=True))

@@ -8,8 +8,8 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError
-from .house import House, Status, given, unknown, whole
+from ...errors import KincheckError, unknown
+from .house import House, Status, given, whole
 from .run import MODES, TOL, positive
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError
+from ...errors import KincheckError, unknown
 from ..console import complain
 from . import foreign, isolation
-from .house import House, Status, unknown, whole
+from .house import House, Status, whole
 from .run import TOL, positive
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError
+from ...errors import KincheckError, unknown
 from . import foreign
-from .house import House, Status, unknown
+from .house import House, Status
 from .run import positive
 
 if TYPE_CHECKING:

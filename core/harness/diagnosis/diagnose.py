@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 
 from ...analysis.diagnosis.conditioning import Conditioning, conditioning
-from ...analysis.diagnosis.rank import Blocked, Component, Dependency, Ranks, Row, Violation
+from ...analysis.diagnosis.rank import Blocked, ComponentCount, Dependency, NamedRow, Ranks, Violation
 from ...analysis.diagnosis.screws import Screw, described
 from ...analysis.equations.geometry import places
-from ...errors import SolveError
+from ...errors import SolveError, shortened
 from ..case import MARKER, ORDERS, Case
 from ..explain import explain
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
@@ -32,11 +32,11 @@ class Nearly(msgspec.Struct, frozen=True):
     """Rows of which a combination nearly vanishes: its size, which is a singular value of the joint rows."""
 
     size: float
-    rows: list[Row]
+    rows: list[NamedRow]
 
 
 class Sample(msgspec.Struct, frozen=True):
-    """How well a pose of the sweep is determined; see `diagnosis.conditioning.Pose`. condition is null where it is singular."""
+    """How well a pose of the sweep is determined; see `PoseConditioning`. condition is null where it is singular."""
 
     value: float
     smallest: float
@@ -60,7 +60,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     case: str
     findings: list[str]
     freedom: Freedom
-    components: list[Component]
+    components: list[ComponentCount]
     redundant: list[Dependency]
     nearly_redundant: list[Nearly]
     free: list[list[Screw]]
@@ -186,8 +186,4 @@ def _remedy(ranks: Ranks) -> str:
 
 
 def _violations(rows: tuple[Violation, ...] | list[Violation], most: int = 4) -> str:
-    more = f" and {len(rows) - most} more" if len(rows) > most else ""
-    return (
-        ", ".join(f"{each.row} by {abs(each.amount):.2g} {'m' if 'along' in each.row.holds else 'rad'}" for each in rows[:most])
-        + more
-    )
+    return shortened([f"{each.row} by {abs(each.amount):.2g} {'m' if 'along' in each.row.holds else 'rad'}" for each in rows], most)

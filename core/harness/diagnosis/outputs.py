@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from ...algebra import Vec3, vec
-from ...analysis.diagnosis.conditioning import Conditioning, Gradient, Pose
+from ...analysis.diagnosis.conditioning import Conditioning, Gradient, PoseConditioning
 from ...analysis.equations.geometry import kinds
 from ...jet import Jet
 from ...joints import Kind
@@ -121,7 +121,7 @@ def _names(found: Conditioning) -> list[str]:
     return [place if count[place] == 1 else f"{place} {'xyz'[component]}" for place, component, _ in found.numbers]
 
 
-def _derivative(output: Quantity, pose: Pose, design: dict[str, Array], by: str) -> tuple[Array, Array]:
+def _derivative(output: Quantity, pose: PoseConditioning, design: dict[str, Array], by: str) -> tuple[Array, Array]:
     """Value and derivatives of an output by what its points move by."""
     at = {name: _jets(gradient.position, getattr(gradient, by)) for name, gradient in pose.points.items()}
     still = {name: _design(gradient, design[name], by) for name, gradient in pose.points.items()}

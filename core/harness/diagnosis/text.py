@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ...analysis.diagnosis.rank import Row
+from ...analysis.diagnosis.rank import NamedRow
 from ...analysis.diagnosis.screws import described
 from ..printing import columns, listed
 from .diagnose import Diagnosis, Sample
@@ -68,7 +68,7 @@ def _freedom(found: Diagnosis) -> Iterator[Text | Table]:
         yield Text(f"nearly redundant ({each.size:.1e}): {', '.join(map(str, each.rows))}", "yellow")
 
 
-def _sum(terms: Sequence[tuple[float, Row]]) -> str:
+def _sum(terms: Sequence[tuple[float, NamedRow]]) -> str:
     if len(terms) > TERMS:
         return f"a sum of {len(terms)} rows of {listed(list(dict.fromkeys(row.owner for _, row in terms)))}"
     parts = [f"{'-' if w < 0.0 else '+'} {abs(w):.3g} [{row}]" for w, row in terms]

@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...errors import remedy
 from ...joints import Coupler, Joint, Kind
 from ...mechanism import Body, Mechanism, Point, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, Truth
 from ..compare import size
 from .coordinates import AXES, with_all_coordinates
-from .document import as_table, class_of, explained, fault, join, parse, read_text, remedy, shown, typed
+from .document import as_table, class_of, explained, fault, join, parse, read_text, shown, typed
 from .driving import read_drivers, read_sweep
 from .reference import Convert, ReferenceKeys, is_derivative, read_reference
 from .schema import (

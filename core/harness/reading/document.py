@@ -5,7 +5,6 @@ Nothing is evaluated or imported from a file. Every message says: file, key, wha
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import re
@@ -15,23 +14,20 @@ from collections import Counter
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from functools import cache
-from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
-from ...errors import CaseError, MechanismError
+from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar
 from ..visible import visible
 
 # Numbers are squared and multiplied on the way: within these bounds that neither overflows nor underflows.
 LARGEST, SMALLEST = 1e100, 1e-100
 # Tables of a case are three deep, rows of numbers two more; what nests beyond that only hides in a message.
 DEEPEST = 16
-# Names are of parts of a mechanism, texts say where numbers come from; what is longer hides the rest of a message.
-LONGEST_NAME, LONGEST_TEXT = 200, 10_000
-# A message that lists all names of a large file is not read. The search for a similar name is cubic in their lengths at worst.
-MOST_NAMED, MOST_SEARCHED = 30, 10_000
+# Texts say where numbers come from; what is longer hides the rest of a message.
+LONGEST_TEXT = 10_000
 LONGEST_MESSAGE = 3_000
 # Python's bound for decimal integers, which keeps their conversion from taking hours, is 4300 digits.
 _TOO_MANY_DIGITS = "Exceeds the limit"
@@ -74,25 +70,6 @@ def join(key: str, name: str) -> str:
     """The path of a key inside a table."""
     name = name if name.isprintable() and name else repr(name)
     return f"{key}.{name}" if key else name
-
-
-def remedy(name: str, known: Iterable[str]) -> str:
-    """What to write instead of a name that is not known."""
-    names = sorted(known)
-    close = similar(name, names)
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return f"did you mean {close!r}?" if close else f"known: {', '.join(map(brief, names[:MOST_NAMED])) or 'none'}{more}"
-
-
-def similar(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
-    """The known name that is most like another one; empty where none is."""
-    short = islice((each for each in known if len(each) <= LONGEST_NAME), MOST_SEARCHED)
-    return next(iter(difflib.get_close_matches(name, short, 1, cutoff)), "") if len(name) <= LONGEST_NAME else ""
-
-
-def brief(text: str) -> str:
-    """The beginning of a text."""
-    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 6]} [...]"
 
 
 def decimal(text: str) -> float:

@@ -10,11 +10,12 @@ import msgspec
 import numpy as np
 
 from ...drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
+from ...errors import remedy
 from ...mechanism import Mechanism
 from ...motions import Absolute, Measure, Motion
 from ...trajectory import Array
 from ..case import TIME, Sweep
-from .document import class_of, explained, fault, join, remedy, shown, typed
+from .document import class_of, explained, fault, join, shown, typed
 from .reference import Convert
 from .schema import CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
 

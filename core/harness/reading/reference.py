@@ -25,10 +25,11 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
+from ...errors import remedy
 from ...trajectory import Array
 from ..case import PER_TRAVEL, Quantity, Series
 from ..references import read, series
-from .document import LARGEST, decimal, fault, read_text, remedy, shown
+from .document import LARGEST, decimal, fault, read_text, shown
 
 LARGEST_FILE = 64_000_000
 # As many samples as a sweep can have, and as many lines between them.

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 
 from ...mechanism import GROUND
+from ...trajectory import QUANTITIES
 from ..case import Truth
 from ..record import Outcome, OutputSeries, Record, Results, Scene, from_json
 from .document import fault, join, read_text, shown
@@ -112,7 +113,7 @@ def _check_record(file: Path, key: str, record: Record, samples: dict[str, int])
 
 
 def _check_series(file: Path, key: str, series: OutputSeries, count: int) -> None:
-    for quantity in ("position", "velocity", "acceleration"):
+    for quantity in QUANTITIES:
         values: Sequence[float | None] | None = getattr(series, quantity)
         if values is not None:
             _check_numbers(file, f"{key}.{quantity}", values, count)

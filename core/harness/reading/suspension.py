@@ -14,11 +14,12 @@ import msgspec
 from msgspec import Meta
 
 from ...algebra import vec
+from ...errors import remedy
 from ...mechanism import Mechanism, Point, Vector
 from ..case import Case, Quantity
 from ..compare import size
 from ..suspension import Axle, Convention, PerTravel, Rate, Reaction, Side, SuspensionOutput, Vehicle, own_keys
-from .document import fault, join, remedy, shown, typed
+from .document import fault, join, shown, typed
 from .reference import Convert
 from .schema import Flag, Number, Numbers3, Text, ToleranceKeys
 from .tolerance import tolerance

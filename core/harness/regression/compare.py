@@ -6,10 +6,11 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from ...trajectory import QUANTITIES
 from ..history.series import Entry, History, Pair, calibration, own_seconds
 from ..reading.tolerance import DEFAULT_ATOL
 from ..record import Outcome, OutputSeries, Record
-from ..reporting.wording import MOTIONS, UNMADE, motion_unit, number
+from ..reporting.wording import UNMADE, motion_unit, number
 from .findings import Change, Finding, Kind
 from .limits import DRIFT, ENOUGH, SAME_SAMPLE, TIME_FLOOR, UNJUDGED, drifted
 from .subject import Subject
@@ -128,7 +129,7 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
         yield _finding(Kind.MOVED, now, "solved at other values of the drivers than before")
         return
     for output, old in before.outputs.items():
-        for motion in MOTIONS:
+        for motion in QUANTITIES:
             off = _apart(_values(old, motion), _values(now.outputs.get(output), motion))
             judged = getattr(now.errors.get(output), motion, None)
             # as far as two values can be that are within a tolerance of one standard
@@ -170,7 +171,7 @@ def _reached(record: Record, phase: str) -> bool:
 
 def _errors(now: Record, before: Record) -> Iterator[Finding]:
     for output, old in before.errors.items():
-        for motion in MOTIONS:
+        for motion in QUANTITIES:
             a, b = getattr(old, motion), getattr(now.errors.get(output), motion, None)
             if a is None or b is None:
                 continue
@@ -192,7 +193,7 @@ def _references(record: Record, now: References, before: References) -> Iterator
     """True values that are not what they were; those that came or went show in what is compared."""
     for output, old in before.get(record.case, {}).items():
         new = now.get(record.case, {}).get(output)
-        for motion in MOTIONS:
+        for motion in QUANTITIES:
             was, off = _values(old, motion), _apart(_values(old, motion), _values(new, motion))
             if off > SAME_SAMPLE * max((abs(x) for x in was if x is not None), default=0.0):
                 told = f"{output} {motion} differs by up to {number(off)} {motion_unit(old.unit, motion)} from what it was"

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...trajectory import QUANTITIES
 from ..history.series import History
-from ..reporting.wording import MOTIONS, motion_unit, number
+from ..reporting.wording import motion_unit, number
 from .findings import Finding, Kind
 from .limits import DRIFT, drifted
 from .steps import above_floor, change_points, errors_of
@@ -25,7 +26,7 @@ def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterato
     for record in subject.results.records:
         pair = record.case, record.engine, record.mode
         entries = [entry for entry in around.pairs.get(pair, ()) if entry.run != subject.number]
-        for output, motion in ((output, motion) for output in record.errors for motion in MOTIONS):
+        for output, motion in ((output, motion) for output in record.errors for motion in QUANTITIES):
             now = getattr(record.errors[output], motion)
             if now is None or not now.within or (*pair, output, motion) in known:
                 continue

@@ -10,7 +10,7 @@ from .findings import Finding, Kind, Regressions
 
 
 def to_regression_junit(results: Results, found: Regressions) -> bytes:
-    """As `to_junit`, with a failure for every regression of what had passed.
+    """Write what `to_junit` writes, with a failure for every regression of what had passed.
 
     What is about a pair and not about one of its outputs (a phase lost, a time) is a test case of its own, named by its kind.
     """

@@ -10,12 +10,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from ...trajectory import QUANTITIES
 from ..case import Array
 from ..history.series import Entry, History, Pair, calibration
 from ..history.store import RunRow
 from ..history.trends import unit_of
 from ..record import Deviation
-from ..reporting.wording import MOTIONS
 from .compare import changes
 from .findings import Change, Step
 from .limits import DRIFT, DRIFT_FLOOR, TIME_FLOOR
@@ -55,7 +55,7 @@ def steps(history: History, *, standing: bool = False) -> list[Step]:
     found: list[Step] = []
     for pair, entries in history.pairs.items():
         by_quantity: list[list[Step]] = [_outcomes(pair, entries, history), _times(pair, entries, history)]
-        by_quantity += [_errors(pair, entries, history, motion) for motion in MOTIONS]
+        by_quantity += [_errors(pair, entries, history, motion) for motion in QUANTITIES]
         for each in by_quantity:
             found += [step for step in each[-1:] if step.worse] if standing else each
     return sorted(found, key=lambda step: -step.first)

@@ -39,7 +39,7 @@ class Subject:
 
     @property
     def label(self) -> RunName:
-        """As a report has it."""
+        """The run's name as a report has it."""
         git: dict[str, Any] = self.facts.get("git") or {}
         known = {key: str(self.facts.get(key, "unknown")) for key in ("started", "host")}
         return RunName(name=self.name, number=self.number, commit=git.get("commit"), **known)

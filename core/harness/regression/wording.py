@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from ...errors import shortened
 from ..reporting.wording import motion_unit, number, product
 from .findings import Finding, Kind, Loose, Regressions, Step
 
@@ -33,8 +34,7 @@ class Row:
     @property
     def where(self) -> str:
         """The cases, the first of many."""
-        named = ", ".join(self.cases[:NAMED])
-        return named + (f" and {len(self.cases) - NAMED} more" if len(self.cases) > NAMED else "")
+        return shortened(self.cases, NAMED)
 
     @property
     def what(self) -> str:

@@ -13,7 +13,7 @@ COMPARED = (Outcome.PASS, Outcome.FAIL)
 
 
 def caveats(results: Results) -> list[tuple[str, str]]:
-    """Each limit of the run as a title and a sentence."""
+    """Return each limit of the run as a title and a sentence."""
     records = results.records
     said: list[tuple[str, str]] = []
 

@@ -42,7 +42,7 @@ class Destinations:
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Destinations:
-        """Those that a command's options name."""
+        """Return the destinations that a command's options name."""
         return cls(**{each.name: getattr(options, each.name, None) for each in fields(cls)})
 
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:

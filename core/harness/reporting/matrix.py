@@ -7,12 +7,13 @@ from typing import TextIO
 from rich.table import Table
 from rich.text import Text
 
+from ...trajectory import QUANTITIES
 from .. import printing
 from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
-from .table import COLOURS, QUANTITIES, messages, print_messages, print_signs, worst
-from .wording import notes, signs
+from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
+from .wording import motion_unit, notes, signs
 
 NOT_ASKED = "–"
 
@@ -81,7 +82,7 @@ def _reading(results: Results) -> str:
     )
     if not standards:
         return "No errors: nothing was compared with anything"
-    units = " · ".join(f"{quantity} [{unit}]" for quantity, unit in QUANTITIES.items())
+    units = " · ".join(f"{quantity} [{motion_unit(LENGTH, quantity)}]" for quantity in QUANTITIES)
     return f"Largest errors against {', '.join(standards).replace('_', ' ')}: {units}"
 
 

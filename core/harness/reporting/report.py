@@ -15,12 +15,13 @@ from typing import Any, cast
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from ...trajectory import QUANTITIES
 from ..record import Outcome, Record, Results
 from .caveats import COMPARED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
-from .wording import MOTIONS, TRUTHS, against, engine_name, known, number, output_label, product
+from .wording import TRUTHS, against, engine_name, known, number, output_label, product
 
 NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
@@ -87,7 +88,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
             caveats=caveats(given.results),
             never=never,
             truths=TRUTHS,
-            motions=MOTIONS,
+            motions=QUANTITIES,
             compared=COMPARED,
             validation=validation,
             severity=severity,
@@ -176,7 +177,7 @@ def validation(record: Record) -> str:
     if not record.validated:
         return ""
     standards = {deviation.against for errors in record.errors.values() for _, deviation in errors.items()}
-    whole = standards == {record.truth} and all(len(errors.items()) == len(MOTIONS) for errors in record.errors.values())
+    whole = standards == {record.truth} and all(len(errors.items()) == len(QUANTITIES) for errors in record.errors.values())
     return "validated" if whole else "validated, positions only"
 
 

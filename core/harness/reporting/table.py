@@ -10,14 +10,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ...trajectory import QUANTITIES
 from .. import printing
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
-from .wording import notes, signs
+from .wording import motion_unit, notes, signs
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
-QUANTITIES = {"position": LENGTH, "velocity": "m/s", "acceleration": "m/s²"}
 
 
 def print_table(results: Results, file: TextIO) -> None:
@@ -28,8 +28,8 @@ def print_table(results: Results, file: TextIO) -> None:
     table.add_column("case", overflow="fold")
     for name in ("engine", "outcome"):
         table.add_column(name, no_wrap=True)
-    for unit in QUANTITIES.values():
-        table.add_column(f"error\n{unit}", justify="right", no_wrap=True)
+    for quantity in QUANTITIES:
+        table.add_column(f"error\n{motion_unit(LENGTH, quantity)}", justify="right", no_wrap=True)
     table.add_column("truth", overflow="fold")
     table.add_column("us/step", justify="right", no_wrap=True)
     several = len({record.mode for record in results.records}) > 1

@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...trajectory import QUANTITIES
 from ..case import Truth
 from ..record import Deviation, OutputSeries, Record, Results
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
 from .figures import Figure, Style, Values, band_is_thin, error_figure, output_figure
 from .measures import Effort, Past, precision_figure, trend_figures
-from .wording import MOTIONS, against, engine_name, motion_unit, number, output_label
+from .wording import against, engine_name, motion_unit, number, output_label
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ def _output(
     curves = [(styles[engine_name(r)], r.outputs[output]) for r in records if output in r.outputs]
     label, truth = output_label(output), references.get(output)
     errors: list[Plot] = []
-    for motion in MOTIONS:
+    for motion in QUANTITIES:
         here = [each for each in deviations if each.motion == motion]
         values: Values | None = getattr(_standard(here, records, references), motion, None)
         if values is None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+from ...trajectory import PER_TIME, QUANTITIES
 from ..case import Truth
 from ..record import Deviation, Record
 
-MOTIONS = ("position", "velocity", "acceleration")
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
     Truth.THIRD_PARTY_DATA: "third-party data",
@@ -53,7 +53,7 @@ def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def motion_unit(unit: str, motion: str) -> str:
     """The unit of a motion's derivative, e.g. m/s for a velocity in m."""
-    return unit + {"position": "", "velocity": "/s", "acceleration": "/s²"}[motion]
+    return unit + PER_TIME[QUANTITIES.index(motion)].replace("^2", "²")
 
 
 def number(value: float | None) -> str:

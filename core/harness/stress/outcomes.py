@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...trajectory import Array
+from ...trajectory import QUANTITIES, Array
 from ..attempt import Answer, Failure
 from ..case import Case
 from ..record import Outcome
@@ -19,7 +19,7 @@ from .truth import Reach, Truth
 
 
 class Verdict(StrEnum):
-    """Of one sample. Every sample gets exactly one."""
+    """What is said of one sample. Every sample gets exactly one."""
 
     RIGHT = "right"
     REFUSED_RIGHTLY = "refused, right reason"
@@ -94,7 +94,7 @@ def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer |
     errors = np.zeros(n)
     compared = [True, False, False]
     for name, moved in truth.points.items():
-        for k, quantity in enumerate(("position", "velocity", "acceleration")):
+        for k, quantity in enumerate(QUANTITIES):
             found = _moved(result, name, quantity)
             if not np.isfinite(found[known]).any():
                 continue

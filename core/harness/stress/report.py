@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ...trajectory import QUANTITIES
 from ..bench.pages import Report, Section
 from ..markdown import escaped, row
 from .outcomes import ELSEWHERE, Verdict
 from .results import Cell, Finding, Stress
 
 NAME = "stress"
-QUANTITIES = ("position", "velocity", "acceleration")
 SHORT = {
     Verdict.RIGHT: "right",
     Verdict.REFUSED_RIGHTLY: "refused rightly",

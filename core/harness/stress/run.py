@@ -135,7 +135,7 @@ def _family(
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Made]:
-    """As many specimens as make up a share of samples."""
+    """Return as many specimens as make up a share of samples."""
     most = max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share
     found: list[Made] = []
     while (done := sum(one.samples for one in found)) < share:
@@ -144,7 +144,7 @@ def specimens(family: Family, seed: int, share: int) -> list[Made]:
 
 
 def specimen(family: Family, seed: int, number: int, most: int) -> Made:
-    """That specimen of a family; its mechanism is the same whatever else is run, and so are its samples unless that is too many."""
+    """Return that specimen of a family, the same mechanism whatever else is run, and samples too unless those are too many."""
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
     # a coarse sweep leaves most to the solver, a fine one has more to judge
     fineness = float(rng.random()) ** 0.5

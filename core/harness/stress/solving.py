@@ -41,7 +41,7 @@ class Interpreted:
         self._native = native
 
     def version(self) -> str | None:
-        """That of the native engine."""
+        """Return the version of the native engine."""
         return self._native.version()
 
     def unsupported(self, case: Case) -> str | None:
@@ -49,7 +49,7 @@ class Interpreted:
         return self._native.unsupported(case)
 
     def build(self, case: Case) -> Route:
-        """As the native engine, without a compiler."""
+        """Make the model that the native engine makes, without a compiler."""
         path = case.sweep.path
         return Route(compile_model(case.mechanism, Request(tuple(path.motions), case.points, compiled=False)), path)
 

@@ -65,7 +65,7 @@ class Solved:
 
     @property
     def condition(self) -> Array:
-        """That of the inverse, shape (n,)."""
+        """The condition of the inverse, shape (n,)."""
         return condition(self.inverse)
 
     def at(self, k: int) -> Solved:

@@ -11,13 +11,13 @@ import msgspec
 import numpy as np
 
 from ...errors import KincheckError
-from ...trajectory import Array
+from ...trajectory import QUANTITIES, Array
 from ..attempt import Answer, Attempt, Pair, Solver
 from ..case import Series
 from ..compare import describe, deviation, pace
 from ..engine import Engine
 from ..record import Outcome
-from .study import MOTIONS, Study
+from .study import Study
 
 
 class Checked(msgspec.Struct, frozen=True, kw_only=True):
@@ -112,7 +112,7 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked
     worst = Checked(variant=variant, outcome=Outcome.FAIL, message="there is nothing to compare: no row has values from both")
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
-        theirs: Array | None = getattr(series, MOTIONS[row.derivative])
+        theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
         if theirs is None:
             continue
         # where the sweep has no value either, nothing is lost: such a variant is counted among those without a solution
@@ -123,7 +123,7 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked
             continue
         ratio = off.max_abs / off.tolerance if off.tolerance else (np.inf if off.max_abs else 0.0)
         if worst.ratio is None or ratio > worst.ratio:
-            told = row.output.name, MOTIONS[row.derivative], off, case.sweep.driver, case.sweep.values.tolist(), row.output.unit
+            told = row.output.name, QUANTITIES[row.derivative], off, case.sweep.driver, case.sweep.values.tolist(), row.output.unit
             worst = Checked(
                 variant=variant,
                 outcome=Outcome.PASS if off.within else Outcome.FAIL,

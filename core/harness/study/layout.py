@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable
-from enum import Enum
 
 from ...analysis.equations.geometry import kinds, places
+from ...errors import remedy
+from ...joints import Kind
 from ...mechanism import Mechanism
 from ..case import MARKER
 
 # Positions closer than this are one hardpoint [m]: tables are measured to about a micrometre at best.
 SAME = 1e-6
-
-
-class Kind(Enum):
-    """What varies at a place."""
-
-    POSITION = "a position"
-    DIRECTION = "a direction"
-    LENGTH = "a length"
 
 
 class PlaceError(ValueError):
@@ -37,7 +29,7 @@ class Geometry:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.values = places(mechanism)
-        self.kinds = {place: Kind[kind.name] for place, kind in kinds(mechanism).items()}
+        self.kinds = kinds(mechanism)
 
     @property
     def named(self) -> list[str]:
@@ -59,9 +51,7 @@ class Geometry:
             and (place.startswith(f"{name}.") or place.partition(".")[2].startswith(f"{name}."))
         ]
         if not found:
-            close = difflib.get_close_matches(name, self.named, n=1)
-            names = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(self.named)}"
-            raise PlaceError(f"expected a position, direction or length of the case; {names}")
+            raise PlaceError(f"expected a position, direction or length of the case; {remedy(name, self.named)}")
         if any(place not in self.together(found[0]) for place in found):
             raise PlaceError(f"which may be {' or '.join(found)}, expected one place; write it in full")
         return found[0]

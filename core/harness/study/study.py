@@ -17,12 +17,10 @@ from ...analysis.route import Route
 from ...analysis.variants import solve_variants
 from ...jet import Jet
 from ...motions import Path
-from ...trajectory import Array
+from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..case import Case, Quantity
 from .reduce import Summary, merged, summary
 from .variation import CHUNK, Mode, Stream, Variation, generator
-
-MOTIONS = ("position", "velocity", "acceleration")
 
 # Bytes of motions at once, of one thread: many samples of many points are solved in parts of a chunk.
 ROOM = 64_000_000
@@ -31,7 +29,7 @@ MOST_MESSAGES = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class ReducedQuantity:
     """One quantity that is reduced: an output, or its first or second derivative by time."""
 
     output: Quantity
@@ -39,13 +37,13 @@ class Row:
 
     @property
     def name(self) -> str:
-        """That of the output, and of its derivative as in reference tables."""
-        return self.output.name + (f".{MOTIONS[self.derivative]}" if self.derivative else "")
+        """The name of the output, with that of its derivative as in reference tables."""
+        return self.output.name + (f".{QUANTITIES[self.derivative]}" if self.derivative else "")
 
     @property
     def unit(self) -> str:
-        """SI."""
-        return self.output.unit + ("", "/s", "/s^2")[self.derivative]
+        """The unit, SI."""
+        return self.output.unit + PER_TIME[self.derivative]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +76,10 @@ class Study:
         return -(-self.samples // CHUNK)
 
     @cached_property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[ReducedQuantity, ...]:
         """What is reduced: outputs, each with its derivatives as far as wanted and known."""
         return tuple(
-            Row(output, derivative)
+            ReducedQuantity(output, derivative)
             for output in self.case.outputs
             for derivative in range(min(self.order + 1, output.orders))
         )  # fmt: skip
@@ -170,7 +168,7 @@ class Ready:
         numbers = self._numbers
         unknown = np.full((1, 1), np.nan)
         for name in self.study.case.points:
-            known = [kept[self.model.rows[f"{label} {name}"]] for label in MOTIONS[: self.model.orders]]
+            known = [kept[self.model.rows[f"{label} {name}"]] for label in QUANTITIES[: self.model.orders]]
             x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
             at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
             place = f"points.{name}.position"
@@ -249,6 +247,6 @@ def request(study: Study) -> Request:
 
 
 def largest(changes: Array) -> Array:
-    """Of changes, shape (rows, n, V), the one of the largest size over the samples, signed, shape (rows, V); NaN without any."""
+    """Return of changes, shape (rows, n, V), the largest in size over the samples, signed, shape (rows, V); NaN without any."""
     sizes = np.nan_to_num(np.abs(changes), nan=-1.0)
     return np.take_along_axis(changes, sizes.argmax(axis=1)[:, None, :], axis=1)[:, 0]

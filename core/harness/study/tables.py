@@ -127,7 +127,7 @@ class ParquetStore:
             parquet: Any = importlib.import_module("pyarrow.parquet")
         except ImportError as error:
             raise KincheckError("--store needs pyarrow, which is not installed; pip install 'kincheck[parquet]'") from error
-        arrow, self._study, self._first = self._arrow, study, 0
+        arrow, self._first = self._arrow, 0
         n = len(study.case.sweep.values)
         fields = [arrow.field("variant", arrow.int64())]
         offsets = _offset_columns(study)

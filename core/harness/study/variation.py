@@ -66,7 +66,7 @@ class Coordinate:
 
     @property
     def name(self) -> str:
-        """To call it by in results."""
+        """What results call it by."""
         return f"{self.hardpoint}.{self.axis}" if self.axis else self.hardpoint
 
 

@@ -36,10 +36,11 @@ import numpy as np
 from msgspec import Meta
 
 from ...drivers import PointCoordinate
+from ...joints import Kind
 from ...trajectory import Array
 from ..case import Case
 from ..reading.document import fault, join, parse, read_text, shown, typed
-from .layout import Geometry, Kind, PlaceError
+from .layout import Geometry, PlaceError
 from .variation import Coordinate, Law, Mode, Variation
 
 SCHEMA = "kincheck-vary/1"

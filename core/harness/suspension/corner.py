@@ -94,7 +94,7 @@ class Corner:
 
     @property
     def kingpin_offset(self) -> Vec3:
-        """From the contact centre to where the steering axis meets the road [m]; z is zero."""
+        """The vector from the contact centre to where the steering axis meets the road [m]; z is zero."""
         lower, axis = self.kingpin
         contact = self.contact
         return lower + ((contact.z - lower.z) / axis.z) * axis - contact

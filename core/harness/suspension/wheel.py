@@ -19,7 +19,7 @@ class Place(StrEnum):
     CONTACT = "contact"
 
 
-class Component(StrEnum):
+class AxisName(StrEnum):
     """An axis of the convention."""
 
     X = "x"
@@ -144,18 +144,18 @@ class WheelDisplacement(Change):
     positive = "x forward, y left, z up (ISO 8855); x forward, y right, z down (SAE J670)"
     reads = ("wheel_center",)
 
-    component: Component = Component.Z
+    component: AxisName = AxisName.Z
 
     @property
     def sense(self) -> str:
         """Where the axis points."""
         iso = self.vehicle.convention is Convention.ISO_8855
-        ways = {Component.X: "forward", Component.Y: "left" if iso else "right", Component.Z: "up" if iso else "down"}
+        ways = {AxisName.X: "forward", AxisName.Y: "left" if iso else "right", AxisName.Z: "up" if iso else "down"}
         return f"positive: {ways[self.component]}"
 
     def value(self, corner: Corner) -> Jet:
         """Coordinate [m]."""
         x, y, z = corner.center
         up = self.vehicle.convention.up
-        shifts: dict[Component, Jet] = {Component.X: x, Component.Y: up * self.vehicle.side.left * y, Component.Z: up * z}
+        shifts: dict[AxisName, Jet] = {AxisName.X: x, AxisName.Y: up * self.vehicle.side.left * y, AxisName.Z: up * z}
         return shifts[self.component]

@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ..document import fault, remedy, shown
+from ....errors import remedy
+from ..document import fault, shown
 from .table import Hardpoint, HardpointTable, number
 
 BLOCK = "[HARDPOINT]"

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from ....drivers import PointCoordinate
+from ....errors import MOST_NAMED, brief, remedy, shortened, similar
 from ....mechanism import GROUND, Body, Mechanism, Point, Vector
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ..coordinates import AXES, with_all_coordinates
-from ..document import MOST_NAMED, brief, decimal, explained, fault, remedy, shown, similar
+from ..document import decimal, explained, fault, shown
 from ..schema import MOST_SAMPLES
 from ..supplied import LEFT_OUT, Supplied
 from .table import HardpointTable, placed, require_size
@@ -112,8 +113,7 @@ def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
 
 def _listed(names: Sequence[str]) -> str:
     """Names to read: all of those that a file of a suspension has."""
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(map(brief, names[:MOST_NAMED])) + more or "nothing"
+    return shortened([*map(brief, names)], MOST_NAMED) or "nothing"
 
 
 def _require_left_and_upright(

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ....errors import remedy
 from ....mechanism import Vector
-from ..document import decimal, fault, remedy, shown, usable
+from ..document import decimal, fault, shown, usable
 
 UNITS: Mapping[str, Callable[[float], float]] = {
     "m": float,

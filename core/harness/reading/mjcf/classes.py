@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from ..document import remedy, shown
+from ....errors import remedy
+from ..document import shown
 from .attributes import KNOWN, ORIENTATION
 from .elements import Element
 

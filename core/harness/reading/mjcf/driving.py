@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ....errors import CaseError
+from ....errors import CaseError, remedy
 from ....trajectory import Array
-from ..document import decimal, fault, remedy, shown
+from ..document import decimal, fault, shown
 from ..schema import MOST_SAMPLES
 from ..supplied import Supplied
 from .elements import Element

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from ....errors import CaseError
-from ..document import decimal, fault, remedy, shown, usable
+from ....errors import CaseError, remedy
+from ..document import decimal, fault, shown, usable
 
 # Robots are some ten bodies deep; what nests beyond this only exhausts the stack.
 DEEPEST = 200

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from ....algebra import Vec3, quat, vec
-from ..document import remedy, shown
+from ....errors import remedy
+from ..document import shown
 from .attributes import KNOWN, WRITE_OUT
 from .classes import MAIN
 from .elements import Element

@@ -7,11 +7,12 @@ from pathlib import Path
 from ....algebra import Quat
 from ....analysis.structure.driven import degrees_of_freedom
 from ....drivers import JointAngle, JointDisplacement, JointDriver
+from ....errors import remedy
 from ....joints import Fixed, Revolute
 from ....mechanism import Body, Mechanism, Point
 from ...case import Case, Sweep, Truth
 from ..coordinates import with_all_coordinates
-from ..document import explained, fault, remedy
+from ..document import explained, fault
 from ..supplied import LEFT_OUT, Supplied
 from .attributes import MAKE_BODIES, ROOT, WRITE_OUT
 from .classes import read_classes

@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ....algebra import Vec3, vec
+from ....errors import remedy
 from ....mechanism import GROUND
-from ..document import remedy, shown
+from ..document import shown
 from .attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, WRITE_OUT
 from .classes import MAIN, Classes
 from .elements import Element

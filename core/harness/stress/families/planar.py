@@ -39,7 +39,7 @@ class Plane:
 
     @property
     def normal(self) -> tuple[float, float, float]:
-        """Of the plane; turns go by the right hand about it."""
+        """The normal of the plane, global; turns go by the right hand about it."""
         return triple(np.cross(self.e1, self.e2))
 
     def along(self, at: Plan) -> tuple[float, float, float]:

@@ -62,7 +62,7 @@ def normal(name: str) -> str:
 
 
 def between(a: Vector, b: Vector) -> Vector:
-    """From a to b."""
+    """Return the vector from a to b."""
     return b[0] - a[0], b[1] - a[1], b[2] - a[2]
 
 
