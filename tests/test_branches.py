@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from kincheck.core import Body, ConstantVelocity, JointAngle, Mechanism, Point, Revolute
+from kincheck.core import Body, ConstantVelocity, Gear, JointAngle, JointDisplacement, Mechanism, Point, Revolute, Translational
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
 from kincheck.core.analysis.solve import solve
-from kincheck.core.motions import Ramp
+from kincheck.core.motions import Ramp, Table
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
 from kincheck.core.primitives.conventional import LockTest
 from kincheck.core.primitives.paper import PaperDot12
@@ -92,7 +92,11 @@ def test_a_shaft_is_bent_up_to_where_it_is_folded():
 
 def test_of_the_native_primitives_these_need_a_branch_test(rng):
     i, j = body(rng), body(rng)
-    assert [kind for kind in MAKERS if make(kind, rng).primitive.branch(i.pose, j.pose)] == [p.ConstantVelocity, p.Dot11]
+    assert [kind for kind in MAKERS if make(kind, rng).primitive.branch(i.pose, j.pose)] == [
+        p.ConstantVelocity,
+        p.Dot11,
+        p.DrivenAngle,
+    ]
 
 
 def newton_from(q, primitive, rows, iterations):
@@ -163,3 +167,55 @@ def test_driven_angle_over_three_turns():
     assert np.abs(phi(theta)).max() < 1e-14
     for error in (-3.0, -1e-3, 1e-3, 1.0, np.pi):
         assert np.abs(phi(theta + error) + 2.0 * np.sin(0.5 * error)).max() < 1e-14
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_branch_of_driven_angle(coupled):
+    """A turn too few or too many is a zero as well, from which the rows lead away; of a coordinate it is asked at its own value."""
+    theta = np.linspace(-6.0, 6.0, LANES)
+    j = Pose.of(ZERO, rotation(Z, theta))
+    for turns, sign in ((0, 1.0), (1, -1.0), (-1, -1.0)):
+        c = theta + 2.0 * np.pi * turns
+        driven = p.DrivenAngle(Z, Drive(c, 0.0, 0.0, np.cos(0.5 * c), np.sin(0.5 * c)))
+        assert np.abs(driven.phi(GROUND_POSE, j)).max() < 1e-14
+        assert driven.branch(GROUND_POSE, j)[0] == pytest.approx(sign)
+    joints = [
+        Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("second", "ground", "other", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    ]
+    bodies, couplers = [Body("wheel"), Body("other")], [Gear("gear", ("second", "first"), 0.5)]
+    used = slice(None) if coupled else slice(1)
+    point = Point("rim", "wheel", (1.0, 0.0, 0.0))
+    mechanism = Mechanism("wheels", bodies[used], joints[used], [point], [JointAngle("turn", "first")], couplers if coupled else ())
+    turn = np.linspace(-20.0, 20.0, 9)
+    found = solve(mechanism, "turn", turn)
+    assert found.points["rim"].position[:, 0] == pytest.approx(np.cos(turn), abs=1e-14)
+
+
+@pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
+@pytest.mark.parametrize("turns", [1, 3, -1])
+def test_a_turn_between_two_samples_is_not_lost(turns, style):
+    """A wheel stands, makes whole turns and stands again: where it stands it says nothing of them, but the wheel it drives does."""
+    rest, move = np.arange(101) * 0.01, np.linspace(0.0, 1.0, 7)[1:-1]
+    times = np.concatenate([rest - 1.0, 0.04 * move, 0.04 + rest])
+    values = 2.0 * np.pi * turns * np.concatenate([0.0 * rest, move, 1.0 + 0.0 * rest])
+    joints = [
+        Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("second", "ground", "driven", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Translational("guide", "ground", "slide", (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+    ]
+    mechanism = Mechanism(
+        "indexing",
+        [Body("wheel"), Body("driven"), Body("slide")],
+        joints,
+        [Point("rim", "driven", (1.2, 0.0, 0.0))],
+        [JointDisplacement("clock", "guide"), JointAngle("turn", "first")],
+        [Gear("gear", ("second", "first"), 0.25)],
+    )
+    clock = np.array([0.0, 1.0])
+    indexed = Table(tuple(times + 0.5), tuple(values))
+    found = solve(mechanism, "clock", 0.01 * clock, rate=0.01, motions={"turn": indexed}, style=style)
+    assert found.solved.all(), found.message
+    angle = 0.25 * indexed.at(clock)[0]
+    expected = np.stack([1.0 + 0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0 * angle], axis=1)
+    assert np.abs(found.points["rim"].position - expected).max() < 1e-12

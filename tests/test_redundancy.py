@@ -13,6 +13,7 @@ from kincheck.core.analysis.request import Request
 from kincheck.core.analysis.structure.freedom import select_rows
 from kincheck.core.analysis.structure.redundancy import independent_rows
 from kincheck.core.harness.stress.families import planar
+from kincheck.core.harness.stress.families.pairs import beside
 from kincheck.core.harness.stress.families.planar import any_plane, crank_rocker
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
@@ -52,7 +53,8 @@ def test_a_senseless_number_of_rows_is_looked_at_in_portions():
 def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
     """Each loop keeps a system of its own: of hinges alone three of its rows are left out, and they are none of the crank's."""
     rng = np.random.default_rng(seed)
-    mechanism = planar.twins(any_plane(rng), *crank_rocker(rng), ("revolutes", "revolutes"))
+    plane, bars = any_plane(rng), crank_rocker(rng)
+    mechanism = beside(planar.four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     selection = select_rows(mechanism, frame, formulation)

@@ -154,6 +154,17 @@ def test_a_contradiction_must_be_told(case, truth):
 # Families
 
 
+def test_a_small_loop_hides_no_corner_of_the_large_one():
+    """A corner that is turned round between two samples; stepped over where one sigma is asked for all blocks of the rows."""
+    rng = np.random.default_rng(164)
+    samples = int(rng.choice([2, 3, 4, 5, 7]))
+    made = FAMILIES["corners"].specimen(rng, samples)
+    assert dict(made.facts)["ratio"] == pytest.approx(0.014, rel=0.05)
+    case = made.describe()
+    found = judged(made, case, made.truth(case), once(Pair(case, Interpreted(NATIVE), made.tol)))
+    assert found.counts[Verdict.RIGHT] == samples
+
+
 @pytest.mark.parametrize("name", FAMILIES)
 def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
     """The same numbers for the same seed; and a case file says all of them."""

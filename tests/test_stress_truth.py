@@ -12,8 +12,10 @@ from kincheck.core.harness.stress.conditions import NotStatedError, conditions
 from kincheck.core.harness.stress.evaluation import Evaluator, Poses
 from kincheck.core.harness.stress.extended import extended
 from kincheck.core.harness.stress.families.base import as_case
+from kincheck.core.harness.stress.families.pairs import beside, beside_motion
 from kincheck.core.harness.stress.families.planar import (
     any_plane,
+    crank_rocker,
     flats,
     four_bar,
     four_bar_motion,
@@ -115,6 +117,20 @@ def parallelogram(off, samples=9):
     plane = any_plane(np.random.default_rng(1))
     points = b, (1.0, 0.0), (float(c[0]), float(c[1]))
     return as_case(four_bar(plane, *points, "rod"), "turn", np.linspace(-3.0, 3.0, samples)), four_bar_motion(plane, *points)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("ratio", [1.0, 1e-3])
+def test_two_loops_on_one_crank_move_as_followed(ratio, seed):
+    """The second with points of its own, of any size beside the first; its closed form is that of both."""
+    rng = np.random.default_rng(seed)
+    plane, first, second = any_plane(rng), crank_rocker(rng), crank_rocker(rng, ratio)
+    mechanism = beside(four_bar(plane, *first), plane, *second, "rod", "second ")
+    case = as_case(mechanism, "turn", np.linspace(-3.0, 3.0, 7))
+    truth = closed(case, beside_motion(four_bar_motion(plane, *first), four_bar_motion(plane, *second), "second "))
+    assert (truth.reach == Reach.REACHED).all()
+    assert {"C", "second C"} < {*truth.points}
+    assert worst(truth, {name: x for name, (x, _, _) in followed(case).points.items()}) < 1.0
 
 
 @pytest.mark.parametrize("off", [1e-9, 1e-6, 1e-3])

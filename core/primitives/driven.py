@@ -11,7 +11,9 @@ Joint angle about h, on a joint whose axes are parallel, with the Euler paramete
     rows  = [ 0 | -h | 0 | h ]       nu = c_t       gamma = c_tt            exact where the axes are parallel and phi = 0
 
 sin(theta - c) has a second zero at c + pi, atan2 needs unwrapping and cos(theta) - cos(c) is singular at 0 and pi; the half angle
-has none of these, because Euler parameters that are followed continuously know the turn (any number of turns, no counter).
+has none of these, because Euler parameters that are followed continuously know the turn (any number of turns, no counter). It has
+one at c + 2 pi, from which the rows lead away; where a driver at rest makes a whole turn between two samples Newton starts exactly
+there, and the turn would be lost. The branch test is  cos((theta - c)/2) = cos(c/2) rho_0 + sin(c/2) h . vec(rho).
 """
 
 from __future__ import annotations
@@ -59,6 +61,10 @@ class DrivenAngle(Primitive):
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         h = i.turn(self.h)
         return (Row(ZERO, -h, ZERO, h),)
+
+    def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        rho = i.q.conjugate() * j.q
+        return (self.drive.half_cos * rho.e0 + self.drive.half_sin * (self.h @ rho.e),)
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (self.drive.c_tt,)

@@ -130,7 +130,7 @@ class Cartesian:
 
     def branch(self, at: Configuration) -> list[Scalar]:
         bodily = (c for c in self.constraints if isinstance(c, Constraint))
-        return [value for c in bodily for value in c.primitive.branch(*_pair(c, at))]
+        return [value for c in bodily for value in self._bound(c, at).branch(*_pair(c, at))]
 
     def rows(self, at: Configuration) -> Rows:
         found: Rows = []

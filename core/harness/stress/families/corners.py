@@ -10,10 +10,12 @@ import numpy as np
 from ..extended import extended
 from ..truth import closed
 from .base import Family, Rng, Specimen, as_case, power
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, meet
+from .pairs import beside, beside_motion
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, crank_rocker, flats, four_bar, four_bar_motion, meet
 
 # The design is not to be near a corner itself: of what is folded more, coordinates hold too few digits of the shape.
 FOLDED = 0.05
+SMALL = "small "
 
 # Crank, ground, coupler and rocker, of three sizes and by how much they are off.
 SHAPES: Mapping[str, Callable[[float, float, float, float], tuple[float, float, float, float]]] = {
@@ -31,7 +33,8 @@ class Corners(Family):
     name = "corners"
     about = (
         "four-bars of any sizes, off by 1e-7 to 0.1 from kites, parallelograms and others that can lie flat, from anywhere in "
-        "coarse steps: rods on hinges (three redundant rows), on two universals (one), and on what leaves none"
+        "coarse steps: rods on hinges (three redundant rows), on two universals (one), and on what leaves none; half of them with "
+        "a regular loop of 1e-3 to 0.3 of their size on the same crank"
     )
 
     samples = 31
@@ -43,11 +46,19 @@ class Corners(Family):
         kind = tuple(SHAPES)[int(rng.integers(len(SHAPES)))]
         b, d, c = _loop(rng, kind, off)
         last = float(rng.uniform(2.0, 6.2) * rng.choice([-1.0, 1.0]))
+        mechanism, motion = four_bar(plane, b, d, c, way), four_bar_motion(plane, b, d, c)
+        name, facts = f"{kind} with {way}, off by {off:.2g}", [("off", off)]
+        if rng.random() < 0.5:  # its singular values are small everywhere, and hide those of the large loop
+            ratio, hung = power(rng, -3.0, -0.5), str(rng.choice(JOINTS_OF_A_LOOP))
+            small = crank_rocker(rng, ratio)
+            mechanism = beside(mechanism, plane, *small, hung, SMALL)
+            motion = beside_motion(motion, four_bar_motion(plane, *small), SMALL)
+            name, facts = f"{name}, beside a loop of {ratio:.2g} with {hung}", [*facts, ("ratio", ratio)]
         return Specimen(
-            f"{kind} with {way}, off by {off:.2g}",
-            partial(as_case, four_bar(plane, b, d, c, way), "turn", np.linspace(0.0, last, samples)),
-            partial(closed, motion=four_bar_motion(plane, b, d, c), nearest=flats(b, d)),
-            facts=(("off", off),),
+            name,
+            partial(as_case, mechanism, "turn", np.linspace(0.0, last, samples)),
+            partial(closed, motion=motion, nearest=flats(b, d)),
+            facts=tuple(facts),
         )
 
 

@@ -130,19 +130,6 @@ def four_bar(plane: Plane, b: Plan, d: Plan, c: Plan, way: str = "revolutes", tu
     )
 
 
-TWIN = "twin "
-
-
-def twins(plane: Plane, b: Plan, d: Plan, c: Plan, ways: tuple[str, str]) -> Mechanism:
-    """A four-bar that has its coupler and its rocker twice: two loops on one crank."""
-    single = four_bar(plane, b, d, c, ways[0])
-    rocker = f"{TWIN}rocker"
-    bodies, joints = coupled(ways[1], plane, ("crank", rocker, f"{TWIN}coupler"), (b, c), TWIN)
-    rest = Revolute(f"{TWIN}rest", "ground", rocker, plane.point(d), plane.normal)
-    points = [*single.points, Point(f"{TWIN}C", rocker, plane.point(c))]
-    return Mechanism("twins", [*single.bodies, Body(rocker), *bodies], [*single.joints, rest, *joints], points, single.drivers)
-
-
 def nearly_parallel(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
     """B, D and C of a parallelogram, exact or off by the last: it folds flat twice a turn."""
     off = 0.0 if rng.random() < 0.25 else power(rng, -12.0, -2.0) * float(rng.choice([-1.0, 1.0]))
@@ -175,9 +162,7 @@ def rockers(rng: Rng) -> tuple[Plan, Plan, Plan]:
 
 
 def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = False) -> Motion:
-    """Its closed form, twice, on the side of the design up to where the crank must turn back; or of the parallelogram, which goes
-    on.
-    """
+    """Its closed form, on the side of the design up to where the crank must turn back; or of the parallelogram, which goes on."""
     B, C, D = (extended(each)[:, None] for each in (b, c, d))
     p, q = ((C - B) ** 2).sum(axis=0), ((C - D) ** 2).sum(axis=0)
     side = float(np.sign((D - B)[0, 0] * (C - B)[1, 0] - (D - B)[1, 0] * (C - B)[0, 0]))
@@ -189,11 +174,11 @@ def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = Fa
         now_b = spin(turn, b)
         now_c = now_b + (C - B) if parallel else meet(now_b, p, D + 0.0 * now_b, q, side)
         still = np.zeros((3, len(turn)), dtype=np.longdouble)
-        loop = {
+        return {
+            "crank": (plane.turned(turn), pivot, still),
             "rocker": (plane.turned(heading(now_c - D) - heading(C - D)), rest, still),
             "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.lift(now_b - B)),
         }
-        return {"crank": (plane.turned(turn), pivot, still)} | loop | {f"{TWIN}{name}": moved for name, moved in loop.items()}
 
     return motion
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..truth import closed
 from .base import Family, Rng, Specimen, as_case
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar_motion, nearly_kite, nearly_parallel, rockers, twins
+from .pairs import beside, beside_motion
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, nearly_kite, nearly_parallel, rockers
 
-TURN = 0.97 * np.pi
+TURN, TWIN = 0.97 * np.pi, "twin "
 
 
 def _rockers(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
@@ -38,9 +39,10 @@ class Twins(Family):
         kind = tuple(SHAPES)[int(rng.integers(len(SHAPES)))]
         b, d, c, off = SHAPES[kind](rng)
         motion = four_bar_motion(plane, b, d, c, parallel=kind == "parallelograms" and off == 0.0)
+        mechanism = beside(four_bar(plane, b, d, c, first), plane, b, d, c, second, TWIN)
         return Specimen(
             f"{kind} with {first} and {second}, off by {off:.2g}",
-            partial(as_case, twins(plane, b, d, c, (first, second)), "turn", np.linspace(-TURN, TURN, samples)),
-            partial(closed, motion=motion, nearest=flats(b, d)),
+            partial(as_case, mechanism, "turn", np.linspace(-TURN, TURN, samples)),
+            partial(closed, motion=beside_motion(motion, motion, TWIN), nearest=flats(b, d)),
             facts=(("off", off),),
         )
