@@ -193,7 +193,7 @@ def test_branch_of_driven_angle(coupled):
 
 
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
-@pytest.mark.parametrize("turns", [1, 3, -1])
+@pytest.mark.parametrize("turns", [1, 2, 3, -1, -4])
 def test_a_turn_between_two_samples_is_not_lost(turns, style):
     """A wheel stands, makes whole turns and stands again: where it stands it says nothing of them, but the wheel it drives does."""
     rest, move = np.arange(101) * 0.01, np.linspace(0.0, 1.0, 7)[1:-1]

@@ -22,6 +22,7 @@ from .continuity import (
     LARGEST_CORRECTION,
     LARGEST_RATIO,
     LONGEST_STEP,
+    LONGEST_TURN,
     NEGLIGIBLE,
     ROUNDING,
     STEEPER,
@@ -29,6 +30,7 @@ from .continuity import (
     TURNED,
     WORSE,
 )
+from .equations.drives import turns
 from .request import ACCEPT, BLOCKS, FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, SLOPE, by_block
 
 if TYPE_CHECKING:
@@ -84,14 +86,19 @@ def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
         known = maximum(before(found, slope), least) if neighbours else slope
         blocks.append((size, size_before, maximum(known, found)))
         slopes[label] = maximum(found, least)
-    passed = margins(read, sigma_before, turned_before, largest, blocks)
+    passed = margins(read, sigma_before, turned_before, largest, blocks, tracer.turns)
     out = {MARGIN: reduce(minimum, passed.values()), LARGEST_SIGMA: largest, **slopes}
     out = {tracer.layout.scalar(label): value for label, value in out.items()}
     return program(name, tracer.tape, out, tracer.prepared)
 
 
 def margins(
-    read: Callable[[str], Scalar], sigma_before: Scalar, turned_before: Scalar, largest: Scalar, blocks: Sequence[Block]
+    read: Callable[[str], Scalar],
+    sigma_before: Scalar,
+    turned_before: Scalar,
+    largest: Scalar,
+    blocks: Sequence[Block],
+    turns: Sequence[str],
 ) -> dict[str, Scalar]:
     """By how much a lane passes each test of a solution: it has converged, closes, agrees with the redundant rows, is on its
     branch, and continues the motion it is predicted from.
@@ -103,6 +110,7 @@ def margins(
         read: a scalar of the lane by its name.
         sigma_before, turned_before: of where it is predicted from.
         largest: the largest estimate of sigma so far.
+        turns: names of the angles of drivers.
         blocks: of the rows. Of one loop sigma may stay as small as it is while another's, which is larger, falls to nothing.
     """
     tol, consistent, crossing = (read(label) for label in ACCEPT)
@@ -115,6 +123,7 @@ def margins(
         "on the branch": read("branch"),
         "continued": LARGEST_CORRECTION * read(MOVED) + NEGLIGIBLE - read(GAP),
         "near": LONGEST_STEP - read(REACH),
+        "not turned round": reduce(minimum, (LONGEST_TURN - absolute(read(name) - read(FROM + name)) for name in turns), 1.0),
         "as regular": reduce(minimum, (_as_regular(size, size_before) for size, size_before, _ in blocks)) + crossing,
         "on this side": 0.5 - absolute(turned - turned_before) + crossing,
         "regular between": reduce(minimum, (_between(*block, read(MOVED)) for block in blocks)) + crossing,
@@ -155,7 +164,8 @@ def why_refused(model: Model, lane: Array) -> str:
 
     names = zip(by_block(SIGMA, model.blocks), by_block(SLOPE, model.blocks), strict=True)
     blocks = [(read(name), read(FROM + name), max(_slope(read, label), read(label))) for name, label in names]
-    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), blocks)
+    angles = turns(model.mechanism, model.request.drivers)
+    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), blocks, angles)
     failed = [name for name, margin in found.items() if not margin > 0.0]
     closure, leftover, tol = (read(name) for name in ("closure", "leftover", "tolerance"))
     if not np.isfinite(closure):
@@ -173,6 +183,6 @@ def why_refused(model: Model, lane: Array) -> str:
         return "there is a singular pose ahead"
     if failed == ["converged"]:
         return f"Newton does not settle, residual {closure:.3g} of the mechanism's size"
-    if failed == ["near"]:
+    if not set(failed) - {"near", "not turned round"}:
         return "the step to it is too long to be believed"
     return "Newton jumps to another assembly"

@@ -19,6 +19,9 @@ NEGLIGIBLE = 1e-8
 # A step from one pose to the next that is longer than this, in Euler parameters (half of it: one radian), joint angles [rad] or
 # parts of the mechanism's size, says nothing of what is between: a whole turn ends where it began, on whatever assembly.
 LONGEST_STEP = 0.5
+# Where all stands still at two samples the state says nothing of a driver that made whole turns between them, and its row does not
+# know two of them from none: a driver turns by no more than this in a step, or it is divided [rad].
+LONGEST_TURN = 2.0
 # Nor does a step over which sigma changes by more than this factor, or a determinant its sign: beside a singular pose rates
 # change as fast. Steps towards it get shorter and shorter, and nothing there is stepped over. Where rows are exchanged the estimate
 # of sigma jumps, over the case library by up to 3.6 times.

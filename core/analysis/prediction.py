@@ -39,7 +39,7 @@ def carried(tracer: Tracer) -> list[tuple[int, int]]:
     sizes |= {PREDICTED + name: count for name, count in sizes.items()}
     sizes |= {RATE: tracer.unknowns, RATE_T: tracer.unknowns}
     pairs = [(tracer.layout.scalar(FROM + TIME), tracer.layout.scalar(EARLIER + TIME))]
-    told = TIME, *remembered(tracer.blocks)
+    told = TIME, *remembered(tracer.blocks), *tracer.turns
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in told]
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(name)) for name in ACCEPT]
     for name, count in sizes.items():
@@ -87,9 +87,9 @@ def predict(tracer: Tracer) -> Program:
 
 def extrapolate(tracer: Tracer, lanes: int) -> Program:
     """The state from what it is in the group of so many lanes before, or several, by the weights of those: `weights_of_groups`."""
-    # and what is carried of the last of them, which is at hand here; but its time is no longer there
-    time, last = tracer.layout.scalar(TIME), NODES - 1
-    stood = {target: tracer.tape.at(last, source) for source, target in continued(tracer) if source not in (time, target)}
+    # and what is carried of the last of them, which is at hand here; but its time and drives are no longer there
+    last, given = NODES - 1, {tracer.layout.scalar(name) for name in (TIME, *tracer.turns)}
+    stood = {target: tracer.tape.at(last, source) for source, target in continued(tracer) if source not in (*given, target)}
     state, behind = _state_slots(tracer), groups_behind(lanes)
     past = _past_slots(tracer) if behind > 1 else state
     stood |= {target: tracer.tape.input(source) for source, target in shifted(past[0], state, behind)}

@@ -34,6 +34,7 @@ from .continuity import EPSILON
 from .equations.carried import motion_of_frame, motion_of_point
 from .equations.cartesian import Cartesian, Given
 from .equations.constraints import Style, constraints, frames
+from .equations.drives import turns
 from .equations.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
 from .equations.geometry import placed, places
 from .equations.relative import Relative
@@ -111,6 +112,11 @@ class Tracer:
     def _factor(self) -> Elimination:
         """The rows at the state, factored: to iterate, and where the iteration ends for the rates."""
         return Elimination(self._kept(self.formulation.rows(self.at)))
+
+    @property
+    def turns(self) -> Sequence[str]:
+        """The scalars that hold the angles of drivers that turn."""
+        return turns(self.mechanism, self.request.drivers)
 
     @property
     def blocks(self) -> int:

@@ -49,7 +49,8 @@ def solve(
             products), "mixed" (joint coordinates as further unknowns) or "relative" (joint coordinates of a tree as the only
             ones); the solutions are the same.
         motions: of further drivers, their values measured likewise, over the time in which the swept one goes from its design
-            value at the rate; the others hold.
+            value at the rate; the others hold. They are asked at the samples, and between them where a step is divided: what goes
+            away and comes back between two samples is not seen.
 
     Returns:
         The motion; NaN where a sample cannot be reached, and the reason in its message.

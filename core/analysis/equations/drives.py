@@ -25,6 +25,11 @@ def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array
     return found.reshape(5 * len(drivers), drive.shape[-1])
 
 
+def turns(mechanism: Mechanism, drivers: Sequence[str]) -> list[str]:
+    """Return the scalars of a lane that hold the angles of those of the drivers that turn [rad from the design]."""
+    return [f"drive {name}.0" for name in drivers if mechanism.driver(name).turns]
+
+
 def standing_drives(mechanism: Mechanism, unit: float, change: Mapping[str, float]) -> dict[str, Drive]:
     """Drivers by name that stand at values from the design [SI]."""
     values = np.array([[*change.values()], *np.zeros((2, len(change)))])[..., None]
