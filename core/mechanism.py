@@ -5,7 +5,6 @@ All points and axes are global coordinates at the design position, SI units, as 
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -14,7 +13,7 @@ from functools import cached_property
 from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
-from .errors import MechanismError
+from .errors import MechanismError, unknown
 from .given import held, require_finite, triple
 from .joints.base import Joint, Kind, unit
 from .joints.coupler import Coupler
@@ -177,6 +176,4 @@ def _unique(what: str, names: Sequence[str]) -> None:
 def _known(who: str, what: str, name: str, known: Mapping[str, Any], key: str) -> None:
     if name in known:
         return
-    close = difflib.get_close_matches(name, list(known), n=1)
-    remedy = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(sorted(known)) or 'none'}"
-    raise MechanismError(f"{who}: there is no {what} {name!r}; {remedy}", key)
+    raise MechanismError(f"{who}: {unknown(what, name, known)}", key)

@@ -13,7 +13,7 @@ from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
 from ..program.llvm.compiler import available
-from ..trajectory import Array
+from ..trajectory import QUANTITIES, Array
 from . import acceptance, prediction
 from .equations.drives import drive_numbers
 from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request, remembered
@@ -26,6 +26,8 @@ MAX_ITERATIONS = 12
 RECENT = 8
 # A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
 CLOSED = 1e-12
+# Iterations from the design position at most: a rod given longer or shorter than its design distance is taken up by them.
+ASSEMBLING = 50
 NONE_VARIED = np.empty((0, 1))
 TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
@@ -123,7 +125,7 @@ class Model:
         """Names of the vectors asked for, those of one motion side by side."""
         order = self.request.order + 1
         found = [*self.state, *(PREDICTED + name for name in self.state), RATE, RATE_T] if self.request.state else []
-        found += [f"{label} {name}" for name in self.request.points for label in ("position", "velocity", "acceleration")[:order]]
+        found += [f"{label} {name}" for name in self.request.points for label in QUANTITIES[:order]]
         labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
         return found + [f"{label} {name}" for name in self.request.bodies for group in labels for label in group]
 
@@ -145,8 +147,7 @@ class Model:
     @cached_property
     def of_points(self) -> Mapping[str, list[slice | None]]:
         """By point: rows of its position, velocity and acceleration; None where one is not wanted."""
-        labels = ("position", "velocity", "acceleration")
-        return {name: [self.rows.get(f"{label} {name}") for label in labels] for name in self.request.points}
+        return {name: [self.rows.get(f"{label} {name}") for label in QUANTITIES] for name in self.request.points}
 
     @cached_property
     def of_bodies(self) -> Mapping[str, list[slice | None]]:
@@ -239,7 +240,7 @@ class Model:
         if len(geometry):
             executor.put(self.geometry, geometry)
             executor.run("prepare")
-        for _ in range(50):  # a rod given longer or shorter than its design distance is taken up here
+        for _ in range(ASSEMBLING):
             executor.run("newton")
             (residual,) = executor.get([self.slots["residual"]])
             if not (residual > CLOSED).any():

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import sys
 import traceback
 from pathlib import Path
 from types import ModuleType
 
-from ...errors import KincheckError
+from ...errors import KincheckError, similar
 from ...joints import Coupler, Joint
 from ..attempt import said
 
@@ -64,8 +63,8 @@ def load_joint(where: str) -> type[Joint]:
             ) from error
         raise KincheckError(f"module {module_name!r} cannot be imported: {_raised(error)}; correct it") from error
     if found is None:
-        close = difflib.get_close_matches(name, joints, n=1)
-        remedy = f"did you mean {close[0]!r}?" if close else f"its joints: {', '.join(joints) or 'none'}"
+        close = similar(name, joints)
+        remedy = f"did you mean {close!r}?" if close else f"its joints: {', '.join(joints) or 'none'}"
         raise KincheckError(f"module {module_name!r} has no class {name!r}; {remedy}")
     if not (isinstance(found, type) and issubclass(found, Joint)):
         raise KincheckError(f"{where} is no joint type; derive it from kincheck.core.Joint")
