@@ -7,6 +7,7 @@ import pytest
 from kincheck import cases
 from kincheck.cases import bennett
 from kincheck.cases.jet import Jet
+from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, Universal
 from kincheck.core.analysis import sweep
 from kincheck.core.analysis.diagnosis.conditioning import conditioning
 from kincheck.core.analysis.march import Marcher, march
@@ -244,3 +245,36 @@ def test_a_diagnosis_knows_no_singular_pose_there():
     assert [pose.orientation for pose in found.poses] == [1.0] * 41
     assert min(pose.smallest for pose in found.poses) > 0.03
     assert len({tuple(pose.owners) for pose in found.poses}) > 1
+
+
+@pytest.mark.parametrize("off", [0.003, 0.0044, 0.008])
+@pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
+def test_a_spherical_kite_beside_its_corner(off, style):
+    """Rod and rocker are alike, crank and ground nearly so: beside the corner all rows are nearly singular, those kept more so."""
+    alike, ground = 0.98, 0.72
+
+    def turned(axis, angle, vector):
+        return vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1.0 - np.cos(angle))
+
+    first, up = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+    last = turned(up, ground, first)
+
+    def pose(angle):
+        pin = turned(first, angle, turned(up, ground + off, first))
+        mean, across = pin + last, np.cross(pin, last)
+        along = np.cos(alike) / (1.0 + pin @ last)
+        return pin, along * mean + np.sqrt((1.0 - along**2 * (mean @ mean)) / (across @ across)) * across
+
+    pin, meet = (tuple(each.tolist()) for each in pose(0.9))
+    joints = [
+        Revolute("first", "ground", "crank", (0.0, 0.0, 0.0), tuple(first.tolist())),
+        Revolute("last", "ground", "rocker", tuple(last.tolist()), tuple(last.tolist())),
+        Revolute("pin", "crank", "rod", pin, pin),
+        Universal("meet", "rod", "rocker", meet, (meet, tuple(np.cross(pin, meet).tolist()))),
+    ]
+    bodies = [Body(name) for name in ("crank", "rod", "rocker")]
+    kite = Mechanism("kite", bodies, joints, [Point("meet", "rocker", meet)], [JointAngle("turn", "first")])
+    turn = np.linspace(0.0, -6.28, 14)
+    found = solve(kite, "turn", turn, style=style, order=0)
+    assert found.solved.all(), found.message
+    assert np.abs(found.points["meet"].position - [pose(0.9 + each)[1] for each in turn]).max() < 1e-10

@@ -85,6 +85,9 @@ def test_factors_in_a_given_order_solve_what_dense_ones_do(n):
     given |= dict(zip(numbers(right), b, strict=True))
     found = gone_through([*factor, *fixed.solve(link, factors, inverse, right)], memory, given)
     np.testing.assert_allclose(found[right], np.linalg.solve(matrices, b.T[..., None])[..., 0].T, rtol=1e-10)
+    there = gone_through([*factor, *fixed.solve(link, factors, inverse, right, transposed=True)], memory, given)
+    transposed = np.linalg.solve(matrices.swapaxes(1, 2), b.T[..., None])[..., 0].T
+    np.testing.assert_allclose(there[right], transposed, rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(found[factors][fixed.pivots].prod(axis=0), np.linalg.det(matrices), rtol=1e-10)
     np.testing.assert_array_equal(found[matrix], values)
     # that of L is what elimination by hand has

@@ -5,7 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.cases import load
-from kincheck.core import Body, JointAngle, Mechanism, Point, Ramp, Screw, Sine, SolveError, solve, solve_designs
+from kincheck.core import (
+    Body,
+    JointAngle,
+    Mechanism,
+    Point,
+    Ramp,
+    Revolute,
+    Screw,
+    Sine,
+    SolveError,
+    Universal,
+    solve,
+    solve_designs,
+)
 from kincheck.core.analysis import variants
 from kincheck.core.analysis.equations.geometry import placed, places
 from kincheck.core.analysis.model import compile_model
@@ -226,3 +239,25 @@ def test_a_variant_that_ends_early_is_told_that_it_may_go_on_by_itself():
     found = solve_designs(strut()[0], "stroke", [0.0, 0.5], {"joints.ball.point": [strut()[0].joint("ball").point]})
     assert "cannot be followed beyond stroke = 0.293" in found.messages[0]
     assert found.messages[0].endswith("by itself, a variant may pass a singular pose; many at once do not")
+
+
+def test_a_variant_that_other_rows_would_follow_is_told_so():
+    """A kite off by a twentieth, its rod on universals: one row too many, and the one that is left out does not stay so."""
+    Z, X, turn = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), np.linspace(0.0, 1.6, 17)
+    pin = 1.25 * np.array([np.cos(1.1), -np.sin(1.1)])
+    d = np.array([1.2, 0.0]) - pin
+    side = np.sqrt(0.49 / (d @ d) - 0.25)
+    pin, meet = ((*each.tolist(), 0.0) for each in (pin, pin + 0.5 * d + side * np.array([-d[1], d[0]])))
+    joints = [
+        Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), Z),
+        Revolute("rest", "ground", "rocker", (1.2, 0.0, 0.0), Z),
+        Universal("pin", "crank", "rod", pin, (X, Z)),
+        Universal("end", "rod", "rocker", meet, (Z, X)),
+    ]
+    bodies = [Body(name) for name in ("crank", "rod", "rocker")]
+    kite = Mechanism("kite", bodies, joints, [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")])
+    assert solve(kite, "turn", turn).solved.all()
+    found = solve_designs(kite, "turn", turn, {"points.meet.position": np.array([meet])})
+    assert not found.solved.all()
+    assert "what is singular may be the 18 rows chosen at the nominal design out of 19" in found.messages[0]
+    assert "solve this variant by itself" in found.messages[0]

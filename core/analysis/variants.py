@@ -31,6 +31,11 @@ SOME = 32
 RECYCLED = 16_000_000
 # What a batch does not do.
 BY_ITSELF = "by itself, a variant may pass a singular pose; many at once do not"
+# Nor this: it would be another program, made for the geometry of one variant.
+OTHER_ROWS = (
+    "what is singular may be the {count} rows chosen at the nominal design out of {all}, and not the mechanism: solve this variant "
+    "by itself, and rows are chosen anew where these come to depend on each other; those of many at once stay"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +84,9 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         found = march(replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0]), tol)
         kept[:, :, k], solved[:, k] = found.kept[:, route.order], found.solved[route.order]
         if found.messages:
-            messages[k] = "; ".join([*found.messages, BY_ITSELF])
+            kept_rows, others = len(model.selection.kept), len(model.selection.dropped)
+            rows = [OTHER_ROWS.format(count=kept_rows, all=kept_rows + others)] if others else []
+            messages[k] = "; ".join([*found.messages, BY_ITSELF, *rows])
     closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
     doubted = np.zeros_like(solved)
     # the worst of all first: to judge each takes a twentieth of the time

@@ -85,15 +85,21 @@ class FixedOrder:
         )
         return [link.operations("copy", at[: self._given], matrix), link.operations("copy", at[self._given :], zero), elimination]
 
-    def solve(self, link: Linker, entries: slice, inverse: slice, right: slice) -> list[Words]:
-        """Solve for what stands in the rows `right`, in the order of elimination."""
+    def solve(self, link: Linker, entries: slice, inverse: slice, right: slice, *, transposed: bool = False) -> list[Words]:
+        """Solve for what stands in the rows `right`, in the order of elimination; or with the matrix transposed."""
         at, inverses = numbers(right), numbers(inverse)
 
-        def less(of: Rows) -> tuple[Rows, Rows, Rows, Rows]:
+        def less(of: tuple[Rows, Rows, Rows] | Rows) -> tuple[Rows, Rows, Rows, Rows]:
             pivot, row, entry = of
             return at[row], entries.start + entry, at[pivot], at[row]
 
         stages, back = self._last + 1, self._last - self._level
+        if transposed:  # what needs what is the other way round
+            (j, i, upper), (k, below, lower) = self._above, self._below
+            return [
+                link.staged(stages, ("*", self._level, (at, at, inverses)), ("fnma", self._level[i], less((i, j, upper)))),
+                link.staged(stages, ("fnma", back[below], less((below, k, lower)))),
+            ]
         return [
             link.staged(stages, ("fnma", self._level[self._below[0]], less(self._below))),
             link.staged(stages, ("*", back, (at, at, inverses)), ("fnma", back[self._above[0]], less(self._above))),

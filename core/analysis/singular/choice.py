@@ -27,9 +27,9 @@ from ..system import system_of
 
 # A motion that ends with a smallest singular value above this part of the largest that it has had does not end at a singular pose.
 NEAR = 1e-2
-# Where that of all rows together is below this part of it the mechanism itself is nearly singular, and no rows are good.
-# (By NEAR kites that are off by a hundredth to a thousandth of their size were refused where they lie flat.)
-REGULAR = 1e-4
+# Rows are chosen anew where all together have a smallest singular value above this part of the largest that there was, thirty times
+# what rounding can turn (TURNED); with NEAR kites off by 0.002 to 0.008 of their size were refused beside their corner.
+SEEN = 1e-4
 # Rows are chosen anew where that makes the smallest singular value as many times larger.
 BETTER = 3.0
 # Rows of before are taken again where their smallest singular value is this part of that of all rows: of those that are chosen at a
@@ -66,7 +66,8 @@ class Choice:
         matrix[[*model.selection.kept]], matrix[[*model.selection.dropped]] = found.jacobian[0], found.redundant[0]
         if not np.isfinite(matrix).all():
             return None
-        least = max(BETTER * _sigma(matrix, model.selection.kept), REGULAR * float(lane[slots[FROM + LARGEST_SIGMA]]))
+        largest = float(lane[slots[FROM + LARGEST_SIGMA]])
+        least = max(BETTER * _sigma(matrix, model.selection.kept), SEEN * largest)
         if not _sigma(matrix, range(len(matrix))) > least:
             return None
         known = {each.selection.kept: each for each in self.models}
@@ -79,7 +80,12 @@ class Choice:
             best = recent_model(model.mechanism, replace(model.request, rows=rows))
             self.models.append(best)
         stands = _standing(best, {name: lane[model.vectors[FROM + name]] for name in model.state}, sample, NEAR * sigma)
-        return None if stands is None else Standing(best, stands)
+        if stands is None:
+            return None
+        # beside a corner all rows are nearly singular: the scale is that of the motion, not of what it is there
+        for name in (LARGEST_SIGMA, FROM + LARGEST_SIGMA):
+            stands[best.slots[name]] = max(stands[best.slots[name]], largest)
+        return Standing(best, stands)
 
 
 def chosen(matrix: Array, known: Sequence[tuple[int, ...]], drivers: int, conditions: Sequence[Condition]) -> tuple[int, ...]:

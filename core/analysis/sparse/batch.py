@@ -14,11 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...trajectory import Array
-from ..continuity import EPSILON, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED_BY_PIVOTS, WORSE_BY_PIVOTS
 from ..interpolation import lagrange
-from ..request import CONSISTENT
 from ..structure.factors import PIVOT_THRESHOLD
-from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance, regular_between
+from .stand import CONTRACTS, SETTLED, STALLS, Poses, Stand, distance, lacked
 from .tables import SparseTables
 
 if TYPE_CHECKING:
@@ -51,6 +49,7 @@ class Batch:
     def order(self, model: SparseModel) -> None:
         """Eliminate from now on in the order that serves the pose where the model was last evaluated."""
         tables, self.outgrown = self._tables, False
+        model.factors.update(model.elements.entries[model.solved])
         model.factors.factor()
         found = model.factors.ordered
         tables.order(found, model.solved[found.entries], model.kept[np.argsort(found.row)])
@@ -73,47 +72,44 @@ class Batch:
         earlier = np.append(here.time, times[:-1])
         with np.errstate(all="ignore"):  # lanes that diverge are found by their residuals
             self._predict(before, times)
-            closure, iterations, sure = self._iterated(tol)
+            closure, iterations, done = self._iterated(tol)
             tables.motion()
             state, rates, accelerations = tables["state"].copy(), tables["rates"].copy(), tables["accelerations"].copy()
             leftover: Array = np.abs(tables["phi"].take(self._dropped, axis=0)).max(axis=0, initial=0.0)
             branch: Array = tables["branch"].min(axis=0, initial=1.0)
-            pivot, same = self._pivots(here)
-            limit = WORSE_BY_PIVOTS * np.maximum(pivot, here.largest_pivot) * np.maximum(closure, EPSILON)
-            sure &= (
-                (closure <= tol)
-                & (leftover <= max(CONSISTENT, tol))
-                & (branch > 0.0)
-                & same
-                & (TURNED_BY_PIVOTS * pivot**2 > limit)
-            )
+            (pivot, turned), sigmas = self._pivots(here), self._sigmas()
             past = _past(here.state, state)
             taylor = self._taylor(past, _past(here.rates, rates), _past(here.accelerations, accelerations), times - earlier)
             gap, step = distance(state - taylor, self._scale), distance(state - past, self._scale)
-            sure &= (gap <= LARGEST_CORRECTION * step + NEGLIGIBLE) & (step <= LONGEST_STEP)
-            sigmas = np.zeros((self.width, 0))
-            if len(self._dropped):
-                sigmas = self._blocks.sigmas(tables["entries"].take(self._solved, axis=0))
-                sure &= regular_between(sigmas, np.vstack([here.sigmas, sigmas[:-1]]), step)
+            poses = Poses(done, closure, leftover, branch, gap, step, pivot, chosen=False, turned=turned, sigmas=sigmas)
+            sure = np.logical_and.reduce([*poses.passed(here, tol).values()])
             small = tables.growth <= GROWTH
         accepted = int(np.logical_and.accumulate((sure & small)[:count]).sum())
         self.outgrown = accepted < count and bool(sure[accepted])
+        remembered = poses.remembered(here)
         return [
             Stand(
                 *(float(times[k]), float(earlier[k])),
                 *(state[:, k], taylor[:, k], rates[:, k], accelerations[:, k]),
                 *(iterations, float(closure[k]), float(leftover[k]), float(branch[k])),
-                *(float(pivot[k]), here.largest_pivot, here.orientation, sigmas[k]),
+                *(float(pivot[k]), here.largest_pivot, here.orientation, *remembered[k]),
             )
             for k in range(accepted)
         ]
 
     def _pivots(self, here: Stand) -> tuple[Array, NDArray[np.bool_]]:
-        """Where all was last factored the smallest in size, and whether the orientation is that of where the motion stands."""
+        """Where all was last factored the smallest in size, and whether the orientation is another than where the motion stands."""
         pivots = self._tables.pivots
         entries = self._tables["entries"].take(self._solved, axis=0)
         orientation = self._blocks.orientation(entries, self._sign * np.sign(pivots).prod(axis=0))
-        return np.abs(pivots).min(axis=0), np.array([each == here.orientation for each in orientation])
+        return np.abs(pivots).min(axis=0), np.array([each != here.orientation for each in orientation])
+
+    def _sigmas(self) -> Array:
+        """As of `SparseModel`, where all was last factored."""
+        if not len(self._dropped):
+            return np.abs(self._tables.pivots).min(axis=0)[:, None]
+        tables = self._tables
+        return self._blocks.sigmas(tables["entries"].take(self._solved, axis=0), tables.solve, tables.solve_transposed)
 
     def _predict(self, before: Sequence[Stand], times: Array) -> None:
         """By the polynomial through the samples before, or by a Taylor step and what the last such step lacked."""
@@ -123,10 +119,9 @@ class Batch:
             weights = lagrange(times, np.repeat(known[:, None], len(times), axis=1))
             state = np.column_stack([each.state for each in before]) @ weights
         else:
-            h, last = times - here.time, here.time - here.earlier
+            h = times - here.time
             state = self._taylor(here.state[:, None], here.rates[:, None], here.accelerations[:, None], h)
-            if last:
-                state = state + (h / last) ** 3 * (here.state - here.predicted)[:, None]
+            state = state + lacked(h, here.time - here.earlier) * (here.state - here.predicted)[:, None]
         self._taylor(state, np.zeros(1), np.zeros(1), times)
 
     def _taylor(self, state: Array, rates: Array, accelerations: Array, h: Array) -> Array:

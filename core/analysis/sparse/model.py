@@ -11,6 +11,8 @@ whole: that is what the entries of the matrix and the round-off of the rows depe
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -21,12 +23,10 @@ from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...motions import Path
 from ...trajectory import Array
-from ..continuity import EPSILON, FOLLOWED, LARGEST_CORRECTION, LONGEST_STEP, NEGLIGIBLE, TURNED_BY_PIVOTS, WORSE_BY_PIVOTS
+from ..acceptance import in_words
 from ..equations.constraints import constraints, measured
 from ..equations.drives import drive_numbers
 from ..model import CLOSED, MAX_ITERATIONS
-from ..prediction import ABOUT
-from ..request import CONSISTENT
 from ..structure.driven import locked_drivers, require_driven
 from ..structure.factors import Factors, Indices, SingularError
 from ..structure.freedom import counted
@@ -35,9 +35,11 @@ from .batch import Batch
 from .elements import Elements
 from .orientation import Blocks
 from .row_selection import Jacobian
-from .stand import CONTRACTS, SETTLED, STALLS, Stand, distance, regular_between
+from .stand import CONTRACTS, SETTLED, STALLS, Poses, Stand, distance, lacked
 from .turning import Turn
 
+# Rows are chosen anew where that makes the determinant, and so the least of what it is a product of, as many times larger.
+BETTER = 3.0
 FEW = 5
 """Names listed in a message, at most."""
 
@@ -88,13 +90,9 @@ class SparseModel:
         rows, unknowns = jacobian.shape
         if rows < unknowns:
             require_driven(self.mechanism)
-        self.kept: Indices = jacobian.independent(drivers)
-        self.dropped: Indices = np.setdiff1d(np.arange(rows), self.kept)
-        among = jacobian.among(self.kept)
-        self.solved = np.flatnonzero(among >= 0)
+        kept = jacobian.independent(drivers)
         try:
-            pattern = among[self.solved], jacobian.columns[self.solved]
-            self.factors, self.blocks = Factors(*pattern, jacobian.values[self.solved], unknowns), Blocks(*pattern, unknowns)
+            self._keep(kept, jacobian)
             pivot = abs(self.factors.signed_pivot)
         except SingularError:
             pivot = 0.0
@@ -105,6 +103,45 @@ class SparseModel:
                 "position (lock-up or dead centre); give the design in another pose, some degrees on, and sweep from there, "
                 "or drive another coordinate"
             )
+
+    def _keep(self, kept: Indices, jacobian: Jacobian) -> None:
+        """Solve these rows. Raises SingularError."""
+        self.kept, self.dropped = kept, np.setdiff1d(np.arange(jacobian.shape[0]), kept)
+        among = jacobian.among(kept)
+        self.solved = np.flatnonzero(among >= 0)
+        pattern = among[self.solved], jacobian.columns[self.solved]
+        self.factors = Factors(*pattern, jacobian.values[self.solved], len(kept))
+        self.blocks = Blocks(*pattern, len(kept), well_chosen=jacobian.well_chosen)
+
+    def anew(self, at: Stand, drives: Array, known: Sequence[SparseModel]) -> tuple[SparseModel, Stand] | None:
+        """The same by rows that are better where a motion stands, and how it stands by them; None where none are better.
+
+        Args:
+            known: others that are made already.
+
+        Raises:
+            FailedError: it is too near to a singular pose for that to be seen.
+        """
+        self._evaluate(at.state, drives)
+        self._factor()
+        jacobian = Jacobian.of(self.elements)
+        if not (len(self.dropped) and jacobian.well_chosen):
+            return None
+        kept = jacobian.independent(len(self.mechanism.drivers))
+        other = next((each for each in known if np.array_equal(each.kept, kept)), None)
+        try:
+            if other is None:
+                other = copy(self)  # elements and all that rows have no part in are shared
+                vars(other).pop("together", None)
+                other._keep(kept, jacobian)
+            other.factors.update(jacobian.values[other.solved])
+            other.factors.factor()
+        except SingularError:
+            return None
+        if not other.factors.log_determinant > self.factors.log_determinant + math.log(BETTER):
+            return None
+        still = Stand(at.time, at.time, at.state, at.state, at.rates, at.accelerations)
+        return other, other.moving(still, at.time, drives)
 
     @property
     def redundant(self) -> list[str]:
@@ -156,7 +193,9 @@ class SparseModel:
         rates, accelerations = self._motion()
         now = replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
         pivot, orientation = self._pivots()
-        now = replace(now, sigmas=self._sigmas())
+        sigmas = self._sigmas()
+        slopes, high = (each if len(each) else np.zeros(len(sigmas)) for each in (at.slopes, at.high))
+        now = replace(now, sigmas=sigmas, slopes=slopes, high=np.maximum(high, sigmas))
         return replace(now, pivot=pivot, largest_pivot=max(at.largest_pivot, pivot), orientation=orientation)
 
     def _pivots(self) -> tuple[float, bytes]:
@@ -165,8 +204,11 @@ class SparseModel:
         return abs(pivot), self.blocks.orientation(entries[:, None], np.array([pivot]))[0]
 
     def _sigmas(self) -> Array:
-        """Those of the blocks where all was last evaluated; none where all rows are solved."""
-        return self.blocks.sigmas(self.elements.entries[self.solved][:, None])[0] if len(self.dropped) else np.zeros(0)
+        """Those of the blocks where all was last factored; where all rows are solved the smallest pivot stands for all."""
+        if not len(self.dropped):
+            return np.array([abs(self.factors.signed_pivot)])
+        factors, entries = self.factors, self.elements.entries[self.solved]
+        return self.blocks.sigmas(entries[:, None], factors.solve, factors.solve_transposed)[0]
 
     def _factor(self) -> None:
         try:
@@ -199,11 +241,9 @@ class SparseModel:
 
     def _predicted(self, here: Stand, time: float) -> tuple[Array, Array]:
         """A Taylor step of second order, and that with what the last such step lacked, which grows by the cube of the step."""
-        h, before = time - here.time, here.time - here.earlier
+        h = time - here.time
         taylor = self.moved(here.state, h * (here.rates + (0.5 * h) * here.accelerations))
-        if not ABOUT * abs(before) > abs(h):
-            return taylor, taylor
-        corrected = taylor + (h / before) ** 3 * (here.state - here.predicted)
+        corrected = taylor + lacked(np.array(h), here.time - here.earlier) * (here.state - here.predicted)
         return taylor, self.moved(corrected, np.zeros_like(here.rates))
 
     def reach(self, here: Stand, time: float, drives: Array, tol: float) -> Stand:
@@ -226,34 +266,33 @@ class SparseModel:
                 last, residual = residual, self._evaluate(state, drives)
                 rate, iterations = residual / last, iterations + 1
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
-            closure, leftover, branch = self._tested(residual, tol, done=done)
-            gap, reach = (float(distance(state - other, self.scale)) for other in (taylor, here.state))
-            if not gap <= LARGEST_CORRECTION * reach + NEGLIGIBLE or not reach <= LONGEST_STEP:
-                raise FailedError("Newton jumps to another assembly")
+            if not done or not math.isfinite(residual):
+                raise FailedError(self._in_words(["closed"], residual, tol))
+            step, gap = (float(distance(state - other, self.scale)) for other in (here.state, taylor))
             rates, accelerations = self._motion()
         pivot, orientation = self._pivots()
-        largest = max(pivot, here.largest_pivot)
-        # where SuperLU exchanges rows its pivots jump tenfold: their change is not held to
-        limit = FOLLOWED if pivot < here.pivot else TURNED_BY_PIVOTS
-        if orientation != here.orientation or limit * pivot**2 <= WORSE_BY_PIVOTS * largest * max(closure, EPSILON):
-            raise FailedError(f"there is a singular pose ahead, smallest pivot {pivot:.3g}")
-        sigmas = self._sigmas()
-        if len(self.dropped) and not regular_between(sigmas[None], here.sigmas[None], np.array([reach])).all():
-            raise FailedError(f"there may be a singular pose ahead, smallest singular value of a part {sigmas.min():.3g}")
-        tests = closure, leftover, branch, pivot, largest, orientation, sigmas
-        return Stand(time, here.time, state, taylor, rates, accelerations, iterations, *tests)
-
-    def _tested(self, closure: float, tol: float, *, done: bool) -> tuple[float, float, float]:
-        """Closure, leftover and branch where all was last evaluated. Raises FailedError."""
         leftover = float(np.abs(self.elements.phi[self.dropped]).max(initial=0.0))
         branch = float(self.elements.branch.min(initial=1.0))
-        if not math.isfinite(closure):
-            raise FailedError("Newton diverges to numbers that are not finite")
-        if not branch > 0.0:
-            raise FailedError(f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})")
-        if not done or closure > tol:
-            raise FailedError(f"Newton does not converge, residual {closure:.3g} of the bodies' size")
-        if leftover > max(CONSISTENT, tol):
-            names = ", ".join([*self.redundant[:FEW], "..."][: len(self.redundant)])
-            raise FailedError(f"the redundant rows ({names}) contradict the others by {leftover:.3g}")
-        return closure, leftover, branch
+        poses = Poses(
+            done=np.array([done]),
+            closure=np.array([residual]),
+            leftover=np.array([leftover]),
+            branch=np.array([branch]),
+            gap=np.array([gap]),
+            step=np.array([step]),
+            pivot=np.array([pivot]),
+            chosen=True,
+            turned=np.array([orientation != here.orientation]),
+            sigmas=self._sigmas()[None],
+        )
+        failed = [name for name, passed in poses.passed(here, tol).items() if not passed.all()]
+        if failed:
+            raise FailedError(self._in_words(failed, residual, tol, leftover, branch))
+        (found,) = poses.remembered(here)
+        motion = time, here.time, state, taylor, rates, accelerations, iterations
+        return Stand(*motion, residual, leftover, branch, pivot, max(pivot, here.largest_pivot), orientation, *found)
+
+    def _in_words(self, failed: Sequence[str], closure: float, tol: float, leftover: float = 0.0, branch: float = 1.0) -> str:
+        """Why a pose was refused."""
+        names = self.redundant
+        return in_words(failed, closure, leftover, branch, tol, [*names[:FEW], "..."] if len(names) > FEW else names)

@@ -1,9 +1,9 @@
-"""The signs of the determinants of a large sparse matrix, block by block: as `Elimination.orientation` has them of a small one."""
+"""Signs of determinants and smallest singular values of a large sparse matrix, by block; `Elimination` has them of a small one."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,15 @@ class Blocks:
     """The blocks of a pattern that can be solved one after the other.
 
     All but the largest are taken to be small: they are made dense.
+
+    Attributes:
+        rows, columns: those that the largest has are one, all others zero, shape (n, 1).
+        start: some vector that is of no direction in particular, shape (n, 1).
     """
 
-    def __init__(self, rows: Indices, columns: Indices, n: int) -> None:
+    def __init__(self, rows: Indices, columns: Indices, n: int, *, well_chosen: bool = True) -> None:
+        """Args: whether rows were chosen for being well conditioned; without, the largest block's singular values say nothing."""
+        self._well_chosen = well_chosen
         sparse: Any = importlib.import_module("scipy.sparse")
         graphs: Any = importlib.import_module("scipy.sparse.csgraph")
         pattern = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
@@ -26,7 +32,10 @@ class Blocks:
         needs = sparse.csr_array((np.ones(len(rows)), (rows, row_of[columns])), shape=(n, n))
         _, block = graphs.connected_components(needs, directed=True, connection="strong")
         sizes = np.bincount(block)
-        sizes[sizes.argmax()] = 0
+        largest = sizes.argmax()
+        self.rows, self.columns = ((each == largest).astype(float)[:, None] for each in (block, block[row_of]))
+        self.start = np.random.default_rng(0).normal(size=(n, 1))
+        sizes[largest] = 0
         # of every row its place in its block, and of every column that of its row
         order = np.argsort(block, kind="stable")
         place = np.empty(n, np.intp)
@@ -53,9 +62,21 @@ class Blocks:
         found = np.column_stack([small, np.sign(whole) * small.prod(axis=1)])
         return [each.tobytes() for each in found.astype(np.int8)]
 
-    def sigmas(self, values: Array) -> Array:
-        """Of several poses the smallest singular value of each block but the largest, shape (poses, blocks); none is infinite."""
-        found = [np.full((values.shape[1], 1), np.inf)]
+    def sigmas(self, values: Array, solve: Callable[[Array], Array], solve_transposed: Callable[[Array], Array]) -> Array:
+        """Of several poses the smallest singular value of each block, shape (poses, blocks).
+
+        Of the largest, which comes first, it is an estimate by a step of inverse iteration: no less, and the nearer the more
+        singular the block is. The whole matrix gives it: blocks before have no part in what is asked of one, and what it says of
+        those behind is left out.
+
+        Args:
+            solve, solve_transposed: solve for right-hand sides of all poses, shape (n, poses).
+        """
+        found = [np.zeros((values.shape[1], 0))]
+        if self._well_chosen:
+            left = self.rows * solve_transposed(np.repeat(self.columns * self.start, values.shape[1], axis=1))
+            right = self.columns * solve(left)
+            found.append((np.linalg.norm(left, axis=0) / np.linalg.norm(right, axis=0))[:, None])
         for each in self._dense(values):
             sound = np.where(np.isfinite(each).all(axis=(2, 3), keepdims=True), each, 0.0)  # what is no number is singular
             found.append(np.abs(sound[..., 0, 0]) if each.shape[-1] == 1 else np.linalg.svd(sound, compute_uv=False)[..., -1])

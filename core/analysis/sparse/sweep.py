@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
@@ -15,6 +15,7 @@ from ...mechanism import Mechanism
 from ...motions import Path, outwards
 from ...primitives.base import Pose, Twist
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ..continuity import LOW
 from ..division import HALVINGS, MOST_PARTS, TOO_MANY
 from ..equations.carried import motion_of_frame, motion_of_point
 from ..equations.formulation import Acceleration
@@ -107,6 +108,11 @@ class _Sweep:
     bodies: _Wanted
     messages: list[str] = field(default_factory=list[str])
     smallest_pivot: float = np.inf
+    renewed: int = 0
+
+    def __post_init__(self) -> None:
+        self.by = self.model
+        self.known = [self.model]
 
     def solve(self, order: int) -> Trajectory:
         """The motion at all samples."""
@@ -134,30 +140,32 @@ class _Sweep:
         try:
             if not path.from_design:
                 way = path.lead_in()
-                here = model.moving(here, 0.0, model.drives(way, np.zeros(1))[:, 0])
+                here = model.moving(here, 0.0, self._drives(way, 0.0))
                 for there in self._follow(here, way, way.times):
                     here = there
                 if self.messages:
                     self.messages[:] = [f"on the way to the first sample: {self.messages[0]}"]
                     return None
-            return model.moving(here, start, model.drives(path, np.array([start]))[:, 0])
+            return model.moving(here, start, self._drives(path, start))
         except FailedError as error:
             self.messages.append(f"the motion cannot start at {path.where(start)}: {error}")
             return None
 
     def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
         """Where the motion stands at each of the times, outwards, until it ends; then there is a message."""
-        drives, together = self.model.drives(path, times), self.model.together if len(times) >= WORTH else None
+        drives, many = self.model.drives(path, times), len(times) >= WORTH
+        self.by = self.model
         before: deque[Stand] = deque([here], REMEMBERED)
         k = alone = 0
         while k < len(times):
             found: list[Stand] = []
+            together = self.by.together if many else None
             if together and k >= alone:
                 found = together.reach(before, times[k:], drives[:, k:], self.tol)
                 if not found:  # from here on by pivots that are chosen
                     alone = k + together.width
                     try:
-                        here = self.model.moving(here, here.time, self.model.drives(path, np.array([here.time]))[:, 0])
+                        here = self.by.moving(here, here.time, self._drives(path, here.time))
                     except FailedError as error:
                         self._end(here, path, times, k, str(error))
                         return
@@ -167,24 +175,27 @@ class _Sweep:
                     self._end(here, path, times, k, why)
                     return
                 found = [here]
-                if together and together.outgrown:
-                    together.order(self.model)
+                if together and together.outgrown and self.by.together is together:
+                    together.order(self.by)
             for here in found:
                 if here.time == before[-1].time:
                     before.pop()
                 before.append(here)
                 self.smallest_pivot = min(self.smallest_pivot, here.pivot)
                 yield here
-            k += len(found)
+                k, by = k + 1, self.by
+                before[-1] = here = self._by_better_rows(here, path)
+                if self.by is not by:  # what was found beyond is not as good
+                    break
 
     def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> tuple[Stand, str]:
         """Go to a time, in parts where need be: where that ends, and why before that time."""
         for _ in range(MOST_PARTS):
             try:
-                return self.model.reach(here, time, drives, self.tol), ""
+                return self.by.reach(here, time, drives, self.tol), ""
             except FailedError:
                 try:
-                    here = self._part(here, path, time)
+                    here = self._by_better_rows(self._part(here, path, time), path)
                 except FailedError as error:
                     return here, str(error)
         return here, TOO_MANY
@@ -199,7 +210,7 @@ class _Sweep:
         for k in range(1, HALVINGS + 1):
             part = here.time + (time - here.time) * 0.5**k
             try:
-                found = self.model.reach(here, part, self.model.drives(path, np.array([part]))[:, 0], self.tol)
+                found = self.by.reach(here, part, self._drives(path, part), self.tol)
             except FailedError as error:
                 last, longer = error, None
                 continue
@@ -207,6 +218,21 @@ class _Sweep:
                 return longer
             longer = found
         raise last
+
+    def _by_better_rows(self, here: Stand, path: Path) -> Stand:
+        """Where it stands; by other rows, where its own are much nearer to singular than they were and others are not."""
+        if not (here.sigmas < LOW * here.high).any():
+            return here
+        found = self.by.anew(here, self._drives(path, here.time), self.known)
+        if found is None:
+            return replace(here, high=here.sigmas)
+        self.by, here = found
+        self.renewed += 1
+        self.known += [self.by] if self.by not in self.known else []
+        return here
+
+    def _drives(self, path: Path, time: float) -> Array:
+        return self.model.drives(path, np.array([time]))[:, 0]
 
     def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
         self.smallest_pivot = min(self.smallest_pivot, here.pivot)
@@ -227,7 +253,12 @@ class _Sweep:
             iterations=np.where(solved, tests["iterations"], 0.0).astype(np.int64),
             residual=closure,
             message="; ".join(self.messages),
-            details=self.model.details | {"redundant_residual": leftover, "smallest_pivot": self.smallest_pivot},
+            details={
+                **self.model.details,
+                "redundant_residual": leftover,
+                "smallest_pivot": self.smallest_pivot,
+                **({"rows_chosen_anew": self.renewed} if self.renewed else {}),
+            },
             bodies={
                 name: BodyMotion(bodies[:, :3, k], bodies[:, 9:13, k], *(each[:, :, k] for each in rates[:order]), *missing)
                 for k, name in enumerate(self.bodies.names)

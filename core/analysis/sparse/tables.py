@@ -86,7 +86,7 @@ class SparseTables:
         given, link = Memory(), self._link
         given.take(self._base)
         fixed = FixedOrder(order.rows.tolist(), order.columns.tolist(), len(rows))
-        factors, inverse, right = given.take(fixed.count), given.take(len(rows)), given.take(len(rows))
+        factors, inverse, right, self._sums = (given.take(size) for size in (fixed.count, *[len(rows)] * 3))
         self._factor = joined(fixed.factor(link, self._at("entries")[entries], factors, inverse, (self._zero, self._one)))
         solve, into = fixed.solve(link, factors, inverse, right), numbers(right)
 
@@ -96,6 +96,10 @@ class SparseTables:
 
         self._newton, self._velocity = solved("phi", "neg", "step"), solved("nu", "copy", "rates")
         self._acceleration = solved("gamma", "copy", "accelerations")
+        self._place, step, sums = order.row, self._at("step"), numbers(self._sums)
+        there, back = fixed.solve(link, factors, inverse, right, transposed=True), fixed.solve(link, factors, inverse, right)
+        self._transposed = joined([link.operations("copy", into[order.column], step), *there, link.operations("copy", sums, into)])
+        self._solved = joined([link.operations("copy", into, sums), *back, link.operations("copy", step, into[order.column])])
         self._pivots: Indices = factors.start + fixed.pivots
         self._multipliers: Indices = factors.start + fixed.multipliers
         memory = aligned(given.count * self.width).reshape(-1, self.width)
@@ -142,6 +146,19 @@ class SparseTables:
         """Rates and accelerations where all was last evaluated."""
         for table in (self._factor, self._velocity, self._how, self._acceleration):
             self._go(table)
+
+    def solve(self, b: Array) -> Array:
+        """By the factors as they are, of all poses: shape (n, width), in the order of the rows that are solved."""
+        self._memory[self._sums][self._place] = b
+        self._go(self._solved)
+        return self["step"].copy()
+
+    def solve_transposed(self, b: Array) -> Array:
+        """Likewise with the matrices transposed."""
+        self["step"][:] = b
+        self._go(self._transposed)
+        found: Array = self._memory[self._sums][self._place]
+        return found
 
     def _go(self, table: Words) -> None:
         self._interpret(address(self._memory), address(table))

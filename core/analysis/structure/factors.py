@@ -68,7 +68,9 @@ class Factors:
         try:
             return self._splu(matrix, diag_pivot_thresh=PIVOT_THRESHOLD, **NARROW, **options)
         except RuntimeError as error:
-            if "singular" in str(error):
+            if any(
+                said in str(error) for said in ("singular", "failed to factorize")
+            ):  # the second where numbers are lost on the way
                 raise SingularError("exactly singular") from error
             raise
 
@@ -101,6 +103,11 @@ class Factors:
         return -smallest if odd % 2 else smallest
 
     @property
+    def log_determinant(self) -> float:
+        """Of the size of the determinant."""
+        return float(np.log(np.abs(self._factors.U.diagonal())).sum())
+
+    @property
     def entries(self) -> int:
         """The number of entries of both factors together."""
         return self._factors.nnz
@@ -110,6 +117,12 @@ class Factors:
         placed = np.empty_like(b)
         placed[self._row] = b
         return self._factors.solve(placed)[self._column]
+
+    def solve_transposed(self, b: Array) -> Array:
+        """Likewise with the matrix transposed; of several right-hand sides each is a column."""
+        placed = np.empty_like(b)
+        placed[self._column] = b
+        return self._factors.solve(placed, "T")[self._row]
 
 
 def _cycles(permutation: Indices) -> int:
