@@ -47,7 +47,7 @@ def assert_right(found, values):
 def divided(monkeypatch):
     """The steps of which parts were looked for one by one."""
     aims, divide = list[float](), Marcher._divide
-    monkeypatch.setattr(Marcher, "_divide", lambda self, anchor, aim: aims.append(aim) or divide(self, anchor, aim))
+    monkeypatch.setattr(Marcher, "_divide", lambda self, anchor, aim, *rest: aims.append(aim) or divide(self, anchor, aim, *rest))
     return aims
 
 

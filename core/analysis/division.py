@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -28,14 +29,19 @@ def longest(margins: Array) -> int | None:
     return int(good[0]) if len(good) else None
 
 
-def part_of_step(here: float, wanted: float, attempt: Callable[[Array], Array], lanes: int) -> tuple[int, float] | None:
+def part_of_step(
+    here: float, wanted: float, attempt: Callable[[Array], Array], lanes: int, length: float = math.inf
+) -> tuple[int, float] | None:
     """A part of a step that can be gone: the lane that goes it, and the time where it stands then; None where none can.
 
     Args:
         attempt: sends as many lanes to as many times, longest part first; returns their margins.
+        length: of the longest part to try [s].
     """
-    for first in range(1, HALVINGS, lanes - 1):  # a part counts if its half is reached too
-        times: Array = here + (wanted - here) * 0.5 ** np.arange(float(first), first + lanes)
+    whole = wanted - here
+    longest_first = max(1, math.ceil(math.log2(abs(whole) / length))) if length < abs(whole) else 1
+    for first in range(longest_first, HALVINGS, lanes - 1):  # a part counts if its half is reached too
+        times: Array = here + whole * 0.5 ** np.arange(float(first), first + lanes)
         part = longest(attempt(times))
         if part is not None:
             return part, float(times[part])

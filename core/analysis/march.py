@@ -7,6 +7,7 @@ step succeeds the motion ends, and a message says where and why.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -183,26 +184,24 @@ class Marcher:
         for stop in self._stops(side) if self.visit else [side.count]:
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
-            few, divided, length = FEW, 0, np.inf
+            few, divided, length = FEW, 0, math.inf
             while at < stop:
                 came, early = at, self._early(number)
                 if not early and not divided:
                     at, few = self._in_parts(number, at, min(at + few, stop)), 2 * few
                 if at == came:
                     anchor, wanted = self._anchor(number), float(side.samples[0, at])
-                    here = self._stands(anchor)
-                    aim = here + float(np.clip(wanted - here, -length, length))
-                    further = "" if early else TOO_MANY if divided == MOST_PARTS else self._divide(anchor, aim)
+                    further = "" if early else TOO_MANY if divided == MOST_PARTS else self._divide(anchor, wanted, length)
                     if isinstance(further, str):
                         columns = _columns(side, at, side.count)
                         self.kept[:, columns], self.solved[columns] = np.nan, False
                         said = self._end(side, at, anchor, further)
                         return End(said, self.route, anchor, wanted, early, divided=further is TOO_MANY)
                     self.track.anchors[number] = further[self.model.ahead]
-                    divided, length = divided + 1, LONGER * abs(self._stands(further) - here)
+                    divided, length = divided + 1, LONGER * abs(self._stands(further) - self._stands(anchor))
                 beyond, at = at, self.track.follow(number, at, stop, anew=False)
                 few = FEW if at - beyond > few else few
-                divided, length = (0, np.inf) if at > came else (divided, length)
+                divided, length = (0, math.inf) if at > came else (divided, length)
             if self.visit:
                 self._stand(number, at)
         return None
@@ -260,8 +259,8 @@ class Marcher:
         if sample in self.visit:
             self.visited[sample] = self._anchor(number)
 
-    def _divide(self, anchor: Array, aim: float) -> Array | str:
-        """Go a part of a step: the lane there, or why the shortest is refused."""
+    def _divide(self, anchor: Array, aim: float, length: float) -> Array | str:
+        """Go a part of a step, no longer than a length: the lane there, or why the shortest is refused."""
         parts, every = self.model.executor(AT_ONCE), range(len(self.slots))
 
         def attempt(times: Array) -> Array:
@@ -270,7 +269,7 @@ class Marcher:
             parts.attempt()
             return parts.get([self.slots[MARGIN]])[0]
 
-        part = part_of_step(self._stands(anchor), aim, attempt, AT_ONCE)
+        part = part_of_step(self._stands(anchor), aim, attempt, AT_ONCE, length)
         lanes = parts.get(every)
         if part is None:
             return why_refused(self.model, lanes[:, np.flatnonzero(~(lanes[self.slots[MARGIN]] > 0.0))[-1]])
