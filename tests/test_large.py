@@ -4,7 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Gear, Point, Revolute, SolveError, solve
+from kincheck.core import (
+    Body,
+    Gear,
+    JointAngle,
+    JointDisplacement,
+    Point,
+    Revolute,
+    Screw,
+    SolveError,
+    Table,
+    Translational,
+    solve,
+)
 from kincheck.core.harness.bench.ring import ring
 
 Z = (0.0, 0.0, 1.0)
@@ -58,3 +70,29 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
     assert not found.solved[turn > end].any()
     assert np.abs(found.points["meet"].position[:, :2] - meet)[found.solved].max() < 1e-12
     assert found.solved.all() or "singular pose ahead" in found.message
+
+
+@pytest.mark.parametrize("cranks", [12, 22])
+@pytest.mark.parametrize("turns", [1, 2, -4])
+@pytest.mark.parametrize("count", [2, 11])
+def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
+    """A nut stands at both: where it stands says nothing of the turns, which its driver makes between them, but its lead does."""
+    whole, lead, last = ring(cranks), 0.01, 0.01
+    nut = [
+        Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), Z, lead=lead),
+        Translational("guide", "ground", "slide", (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+    ]
+    drivers = [JointDisplacement("clock", "guide"), JointAngle("index", "thread")]
+    mechanism = replace(
+        whole,
+        bodies=[*whole.bodies, Body("nut"), Body("slide")],
+        joints=[*whole.joints, *nut],
+        points=[Point("mark", "nut", (0.2, 0.0, 0.0))],
+        drivers=[*whole.drivers, *drivers],
+    )
+    rest = np.arange(-40.0, 41.0) * 0.01
+    index = Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(np.repeat([0.0, 2.0 * np.pi * turns], len(rest))))
+    found = solve(mechanism, "clock", np.linspace(0.0, last, count), rate=last, motions={"index": index})
+    assert found.solved.all(), found.message
+    assert ("factor_entries" in found.details) == (cranks > 20)
+    assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)

@@ -80,10 +80,10 @@ def test_an_order_that_serves_no_longer_is_renewed(monkeypatch, alone):
     monkeypatch.setattr(Batch, "order", lambda self, model: order(self, model) or ordered.append(self._sign[0]))
     monkeypatch.setattr(module, "GROWTH", 1.5)
     path = turning(*np.linspace(0.0, 1.5, 100))
-    found = solve_sparse(SparseModel(ring(12)), path, POINTS)
+    found = solve_sparse(SparseModel(ring(13)), path, POINTS)
     assert {*ordered} == {-1.0, 1.0}
     assert len(alone) < 35
-    assert_alike(found, one_by_one(ring(12), path))
+    assert_alike(found, one_by_one(ring(13), path))
 
 
 def stood(model: SparseModel, turn: float = 0.0) -> Stand:

@@ -42,6 +42,7 @@ class Batch:
     def __init__(self, model: SparseModel) -> None:
         # not the model, which keeps this: what refers to each other stays in memory until somebody looks for it
         self._kept, self._dropped, self._solved = model.kept, model.dropped, model.solved
+        self._angles = model.angles
         self._blocks, self._scale, self._tables = model.blocks, model.scale, SparseTables(model.elements, model.bodies)
         self.width = self._tables.width
         self.order(model)
@@ -81,7 +82,9 @@ class Batch:
             past = _past(here.state, state)
             taylor = self._taylor(past, _past(here.rates, rates), _past(here.accelerations, accelerations), times - earlier)
             gap, step = distance(state - taylor, self._scale), distance(state - past, self._scale)
-            poses = Poses(done, closure, leftover, branch, gap, step, pivot, chosen=False, turned=turned, sigmas=sigmas)
+            angles = tables["drives"][self._angles]
+            turn = np.abs(angles - _past(here.turns, angles)).max(axis=0, initial=0.0)
+            poses = Poses(done, closure, leftover, branch, gap, step, turn, pivot, chosen=False, turned=turned, sigmas=sigmas)
             sure = np.logical_and.reduce([*poses.passed(here, tol).values()])
             small = tables.growth <= GROWTH
         accepted = int(np.logical_and.accumulate((sure & small)[:count]).sum())
@@ -90,7 +93,7 @@ class Batch:
         return [
             Stand(
                 *(float(times[k]), float(earlier[k])),
-                *(state[:, k], taylor[:, k], rates[:, k], accelerations[:, k]),
+                *(state[:, k], taylor[:, k], rates[:, k], accelerations[:, k], angles[:, k]),
                 *(iterations, float(closure[k]), float(leftover[k]), float(branch[k])),
                 *(float(pivot[k]), here.largest_pivot, here.orientation, *remembered[k]),
             )

@@ -79,6 +79,7 @@ class SparseModel:
         state = np.zeros(numbering.state)
         state[3 * n : 4 * n] = 1.0
         self._turn = Turn(n, compiled=compiled)
+        self.angles = [5 * k for k, driver in enumerate(mechanism.drivers) if driver.turns]  # among the numbers of all drives
         self._rest = self.drives(Path({}, np.zeros(1)), np.zeros(1))[:, 0]
         self.elements.evaluate(state, self._rest)
         self._select()
@@ -192,10 +193,9 @@ class SparseModel:
         self._evaluate(at.state, drives)
         rates, accelerations = self._motion()
         now = replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
-        pivot, orientation = self._pivots()
-        sigmas = self._sigmas()
+        (pivot, orientation), sigmas = self._pivots(), self._sigmas()
         slopes, high = (each if len(each) else np.zeros(len(sigmas)) for each in (at.slopes, at.high))
-        now = replace(now, sigmas=sigmas, slopes=slopes, high=np.maximum(high, sigmas))
+        now = replace(now, turns=drives[self.angles], sigmas=sigmas, slopes=slopes, high=np.maximum(high, sigmas))
         return replace(now, pivot=pivot, largest_pivot=max(at.largest_pivot, pivot), orientation=orientation)
 
     def _pivots(self) -> tuple[float, bytes]:
@@ -280,6 +280,7 @@ class SparseModel:
             branch=np.array([branch]),
             gap=np.array([gap]),
             step=np.array([step]),
+            turn=np.array([np.abs(drives[self.angles] - here.turns).max(initial=0.0)]),
             pivot=np.array([pivot]),
             chosen=True,
             turned=np.array([orientation != here.orientation]),
@@ -289,7 +290,7 @@ class SparseModel:
         if failed:
             raise FailedError(self._in_words(failed, residual, tol, leftover, branch))
         (found,) = poses.remembered(here)
-        motion = time, here.time, state, taylor, rates, accelerations, iterations
+        motion = time, here.time, state, taylor, rates, accelerations, drives[self.angles], iterations
         return Stand(*motion, residual, leftover, branch, pivot, max(pivot, here.largest_pivot), orientation, *found)
 
     def _in_words(self, failed: Sequence[str], closure: float, tol: float, leftover: float = 0.0, branch: float = 1.0) -> str:

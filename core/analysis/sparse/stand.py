@@ -16,6 +16,7 @@ from ..continuity import (
     LARGEST_CORRECTION,
     LARGEST_RATIO,
     LONGEST_STEP,
+    LONGEST_TURN,
     NEGLIGIBLE,
     STEEPER,
     STEEPEST,
@@ -44,6 +45,7 @@ class Stand:
         time: of the pose; earlier: of the one before it, the same where there is none.
         state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
         rates, accelerations: of the unknowns.
+        turns: angles of the drivers that turn [rad from the design].
         closure, leftover, branch: largest residual of the rows solved and of the redundant ones, smallest branch test.
         pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see `Blocks`.
         sigmas: of the blocks (`Blocks.sigmas`); where all rows are solved, which keep the signs of their determinants, the smallest
@@ -57,6 +59,7 @@ class Stand:
     predicted: Array
     rates: Array
     accelerations: Array
+    turns: Array = field(default_factory=_none)
     iterations: int = 0
     closure: float = 0.0
     leftover: float = 0.0
@@ -76,7 +79,7 @@ class Poses:
     Attributes:
         done: whether Newton's iteration ended.
         closure, leftover, branch: see `Stand`.
-        gap: to what a Taylor step made of the pose before; step: to that.
+        gap: to what a Taylor step made of the pose before; step: to that; turn: of a driver from there, the largest.
         pivot: see `Stand`; chosen: whether pivots were chosen at each pose.
         turned: whether the orientation is another.
         sigmas: shape (poses, blocks).
@@ -88,6 +91,7 @@ class Poses:
     branch: Array
     gap: Array
     step: Array
+    turn: Array
     pivot: Array
     chosen: bool
     turned: NDArray[np.bool_]
@@ -115,6 +119,7 @@ class Poses:
             "on the branch": self.branch > 0.0,
             "continued": self.gap <= LARGEST_CORRECTION * self.step + NEGLIGIBLE,
             "near": self.step <= LONGEST_STEP,
+            "not turned round": self.turn <= LONGEST_TURN,
             "as regular": np.all(ratio, axis=1),
             "on this side": ~self.turned,
             # the signs of determinants do not say so where rows are chosen from more: they change by the choice too
