@@ -1,4 +1,4 @@
-"""Which lanes are accepted: the programs of the tests of a solution, and in words why one was not.
+"""Which lanes are accepted: the programs of the tests of a solution.
 
 gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
 alone, joined   all that is tested, and the tolerance   -> margin    positive where a lane may be accepted
@@ -10,11 +10,8 @@ from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..algebra import Scalar
 from ..program import DONE, MARGIN, Program, absolute, before, maximum, minimum, program, where_larger
-from ..trajectory import Array
 from .continuity import (
     EPSILON,
     FALLS,
@@ -24,17 +21,14 @@ from .continuity import (
     LONGEST_STEP,
     LONGEST_TURN,
     NEGLIGIBLE,
-    ROUNDING,
     STEEPER,
     STEEPEST,
     TURNED,
     WORSE,
 )
-from .equations.drives import turns
 from .request import ACCEPT, BLOCKS, FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, SLOPE, by_block
 
 if TYPE_CHECKING:
-    from .model import Model
     from .programs import Tracer
 
 ALONE, JOINED = ("alone_gaps", "alone"), ("joined_gaps", "joined")
@@ -78,7 +72,7 @@ def _margin(tracer: Tracer, name: str, *, neighbours: bool) -> Program:
         sigma_before, turned_before = before(sigma, sigma_before), before(turned, turned_before)
     moved, blocks, slopes = read(MOVED), list[Block](), dict[str, Scalar]()
     for which, label in zip(by_block(SIGMA, tracer.blocks), by_block(SLOPE, tracer.blocks), strict=True):
-        size, size_before, slope = read(which), read(FROM + which), _slope(read, label)
+        size, size_before, slope = read(which), read(FROM + which), steepness(read, label)
         if neighbours:
             size_before = before(size, size_before)
         found = where_larger(moved, NEGLIGIBLE, absolute(size - size_before) / moved, 0.0)
@@ -142,56 +136,7 @@ def _between(sigma: Scalar, sigma_before: Scalar, slope: Scalar, moved: Scalar) 
     return sigma + sigma_before - minimum(STEEPER * slope, STEEPEST) * moved
 
 
-def _slope(read: Callable[[str], Scalar], label: str) -> Scalar:
+def steepness(read: Callable[[str], Scalar], label: str) -> Scalar:
     """How steeply sigma of a block changed so far; as much as may be, where nothing is known of that."""
     found = read(FROM + label)
     return where_larger(found, 0.0, found, STEEPEST)
-
-
-SINGULAR = ("as regular", "on this side", "regular between", "certain", "not turned by rounding")
-"""The tests that a lane fails where a singular pose is ahead."""
-
-
-def why_refused(model: Model, lane: Array) -> str:
-    """Why a lane was not accepted, with the number found.
-
-    Args:
-        lane: all its slots.
-    """
-
-    def read(name: str) -> float:
-        return float(lane[model.slots[name]])
-
-    names = zip(by_block(SIGMA, model.blocks), by_block(SLOPE, model.blocks), strict=True)
-    blocks = [(read(name), read(FROM + name), max(_slope(read, label), read(label))) for name, label in names]
-    angles = turns(model.mechanism, model.request.drivers)
-    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), blocks, angles)
-    failed = [name for name, margin in found.items() if not margin > 0.0]
-    closure, leftover, branch, tol = (read(name) for name in ("closure", "leftover", "branch", "tolerance"))
-    return in_words(failed, closure, leftover, branch, tol, model.selection.account.redundant_rows)
-
-
-def in_words(failed: Sequence[str], closure: float, leftover: float, branch: float, tol: float, redundant: Sequence[str]) -> str:
-    """Why a pose was refused that failed so many tests.
-
-    Args:
-        closure, leftover, branch, tol: what the tests are of.
-        redundant: names of rows.
-    """
-    if not np.isfinite(closure):
-        return "Newton diverges to numbers that are not finite"
-    if "on the branch" in failed:
-        return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
-    if "closed" in failed and closure <= ROUNDING:
-        return f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance {tol:.3g} is less; allow more"
-    if "closed" in failed:
-        return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
-    if "consistent" in failed:
-        return f"the redundant rows ({', '.join(redundant)}) contradict the others by {leftover:.3g}"
-    if any(name in failed for name in SINGULAR):
-        return "there is a singular pose ahead"
-    if failed == ["converged"]:
-        return f"Newton does not settle, residual {closure:.3g} of the mechanism's size"
-    if not set(failed) - {"near", "not turned round"}:
-        return "the step to it is too long to be believed"
-    return "Newton jumps to another assembly"

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from ..program import MARGIN, Side
 from ..trajectory import Array
-from .acceptance import why_refused
 from .division import AT_ONCE, LONGER, MOST_PARTS, TOO_MANY, part_of_step
 from .model import Model
+from .refusal import why_refused
 from .request import FROM, LARGEST_SIGMA, SIGMA, TIME, accept_by, remembered
 from .route import AS_THEY_ARE, Route
 

@@ -23,10 +23,10 @@ from ...errors import SolveError
 from ...mechanism import Mechanism
 from ...motions import Path
 from ...trajectory import Array
-from ..acceptance import in_words
 from ..equations.constraints import constraints, measured
 from ..equations.drives import drive_numbers
 from ..model import CLOSED, MAX_ITERATIONS
+from ..refusal import in_words
 from ..structure.driven import locked_drivers, require_driven
 from ..structure.factors import Factors, Indices, SingularError
 from ..structure.freedom import counted
