@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.analysis.continuity import ROUNDING, continuous
+from ..core.analysis.continuity import LONGEST_TURN, ROUNDING, continuous
 from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
@@ -46,6 +46,7 @@ class _Sample:
     """A solved pose: everything the walk needs to go on from there."""
 
     t: float
+    c: Array  # of the drivers
     saved: Any
     x: Array
     v: Array
@@ -99,7 +100,8 @@ class Walk:
     ) -> None:
         self.model, self.case, self.tol, self.corrections, self.frame = model, case, tol, corrections, frame
         self.drivers = [driver.name for driver in case.mechanism.drivers]
-        self.units = np.array([[1.0 if driver.turns else frame.unit] for driver in case.mechanism.drivers])
+        self.turns = np.array([driver.turns for driver in case.mechanism.drivers], dtype=np.bool_)
+        self.units = np.where(self.turns, 1.0, frame.unit)[:, None]
         self.size = size(case) / frame.unit
         self.lost = LOST  # why the last pose that was looked for was not found
         model.reset()
@@ -177,7 +179,7 @@ class Walk:
             return None
         position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
         sums = self.independent @ jacobian
-        return _Sample(t, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), sums, *done)
+        return _Sample(t, c, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), sums, *done)
 
     def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
         """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t).
@@ -202,7 +204,12 @@ class Walk:
         return at, True
 
     def connected(self, at: _Sample, new: _Sample) -> bool:
-        """Whether the points that are watched, and all coordinates, went from one pose to the other as their rates say."""
+        """Whether the points that are watched, and all coordinates, went from one pose to the other as their rates say.
+
+        Where all stands still they say nothing of a driver that made whole turns in between.
+        """
+        if np.abs(new.c - at.c)[self.turns].max(initial=0.0) > LONGEST_TURN:
+            return False
         dt = np.float64(new.t - at.t)
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
         return bool(watched & continuous(dt * at.v + new.corrected, new.v, at.v, dt, self.size))
