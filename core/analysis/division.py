@@ -39,10 +39,10 @@ def part_of_step(
         length: of the longest part to try [s].
     """
     whole = wanted - here
-    longest_first = max(1, math.ceil(math.log2(abs(whole) / length))) if length < abs(whole) else 1
-    for first in range(longest_first, HALVINGS, lanes - 1):  # a part counts if its half is reached too
+    start = max(1, math.ceil(math.log2(abs(whole) / length))) if 0.0 < length < abs(whole) else 1
+    for first in range(start, HALVINGS, lanes - 1):  # a part counts if its half is reached too
         times: Array = here + whole * 0.5 ** np.arange(float(first), first + lanes)
-        part = longest(attempt(times))
+        part = longest(attempt(times)[: HALVINGS + 1 - first])
         if part is not None:
             return part, float(times[part])
     return None
