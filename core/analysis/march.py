@@ -152,7 +152,7 @@ class Marcher:
         self.track = self.grid.track
         self.counts = [side.count for side in self.grid.sides]
         self._finer: list[Grid] = []
-        self.small = [self.model.ahead.index(self.slots[FROM + name]) for name in (SIGMA, LARGEST_SIGMA)]
+        self.sigmas = [self.model.ahead.index(self.slots[FROM + name]) for name in (SIGMA, LARGEST_SIGMA)]
 
     def finer(self) -> Iterator[Grid]:
         """Grids of parts of the steps; each is made when it is first needed."""
@@ -208,7 +208,7 @@ class Marcher:
 
     def _early(self, number: int) -> bool:
         """Whether to leave off where a side stands; see `march`."""
-        sigma, largest = self.track.anchors[number, self.small]
+        sigma, largest = self.track.anchors[number, self.sigmas]
         return self.crossing or bool(sigma < self.low * largest)
 
     def _in_parts(self, number: int, at: int, stop: int) -> int:
