@@ -187,6 +187,24 @@ def test_the_other_cases_of_a_bad_one_are_run_and_recorded(kincheck_main, capsys
     assert message.partition(":")[0].replace("_", r"\_") in capsys.readouterr().out
 
 
+def test_a_night_in_which_no_case_can_be_read_is_recorded(kincheck_main, capsys, tmp_path, monkeypatch):
+    """Else the report would judge the night before, and its files would stand there as those of this one."""
+    monkeypatch.chdir(tmp_path)
+    files = ["--out", "out", "--junit", "junit.xml", "--markdown", "cases.md", "--history", "history"]
+    for _ in range(2):
+        assert kincheck_main("run", "crank", *files) == 0
+    assert kincheck_main("run", "nosuch", *files) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("there is no case 'nosuch'") == 1
+    assert captured.out.endswith("nothing was run\n1 case could not be read: nosuch\n")
+    found = read_results(Path("out/results.json"))
+    assert (found.records, found.missing) == ([], [("nosuch", "native", "projection")])
+    assert [test.get("name") for test in ElementTree.parse("junit.xml").iter("testcase")] == ["never made"]
+    assert "1 case could not be read: nosuch" in Path("cases.md").read_text()
+    assert kincheck_main("report", "--history", "history") == 1
+    assert "never made" in capsys.readouterr().out
+
+
 def test_an_option_that_is_wrong_ends_a_run_and_the_bad_cases_are_told_too(kincheck_main, capsys):
     RIGHT.solves = 0
     assert kincheck_main("run", "crank", "nosuch", "--engine", "nativ", engines=[RIGHT]) == 2

@@ -184,7 +184,8 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     engines, baseline = _engines(options, house, problems)
     problems += to.problems(history=options.history)
     problems = problems or isolation.unreachable(options)
-    if problems or not cases:
+    # what could not be read at all is recorded too, where records are kept: a night that ran nothing is not the night before
+    if problems or not (cases or to.wanted or options.history is not None):
         raise KincheckError("\n".join([*unread.values(), *problems]))
     complain(line for message in unread.values() for line in message.splitlines())
     return _Plan(cases, engines, baseline, {visible(name): visible(message, also="\n") for name, message in unread.items()})

@@ -45,6 +45,11 @@ class Destinations:
         """Return the destinations that a command's options name."""
         return cls(**{each.name: getattr(options, each.name, None) for each in fields(cls)})
 
+    @property
+    def wanted(self) -> bool:
+        """Whether there are any."""
+        return any(getattr(self, each.name) is not None for each in fields(self))
+
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
         """What cannot be written, found before the work and not after it; makes the folder, for files of these names."""
         found, files = list[str](), list[Named]()

@@ -13,7 +13,7 @@ from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
-from .wording import motion_unit, notes, signs
+from .wording import motion_unit, notes, signs, unread
 
 NOT_ASKED = "–"
 
@@ -42,11 +42,12 @@ def to_markdown(results: Results) -> str:
     versions = {record.engine: record.version for record in results.records if record.version}
     head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
     lines = [line for each in signs(results.run) for line in (escaped(f"{each}."), "")]
-    lines += [row(map(escaped, head)), row(["---"] * len(head))]
+    lines += [row(map(escaped, head)), row(["---"] * len(head))] if rows else []
     for case, records in rows.items():
         cells = (escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escaped(_reading(results))}."]
+    lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
     lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
     lines += [
         escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")

@@ -14,7 +14,7 @@ from ...trajectory import QUANTITIES
 from .. import printing
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
-from .wording import motion_unit, notes, signs
+from .wording import motion_unit, notes, signs, unread
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
@@ -41,7 +41,8 @@ def print_table(results: Results, file: TextIO) -> None:
         # texts, not strings: those would be taken for mark-up, in which [red] is a colour
         case, engine, judge = (Text(visible(each)) for each in (record.case, engine, truth(record)))
         table.add_row(case, engine, outcome, *errors, judge, time)
-    console.print(table)
+    if results.records:
+        console.print(table)
     print_messages(results, console)
 
 
@@ -59,6 +60,8 @@ def print_messages(results: Results, console: Console) -> None:
         console.print(Text(visible(f"{outcome}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
     console.print(", ".join(f"{count} {outcome}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
+    if said := unread(results.run):
+        console.print(Text(visible(said), style="bold red"), soft_wrap=True)
 
 
 def truth(record: Record) -> str:

@@ -51,6 +51,12 @@ def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [(case, note) for case, facts in run.get("cases", {}).items() for note in facts.get("notes", ())]
 
 
+def unread(run: Mapping[str, Any]) -> str:
+    """Which cases could not be read, by the circumstances of a run; empty where all could."""
+    names = run.get("unread", {})
+    return f"{len(names)} {'case' if len(names) == 1 else 'cases'} could not be read: {', '.join(names)}" if names else ""
+
+
 def motion_unit(unit: str, motion: str) -> str:
     """The unit of a motion's derivative, e.g. m/s for a velocity in m."""
     return unit + PER_TIME[QUANTITIES.index(motion)].replace("^2", "²")
