@@ -6,9 +6,11 @@ the exact ones where a joint has others to make up for it; what must agree is wh
 
 import numpy as np
 import pytest
+from kincheck.core import MechanismError
 from kincheck.core import joints as library
 from kincheck.core.algebra import Quat, Vec3
 from kincheck.core.joints import Attachment, Joint
+from kincheck.core.joints.base import direction
 from kincheck.core.primitives.base import Pose, Twist
 
 from . import naive
@@ -172,3 +174,13 @@ def test_exchanged_bodies(name):
     here = here[: len(exchanged)]
     assert np.abs(exchanged - exchanged @ np.linalg.pinv(here) @ here).max() < 1e-13
     assert np.abs(there.each("phi")).max() < 1e-14
+
+
+@pytest.mark.parametrize("annotation", ["tuple[float, float, float]", "Vector", tuple[float, float, float]])
+def test_a_field_of_several_numbers_says_what_they_are(annotation):
+    """Else it were taken for a number, and no specimen but its default tried."""
+    body = {"__annotations__": {"axis": annotation}, "axis": (0.0, 0.0, 1.0), "freedoms": ("rotation",)}
+    with pytest.raises(MechanismError, match=r"Mine: axis holds several numbers, .*; declare it as axis: ... = pos"):
+        type("Mine", (Joint,), body)
+    kept = {"__annotations__": {"axis": annotation, "known": "ClassVar[tuple[str, ...]]"}, "axis": direction(), "known": ()}
+    assert issubclass(type("Mine", (Joint,), kept), Joint)

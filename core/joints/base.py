@@ -12,6 +12,7 @@ from copy import copy
 from dataclasses import MISSING, dataclass, field, fields
 from enum import Enum
 from functools import partial
+from inspect import get_annotations
 from typing import Any, ClassVar, Self
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
@@ -81,6 +82,12 @@ class Attachment:
         return P - self.origin
 
 
+def _several(annotation: Any) -> bool:
+    """Whether a field that is annotated so holds several numbers, and is no attribute of the class."""
+    text = str(annotation)
+    return "ClassVar" not in text and any(each in text for each in ("tuple", "Tuple", "list", "List", "Sequence", "Vector", "Vec3"))
+
+
 def register(registry: dict[str, Any], cls: Any) -> None:
     """Have case files know a type by its name. The same class may be declared anew: a module loaded again, a cell run again.
 
@@ -120,6 +127,13 @@ class Joint(ABC):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
+        for name, said in get_annotations(cls).items():
+            default = cls.__dict__.get(name)
+            if _several(said) and "kind" not in getattr(default, "metadata", {}):
+                raise MechanismError(
+                    f"{cls.__name__}: {name} holds several numbers, and it is not said which; declare it as "
+                    f"{name}: ... = position(), direction(), positions() or directions()"
+                )
         if "type" in cls.__dict__:
             register(Joint.registry, cls)
 
