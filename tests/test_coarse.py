@@ -65,9 +65,12 @@ def test_or_in_parts_that_are_looked_for_one_by_one(values, divided, monkeypatch
     assert divided
 
 
-def test_a_step_too_long_for_all_equal_parts_is_divided(divided):
+def test_a_step_too_long_for_all_equal_parts_is_divided(divided, monkeypatch):
     """Its parts are of more than a radian."""
-    value = np.array([1.2 * FINER[-1]])
+    value = np.array([1.2 * FINER[1]])
+    assert_right(swept(value), value)
+    assert not divided
+    monkeypatch.setattr(march, "FINER", FINER[:2])
     assert_right(swept(value), value)
     assert divided
 

@@ -27,7 +27,7 @@ from .route import AS_THEY_ARE, Route
 
 # A step that fails is gone in so many equal parts, or in more where that fails: each takes a tenth of a microsecond, and a hundred
 # where it is looked for by itself. They are kept ready for sweeps of up to so many parts: longer ones are seldom coarse.
-FINER, ROOM = (8, 64), 4096
+FINER, ROOM = (8, 64, 512, 4096), 8192
 # So many steps are gone in parts before the next is tried whole; twice as many where that fails each time.
 FEW = 4
 
@@ -277,5 +277,6 @@ class Marcher:
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
         sigma, last = float(anchor[self.slots[FROM + SIGMA]]), float(side.samples[0, at - 1]) if at else None
-        reason += f"; smallest singular value there about {sigma:.3g} (zero at a lock-up or dead centre)"
+        if reason is not TOO_MANY:
+            reason += f"; smallest singular value there about {sigma:.3g} (zero at a lock-up or dead centre)"
         return self.route.path.ended(self._stands(anchor), float(side.samples[0, at]), last, reason)
