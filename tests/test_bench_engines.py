@@ -16,6 +16,7 @@ from kincheck.core.harness.bench.diagrams import precision_diagram
 from kincheck.core.harness.bench.engines_report import report
 from kincheck.core.harness.bench.pages import page
 from kincheck.core.harness.case import Truth
+from kincheck.core.harness.circumstances import THREADS
 from kincheck.core.harness.commands import bench as command
 from kincheck.core.harness.engine import Floor
 from kincheck.core.harness.record import Outcome
@@ -192,7 +193,7 @@ def test_results_are_read_as_they_were_written(tmp_path):
 
 @pytest.fixture
 def one_thread(monkeypatch):
-    monkeypatch.setenv(engines.THREADS[0], "1")
+    monkeypatch.setenv(THREADS[0], "1")
 
 
 @pytest.mark.usefixtures("one_thread")
@@ -232,7 +233,7 @@ def test_plain_bench_is_everything(monkeypatch, tmp_path):
 
 
 def test_linear_algebra_has_one_thread(monkeypatch):
-    for name in engines.THREADS:
+    for name in THREADS:
         monkeypatch.delenv(name, raising=False)
     started = []
     monkeypatch.setattr(
@@ -241,7 +242,7 @@ def test_linear_algebra_has_one_thread(monkeypatch):
     assert cli.main(shlex.split("bench engines --rounds 2")) == 5
     ((arguments, env),) = started
     assert arguments[-4:] == ["bench", "engines", "--rounds", "2"]
-    assert {env[name] for name in engines.THREADS} == {"1"}
+    assert {env[name] for name in THREADS} == {"1"}
 
 
 @pytest.mark.usefixtures("one_thread")

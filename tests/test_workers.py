@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from kincheck.core.harness.attempt import here
+from kincheck.core.harness.circumstances import THREADS
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.limits import Limits
@@ -106,6 +107,26 @@ def test_a_worker_stays_for_its_engine_and_is_replaced_after_a_crash():
     assert os.getpid() != a == b
     assert crash is None
     assert b != c == d
+
+
+@pytest.mark.parametrize("given", [None, "2"])
+def test_linear_algebra_has_one_thread_unless_it_is_told_how_many(monkeypatch, given):
+    """Two that wait for each other on a busy machine made Exudyn's steps 30 times as long."""
+    started, start = list[str](), subprocess.Popen
+    for name in THREADS:
+        if given is None:
+            monkeypatch.delenv(name, raising=False)
+        else:
+            monkeypatch.setenv(name, given)
+
+    def noted(*command, **options):
+        started.extend(options["env"][name] for name in THREADS)
+        return start(*command, **options)
+
+    monkeypatch.setattr(subprocess, "Popen", noted)
+    (record,) = run([crank("a")], [Elsewhere()], tol=TOL, solver=in_workers(1, PATIENT)).records
+    assert record.outcome is Outcome.PASS
+    assert started == [given or "1"] * len(THREADS)
 
 
 def test_what_a_pair_leaves_behind_is_not_charged_to_another():

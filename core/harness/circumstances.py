@@ -22,6 +22,9 @@ from .compare import as_numbers
 from .record import OutputSeries, Record, Results
 from .waiting import waited
 
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Environment variables by which linear algebra learns how many threads it may use, when numpy is loaded."""
+
 
 def results(
     cases: Sequence[Case],

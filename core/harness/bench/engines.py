@@ -13,7 +13,7 @@ import msgspec
 from ...errors import KincheckError
 from ...program.llvm import compiler
 from ..case import Case
-from ..circumstances import circumstances
+from ..circumstances import THREADS, circumstances
 from ..engine import Engine
 from ..reporting.measures import Effort
 from ..run import NATIVE
@@ -28,8 +28,6 @@ from .scaling import Scaling
 from .size import Size, measure_sizes
 
 NAME = "bench"
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Environment variables by which linear algebra learns how many threads it may use, once numpy is loaded."""
 PARTS = ("work", "batch", "size", "processes")
 """What may be measured: work against precision, cost against batch size and mechanism size, first use and memory."""
 

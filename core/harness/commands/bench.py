@@ -85,10 +85,11 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
     from ..bench import formulation as bench_formulation
     from ..bench.engines_report import report
     from ..bench.pages import deliver
+    from ..circumstances import THREADS
     from ..reporting.deliver import json_only
 
-    if not any(name in os.environ for name in bench_engines.THREADS):
-        return _with_one_thread(options.command, bench_engines.THREADS)
+    if not any(name in os.environ for name in THREADS):
+        return _with_one_thread(options.command, THREADS)
     problems = _destinations(options, bench_engines.NAME)
     unread: dict[str, str] = {}
     cases = {name: found for name in options.cases for found in house.find_cases([name], unread)}

@@ -15,7 +15,7 @@ from threading import Lock, Thread, Timer
 from typing import IO, BinaryIO, cast
 
 from ..attempt import Attempt, Facts, Failure, bounded
-from ..circumstances import readable
+from ..circumstances import THREADS, readable
 from ..record import Outcome
 from .frames import pack, read, write
 from .limits import STARTUP, Limits
@@ -60,6 +60,8 @@ class Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            # threads that wait for each other, and for those of other workers, would be the simulators' times
+            env={**dict.fromkeys(THREADS, "1"), **os.environ},
             start_new_session=True,  # the terminal's interrupt is for the parent; and its children can be killed with it
         )
         self._in, self._out = cast(BinaryIO, self.process.stdin), cast(BinaryIO, self.process.stdout)
