@@ -69,7 +69,8 @@ def test_every_type_says_what_it_does(own_joint_types):
 
 
 def test_rows_and_freedoms():
-    assert {name: rows_of(cls) for name, cls in Joint.registry.items()} == ROWS
+    ours = {name: cls for name, cls in Joint.registry.items() if cls.__module__.startswith("kincheck.")}
+    assert {name: rows_of(cls) for name, cls in ours.items()} == ROWS
     for name, rows in ROWS.items():
         assert f"  {rows} row" in lines()[name]
         assert f"  {6 - rows} free" in lines()[name]

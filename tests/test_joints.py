@@ -4,13 +4,15 @@ The joints are discovered; a type without an example here, or without its equati
 the exact ones where a joint has others to make up for it; what must agree is what they forbid.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
-from kincheck.core import MechanismError
+from kincheck.core import Body, JointAngle, Mechanism, MechanismError, Point, PointCoordinate, SolveError, solve
 from kincheck.core import joints as library
 from kincheck.core.algebra import Quat, Vec3
 from kincheck.core.joints import Attachment, Joint
-from kincheck.core.joints.base import direction
+from kincheck.core.joints.base import direction, position
 from kincheck.core.primitives.base import Pose, Twist
 
 from . import naive
@@ -184,3 +186,24 @@ def test_a_field_of_several_numbers_says_what_they_are(annotation):
         type("Mine", (Joint,), body)
     kept = {"__annotations__": {"axis": annotation, "known": "ClassVar[tuple[str, ...]]"}, "axis": direction(), "known": ()}
     assert issubclass(type("Mine", (Joint,), kept), Joint)
+
+
+@dataclass(frozen=True)
+class Unmeasured(Joint):
+    """A hinge that names its freedom, and does not say how it is measured."""
+
+    type = "unmeasured"
+    freedoms = ("rotation",)
+    point: tuple[float, float, float] = position()
+    axis: tuple[float, float, float] = direction()
+
+    def primitives(self, i, j):
+        return library.Revolute(self.name, self.i, self.j, self.point, self.axis).primitives(i, j)
+
+
+def test_a_joint_that_measures_no_coordinate_cannot_be_driven():
+    hinge, point = Unmeasured("h", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), Point("p", "a", (1.0, 0.0, 0.0))
+    with pytest.raises(SolveError, match=r"driver 't' \(joint_angle\): joint 'h' is unmeasured, which measures no .*AxialJoint"):
+        solve(Mechanism("m", [Body("a")], [hinge], [point], [JointAngle("t", "h")]), "t", [0.0])
+    driven = Mechanism("m", [Body("a")], [hinge], [point], [PointCoordinate("t", "p", (0.0, 1.0, 0.0))])
+    assert solve(driven, "t", [0.5]).points["p"].position[0] == pytest.approx([0.75**0.5, 0.5, 0.0], abs=1e-15)

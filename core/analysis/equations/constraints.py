@@ -193,7 +193,12 @@ def _driven(mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, m
         arm = frame.arm(point.body, point.position)
         return Constraint(driver.name, p.DrivenCoordinate(unit(driver.direction), arm, drive), GROUND, point.body)
     joint = mechanism.joint(driver.joint) if isinstance(driver, JointDriver) else None
-    if not isinstance(joint, AxialJoint) or not isinstance(driver, JointDriver):
+    if joint is not None and not isinstance(joint, AxialJoint):
+        raise SolveError(
+            f"driver {driver.name!r} ({driver.type}): joint {joint.name!r} is {joint.type}, which measures no coordinate; "
+            "derive its class from kincheck.core.joints.base.AxialJoint, or drive a point"
+        )
+    if joint is None or not isinstance(driver, JointDriver):
         raise SolveError(f"driver {driver.name!r} ({driver.type}) is of a kind the native formulation cannot drive")
     if mixed:
         return Relation(driver.name, {f"{joint.name}.{driver.freedom}": 1.0}, drive)
