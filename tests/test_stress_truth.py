@@ -5,13 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import solve
+from kincheck.core import SolveError, solve
+from kincheck.core.errors import KincheckError
 from kincheck.core.harness.case import Output
 from kincheck.core.harness.probe import probes
 from kincheck.core.harness.stress.conditions import NotStatedError, conditions
 from kincheck.core.harness.stress.evaluation import Evaluator, Poses
 from kincheck.core.harness.stress.extended import extended
 from kincheck.core.harness.stress.families.base import as_case
+from kincheck.core.harness.stress.families.degenerate import WRONG
 from kincheck.core.harness.stress.families.pairs import beside, beside_motion
 from kincheck.core.harness.stress.families.planar import (
     any_plane,
@@ -205,3 +207,17 @@ def test_a_proof_is_about_rows_that_are_good_at_the_sample():
     case = cases.load("bennett")
     truth = followed(replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 45.0, 90.0]))))
     assert distance_from_proof(truth, 2) < 1e-2
+
+
+@pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
+def test_what_is_no_mechanism_is_refused_by_its_reason(make, reasons):
+    """The reasons are searched for in messages: one that is worded anew is to be worded anew here too."""
+
+    def solved():
+        mechanism = make(np.random.default_rng(7))
+        found = solve(mechanism, mechanism.drivers[0].name, [-0.3, 0.3])
+        if not found.solved.all():
+            raise SolveError(found.message)
+
+    with pytest.raises(KincheckError, match=reasons):
+        solved()

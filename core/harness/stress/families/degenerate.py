@@ -128,7 +128,7 @@ def _same_ball_twice(rng: Rng) -> Mechanism:
 
 WRONG: tuple[tuple[Callable[[Rng], Mechanism], str], ...] = (
     (_rod_between_coincident_points, "coincide|0 m"),
-    (_rod_of_length_zero, "length 0"),
+    (_rod_of_length_zero, "length is 0"),
     (_link_between_coincident_points, "length 0"),
     (_axis_of_zero, "axis is zero"),
     (_axis_not_finite, "not finite"),
