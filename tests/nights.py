@@ -6,6 +6,8 @@ import random
 import msgspec
 from kincheck.core.harness.history.store import Store
 from kincheck.core.harness.record import Seconds
+from kincheck.core.harness.regression.report import regressions
+from kincheck.core.harness.regression.subject import find, find_against
 from kincheck.core.harness.run import run
 
 from .fakes import Fake, crank, off
@@ -74,3 +76,9 @@ def nights(path, count, seed=1):
     noise = random.Random(seed)
     for _ in range(count):
         keep(path, records(noise=noise))
+
+
+def reported(path, run=None, against="last-green"):
+    with Store(path, writable=False) as store:
+        subject = find(run, store)
+        return regressions(subject, *find_against(against, subject, store), store)

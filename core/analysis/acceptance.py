@@ -104,8 +104,8 @@ def margins(
         read: a scalar of the lane by its name.
         sigma_before, turned_before: of where it is predicted from.
         largest: the largest estimate of sigma so far.
-        turns: names of the angles of drivers.
         blocks: of the rows. Of one loop sigma may stay as small as it is while another's, which is larger, falls to nothing.
+        turns: names of the angles of drivers that turn.
     """
     tol, consistent, crossing = (read(label) for label in ACCEPT)
     closure, sigma, turned = (read(label) for label in ("closure", SIGMA, ORIENTATION))
@@ -117,13 +117,18 @@ def margins(
         "on the branch": read("branch"),
         "continued": LARGEST_CORRECTION * read(MOVED) + NEGLIGIBLE - read(GAP),
         "near": LONGEST_STEP - read(REACH),
-        "not turned round": reduce(minimum, (LONGEST_TURN - absolute(read(name) - read(FROM + name)) for name in turns), 1.0),
+        **({"not turned round": reduce(minimum, (_unturned(read, name) for name in turns))} if turns else {}),
         "as regular": reduce(minimum, (_as_regular(size, size_before) for size, size_before, _ in blocks)) + crossing,
         "on this side": 0.5 - absolute(turned - turned_before) + crossing,
         "regular between": reduce(minimum, (_between(*block, read(MOVED)) for block in blocks)) + crossing,
         "certain": FOLLOWED * sigma * sigma - uncertain,
         "not turned by rounding": maximum(TURNED * sigma * sigma - uncertain, sigma_before - sigma),
     }
+
+
+def _unturned(read: Callable[[str], Scalar], angle: str) -> Scalar:
+    """Positive where a driver has turned by so little that no turn is lost."""
+    return LONGEST_TURN - absolute(read(angle) - read(FROM + angle))
 
 
 def _as_regular(sigma: Scalar, sigma_before: Scalar) -> Scalar:

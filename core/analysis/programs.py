@@ -130,9 +130,6 @@ class Tracer:
             # iterations end by this: a pose is off by the residual over sigma, and the next one by the square of that
             self.layout.scalar("residual"): largest(phi) * maximum(1.0, FIRM / maximum(self._factor.sigma, EPSILON)),
             self.layout.scalar(SIGMA): self._factor.sigma,
-            **{
-                self.layout.scalar(name): each for name, each in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)
-            },
             self.layout.scalar(ORIENTATION): self._factor.orientation,
         }
         out |= {self.layout.scalar(name): x for name, x in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)}
