@@ -23,7 +23,13 @@ class Blocks:
     """
 
     def __init__(self, rows: Indices, columns: Indices, n: int, *, well_chosen: bool = True) -> None:
-        """Args: whether rows were chosen for being well conditioned; without, the largest block's singular values say nothing."""
+        """Find the blocks.
+
+        Args:
+            rows, columns: of the entries of the pattern.
+            n: rows, and columns, of the matrix.
+            well_chosen: rows were chosen for being well conditioned; without, the largest block's singular values say nothing.
+        """
         self._well_chosen = well_chosen
         sparse: Any = importlib.import_module("scipy.sparse")
         graphs: Any = importlib.import_module("scipy.sparse.csgraph")

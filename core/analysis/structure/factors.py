@@ -68,9 +68,8 @@ class Factors:
         try:
             return self._splu(matrix, diag_pivot_thresh=PIVOT_THRESHOLD, **NARROW, **options)
         except RuntimeError as error:
-            if any(
-                said in str(error) for said in ("singular", "failed to factorize")
-            ):  # the second where numbers are lost on the way
+            # the second where numbers are lost on the way
+            if any(said in str(error) for said in ("singular", "failed to factorize")):
                 raise SingularError("exactly singular") from error
             raise
 
@@ -104,7 +103,7 @@ class Factors:
 
     @property
     def log_determinant(self) -> float:
-        """Of the size of the determinant."""
+        """The logarithm of the size of the determinant."""
         return float(np.log(np.abs(self._factors.U.diagonal())).sum())
 
     @property
