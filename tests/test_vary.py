@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import CaseError
-from kincheck.core.harness.study.variation import CHUNK, Law
+from kincheck.core.harness.study.variation import DRAWN, Law
 from kincheck.core.harness.study.vary import read_variation
 
 from .fakes import crank
@@ -93,11 +93,12 @@ def test_a_line_follows_the_positions_it_goes_through(tmp_path):
 
 def test_a_variant_is_known_by_seed_and_index(tmp_path):
     found = vary(tmp_path, crank(), tip={"at": "tip", "sigma": [1.0, 0, 0]}, pivot={"at": "pivot", "half_width": [0, 3.0, 0]})
-    whole = np.hstack([found.offsets(5, chunk, CHUNK) for chunk in range(40)])
-    np.testing.assert_array_equal(found.offsets(5, 2, 7), whole[:, 2 * CHUNK : 2 * CHUNK + 7])
+    whole = np.hstack([found.offsets(5, first, DRAWN) for first in range(0, 40 * DRAWN, DRAWN)])
+    for first, count in ((2 * DRAWN, 7), (250, 600), (513, 1)):
+        np.testing.assert_array_equal(found.offsets(5, first, count), whole[:, first : first + count])
     for index in (0, 255, 256, 9999):
         np.testing.assert_array_equal(found.of_variant(5, index), whole[:, index])
-    assert not np.isin(whole, found.offsets(6, 0, CHUNK)).any()
+    assert not np.isin(whole, found.offsets(6, 0, DRAWN)).any()
     assert len(np.unique(whole)) == whole.size
     # standard errors of 10240 draws: 0.7 % of a standard deviation, 1 % of a mean; five of them
     assert whole[0].std() == pytest.approx(1e-3, rel=0.035)

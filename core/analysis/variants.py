@@ -68,15 +68,17 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     _recycle()
     model = route.model
     kept, closes = _together(route, geometry, tol)
-    closure = kept[model.rows["closure"].start]
-    failed = np.flatnonzero(np.isnan(closure).any(axis=0))
+    closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
+    solved = ~np.isnan(closure)
+    failed = np.flatnonzero(~solved.all(axis=0))
     again = failed[closes[failed]]
     if FINER[0] * len(closure) <= ROOM:
         for first in range(0, len(again), SOME):
             some = again[first : first + SOME]
             filled = np.resize(some, SOME)  # the executor of as many is kept
             kept[:, :, some] = _together(route, geometry[:, filled], tol, FINER[0])[0][:, :, : len(some)]
-    solved, messages = ~np.isnan(closure), dict[int, str]()
+            solved[:, some] = ~np.isnan(closure[:, some])
+    messages = dict[int, str]()
     for k in failed[~solved[:, failed].all(axis=0)].tolist():
         if not closes[k]:
             messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
@@ -87,7 +89,6 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             kept_rows, others = len(model.selection.kept), len(model.selection.dropped)
             rows = [OTHER_ROWS.format(count=kept_rows, all=kept_rows + others)] if others else []
             messages[k] = "; ".join([*found.messages, BY_ITSELF, *rows])
-    closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
     doubted = np.zeros_like(solved)
     # the worst of all first: to judge each takes a twentieth of the time
     if doubtful(np.fmin.reduce(sigma, axis=None, initial=1.0), np.fmax.reduce(closure, axis=None, initial=0.0), tol):

@@ -19,7 +19,6 @@ from ...motions import Path
 from ...trajectory import Array
 from ..compare import size
 from .study import Ready
-from .variation import CHUNK
 
 STEP = 2e-4
 # What gradients are to be good for: the error relative to the largest gradient of the output by a coordinate of the same unit.
@@ -61,7 +60,7 @@ def gradients(ready: Ready) -> Gradients:
     found = np.empty((count, len(study.rows), n + from_design))
     apart = np.empty_like(found)
     messages = dict[int, str]()
-    at_once = max(1, min(CHUNK, ready.lanes) // len(MOVES))
+    at_once = max(1, ready.lanes // len(MOVES))
     for first in range(0, count, at_once):
         some = np.arange(first, min(first + at_once, count))
         offsets = np.zeros((count, len(some), len(MOVES)))

@@ -23,9 +23,7 @@ Chunks: TypeAlias = Generator[Chunk]
 Source: TypeAlias = Callable[[Study], Chunks]
 """Solves the chunks of a study somewhere: gives each once, in order."""
 
-# Chunks of a task on a cluster: a chunk takes milliseconds, and a task costs the scheduler about one.
-OF_A_TASK = 16
-# Tasks that are under way for each thread: one is solved, one waits, and results come back in order.
+# Chunks that are under way for each thread: one is solved, one waits, and results come back in order.
 AHEAD = 3
 
 
@@ -65,15 +63,14 @@ def on_cluster(address: str) -> Source:
         name = f"kincheck-sweep-{uuid4().hex}"  # the scheduler takes equal names for one and the same task
         with connected(distributed, address) as client, _explained(distributed, address):
             waiting = deque[Any]()
-            for first in range(0, study.chunks, OF_A_TASK):
-                last = min(first + OF_A_TASK, study.chunks)
-                task: Any = client.submit(solve_there, packed, first, last, VERSION, key=f"{name}-{first}", pure=False)
+            for index in range(study.chunks):
+                task: Any = client.submit(solve_there, packed, index, VERSION, key=f"{name}-{index}", pure=False)
                 waiting.append(task)
                 # asked each time: workers may come and go
                 if len(waiting) >= AHEAD * max(1, sum(client.nthreads().values())):
-                    yield from waiting.popleft().result()
+                    yield waiting.popleft().result()
             while waiting:
-                yield from waiting.popleft().result()
+                yield waiting.popleft().result()
 
     return solve
 
@@ -97,8 +94,8 @@ _ready: OrderedDict[bytes, Ready] = OrderedDict()
 _lock = Lock()
 
 
-def solve_there(packed: bytes, first: int, last: int, version: str) -> list[Chunk]:
-    """Solve chunks in a cluster's worker, which keeps the compiled model for the next ones.
+def solve_there(packed: bytes, index: int, version: str) -> Chunk:
+    """Solve a chunk in a cluster's worker, which keeps the compiled model for the next ones.
 
     Raises:
         ClusterError: the worker has another version of kincheck.
@@ -114,4 +111,4 @@ def solve_there(packed: bytes, first: int, last: int, version: str) -> list[Chun
             if len(_ready) > 2:
                 _ready.popitem(last=False)
         ready = _ready[key]
-    return [ready.chunk(index) for index in range(first, last)]
+    return ready.chunk(index)

@@ -14,16 +14,23 @@ from ...analysis.equations.geometry import placed
 from ...analysis.model import Model, compile_model
 from ...analysis.request import Request
 from ...analysis.route import Route
-from ...analysis.variants import solve_variants
+from ...analysis.variants import RECYCLED, solve_variants
 from ...jet import Jet
 from ...motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..case import Case, Quantity
 from .reduce import Summary, merged, summary
-from .variation import CHUNK, Mode, Stream, Variation, generator
+from .variation import DRAWN, Mode, Stream, Variation, drawn
 
-# Bytes of motions at once, of one thread: many samples of many points are solved in parts of a chunk.
-ROOM = 64_000_000
+# Variants that are solved together: what Python adds to each is lost among as many.
+TOGETHER = 1024
+# Bytes of motions at once, of one thread: many samples of many points are solved fewer at a time. As many are used again.
+ROOM = RECYCLED
+# Draws of the largest chunk: where chunks are solved in threads, each costs the others' a pause of Python's lock, and on a cluster
+# the scheduler a millisecond.
+OF_A_CHUNK = 16
+# A study has as many chunks at least, if it has as many draws: threads and workers share them.
+CHUNKS = 64
 # Messages of a chunk that are passed on; all variants without a solution are counted.
 MOST_MESSAGES = 50
 
@@ -71,9 +78,14 @@ class Study:
     whole: bool = False
 
     @property
+    def of_a_chunk(self) -> int:
+        """Variants of a chunk, which is solved in one thread and reduced there; all that are stored are held a draw at a time."""
+        return DRAWN if self.whole else DRAWN * min(OF_A_CHUNK, max(1, self.samples // (CHUNKS * DRAWN)))
+
+    @property
     def chunks(self) -> int:
         """How many chunks the variants are in."""
-        return -(-self.samples // CHUNK)
+        return -(-self.samples // self.of_a_chunk)
 
     @cached_property
     def rows(self) -> tuple[ReducedQuantity, ...]:
@@ -149,7 +161,7 @@ class Ready:
     @property
     def lanes(self) -> int:
         """Variants that are solved at once."""
-        return max(8, min(CHUNK, ROOM // (8 * self.model.kept * len(self.route.path.times))))
+        return max(8, min(TOGETHER, ROOM // (8 * self.model.kept * len(self.route.path.times))))
 
     @cached_property
     def nominal(self) -> Array:
@@ -195,10 +207,10 @@ class Ready:
 
     def chunk(self, index: int) -> Chunk:
         """Solve a chunk."""
-        study, first = self.study, index * CHUNK
-        count = min(CHUNK, study.samples - first)
-        offsets = study.variation.offsets(study.seed, index, count)
-        chosen = generator(study.seed, index, Stream.SUBSET).random(CHUNK)[:count] < study.subset
+        study, first = self.study, index * self.study.of_a_chunk
+        count = min(study.of_a_chunk, study.samples - first)
+        offsets = study.variation.offsets(study.seed, first, count)
+        chosen = drawn(study.seed, Stream.SUBSET, first, count, lambda random: random.random(DRAWN)) < study.subset
         parts, picked, kept = list[Summary](), dict[int, Array](), list[Array]()
         unsolved: list[Unsolved] = []
         effects: list[Array] = []

@@ -1,24 +1,23 @@
 """How a design is varied: independent coordinates, what each moves, and the numbers of every variant by its index.
 
-A variant is known by seed and index alone: the draws of a chunk come from a generator of its own, whose seed sequence is the
-study's spawned by the chunk's index, so that any machine can make any chunk, and one variant can be made again by itself.
+A variant is known by seed and index alone: `DRAWN` of them are drawn by a generator of their own, whose seed sequence is the
+study's spawned by their place, so that any machine can make any variants, and one can be made again by itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...trajectory import Array
 
-CHUNK = 256
-"""Variants that are drawn and solved together; part of what a seed means, and no setting for that reason."""
+DRAWN = 256
+"""Variants that are drawn together; part of what a seed means, and no setting for that reason."""
 
 
 class Mode(StrEnum):
@@ -38,7 +37,7 @@ class Law(StrEnum):
 
 
 class Stream(IntEnum):
-    """What a chunk draws random numbers for; each has a generator of its own."""
+    """What random numbers are drawn for; each has generators of its own."""
 
     GEOMETRY = 0
     SUBSET = 1
@@ -114,22 +113,19 @@ class Variation:
         numbers = iter(self.geometry(offsets[:, None])[:, 0].tolist())
         return {place: tuple(next(numbers) for _ in range(size)) for place, size in self.places.items()}
 
-    def offsets(self, seed: int, chunk: int, count: int) -> Array:
-        """Offsets of the first `count` variants of a chunk from the nominal design [units], shape (coordinates, count)."""
+    def offsets(self, seed: int, first: int, count: int) -> Array:
+        """Offsets of variants from the nominal design [units], shape (coordinates, count)."""
         if self.mode is Mode.MONTE_CARLO:
-            return self._drawn(seed, chunk)[:, :count]
-        return self._listed(chunk * CHUNK + np.arange(count))
+            return drawn(seed, Stream.GEOMETRY, first, count, self._draw)
+        return self._listed(first + np.arange(count))
 
     def of_variant(self, seed: int, index: int) -> Array:
         """Offsets of one variant [units], shape (coordinates,)."""
-        chunk, k = divmod(index, CHUNK)
-        return self.offsets(seed, chunk, k + 1)[:, k]
+        return self.offsets(seed, index, 1)[:, 0]
 
-    def _drawn(self, seed: int, chunk: int) -> Array:
-        """A whole chunk, however much of it is wanted: what a variant is must not depend on how many there are."""
-        random = generator(seed, chunk, Stream.GEOMETRY)
+    def _draw(self, random: np.random.Generator) -> Array:
         rows = [
-            each.scale * (random.standard_normal(CHUNK) if each.law is Law.NORMAL else random.uniform(-1.0, 1.0, CHUNK))
+            each.scale * (random.standard_normal(DRAWN) if each.law is Law.NORMAL else random.uniform(-1.0, 1.0, DRAWN))
             for each in self.coordinates
         ]
         return np.array(rows)
@@ -154,6 +150,17 @@ class Variation:
         return np.array([row for row, _ in pairs], dtype=np.int64), np.array([value for _, value in pairs])
 
 
-def generator(seed: int, chunk: int, stream: Stream) -> Any:
-    """The random numbers of a chunk: Philox, seeded by the chunk-th child of the study's seed sequence."""
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(chunk, int(stream)))))
+def drawn(seed: int, stream: Stream, first: int, count: int, draw: Callable[[np.random.Generator], Array]) -> Array:
+    """Random numbers of variants, the last axis.
+
+    Args:
+        draw: makes those of `DRAWN` variants, always of as many, for what a variant is must not depend on how many are wanted.
+    """
+    places = range(first // DRAWN, -(-(first + count) // DRAWN))
+    found = np.concatenate([draw(_generator(seed, place, stream)) for place in places], axis=-1)
+    return found[..., first - places.start * DRAWN :][..., :count]
+
+
+def _generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
+    """Philox, seeded by a child of the study's seed sequence: the place-th draw of a stream."""
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream)))))
