@@ -20,17 +20,17 @@ from ...motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..case import Case, Quantity
 from .reduce import Summary, merged, summary
-from .variation import DRAWN, Mode, Stream, Variation, generator
+from .variation import Mode, Stream, Variation, generator
 
 # Variants that are solved together: what Python adds to each is lost among as many.
 TOGETHER = 1024
 # Bytes of motions at once, of one thread: many samples of many points are solved fewer at a time. As many are used again.
 ROOM = RECYCLED
-# Draws of the largest chunk: where chunks are solved in threads, each costs the others' a pause of Python's lock, and on a cluster
-# the scheduler a millisecond.
-OF_A_CHUNK = 16
-# A study has as many chunks at least, if it has as many draws: threads and workers share them.
-CHUNKS = 64
+# A study is in so many chunks for threads and workers to share, as far as that makes none smaller than the least, nor larger than
+# the most: each costs the other threads a pause of Python's lock, and on a cluster the scheduler a millisecond.
+CHUNKS, LEAST, MOST = 64, 64, 4096
+# Where the values of all variants are stored, so many are held at once.
+MOST_STORED = 256
 # Messages of a chunk that are passed on; all variants without a solution are counted.
 MOST_MESSAGES = 50
 
@@ -79,8 +79,9 @@ class Study:
 
     @property
     def of_a_chunk(self) -> int:
-        """Variants of a chunk, which is solved in one thread and reduced there; all that are stored are held a draw at a time."""
-        return DRAWN if self.whole else DRAWN * min(OF_A_CHUNK, max(1, self.samples // (CHUNKS * DRAWN)))
+        """Variants of a chunk, which is solved and reduced in one thread; told by the study alone, so that sums are the same."""
+        share = self.samples // CHUNKS
+        return min(MOST_STORED if self.whole else MOST, max(LEAST, share - share % LEAST))
 
     @property
     def chunks(self) -> int:
