@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, Universal, solve
+from kincheck.core import Body, ConstantVelocity, Distance, Inline, JointAngle, Mechanism, Point, Revolute, Universal, solve
 
 Z, ORIGIN, ROD = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.8
 
@@ -195,3 +195,19 @@ def test_a_small_loop_does_not_hide_the_corner_of_a_large_one(count, style):
     assert found.solved.all(), found.message
     side = side_of_the_line((x, y), rest, turn, found)
     assert (side * side[0] > 0.0).all()
+
+
+def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
+    """The rates interpolated at the pose are worse than the pose; they are not wanted, and what is beyond is solved as anywhere."""
+    joints = [
+        Revolute("hinge", "ground", "crank", (0.9, -0.2, 0.0), (-0.9, -0.1, -1.6)),
+        ConstantVelocity("joint", "crank", "shaft", (0.1, -1.0, 0.0), ((0.1, 0.6, -0.1), (-0.5, 2.2, 1.3))),
+        Inline("groove", "shaft", "ground", (0.4, -1.0, 0.5), (-0.9, 0.9, -0.3)),
+    ]
+    point = Point("tip", "shaft", (-0.1, 1.7, 1.3))
+    mechanism = Mechanism("groove", [Body("crank"), Body("shaft")], joints, [point], [JointAngle("turn", "hinge")])
+    found = [solve(mechanism, "turn", [0.0, 1.0], order=order) for order in range(3)]
+    assert [each.solved.all() for each in found] == [True] * 3
+    assert all("crosses a singular pose" in each.details["notes"][0] for each in found)
+    for each in found[1:]:
+        np.testing.assert_allclose(each.points["tip"].position, found[0].points["tip"].position, rtol=0.0, atol=1e-12)

@@ -29,6 +29,7 @@ from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path
 from kincheck.core.program import NODES
 
+from .mechanisms import four_bar
 from .test_chain import LEAN, chain
 
 TOL = 1e-12
@@ -171,6 +172,20 @@ def test_a_variant_that_does_not_close_says_so():
     found = solve_variants(Route(model, PATHS["one side"]), np.array([[0.32, 0.05]]), TOL)
     assert found.solved.all(axis=0).tolist() == [True, False]
     assert found.messages[1].startswith("does not close at its design position; check")
+
+
+@pytest.mark.parametrize("values", [[0.0], [0.1, 0.0, -0.1]])
+def test_a_variant_that_cannot_move_is_not_solved_at_its_design_either(values):
+    """A four-bar of four hinges with the last one tilted: it closes where it is, and is a frame."""
+    mechanism, tilts = four_bar(), np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 1e-3], [0.1, 1.0, 0.0]])
+    found = solve_designs(mechanism, "turn", values, {"joints.D.axis": tilts}, order=2)
+    assert found.solved.tolist() == [[True] * len(values), *[[False] * len(values)] * 2]
+    assert np.isnan(found.points["C"].velocity[1:]).all()
+    assert sorted(found.messages) == [1, 2]
+    for k, message in found.messages.items():
+        with pytest.raises(SolveError) as own:
+            solve(placed(mechanism, {"joints.D.axis": tuple(tilts[k])}), "turn", values)
+        assert message == str(own.value)
 
 
 def test_designs_are_solved_as_one_by_one():

@@ -14,13 +14,18 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SolveError
+from ..mechanism import Mechanism
 from ..motions import Path
 from ..program import Executor
 from ..trajectory import Array
 from .continuity import doubtful
+from .equations.geometry import placed, places
 from .march import FINER, ROOM, march
+from .model import Model
 from .request import SIGMA, accept_by
 from .route import Route
+from .structure.driven import require_driven
 
 # Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
 # it is too long is solved again alone.
@@ -89,6 +94,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             kept_rows, others = len(model.selection.kept), len(model.selection.dropped)
             rows = [OTHER_ROWS.format(count=kept_rows, all=kept_rows + others)] if others else []
             messages[k] = "; ".join([*found.messages, BY_ITSELF, *rows])
+    for k, message in _held(route, geometry, solved).items():
+        kept[:, :, k], solved[:, k], messages[k] = np.nan, False, message
     doubted = np.zeros_like(solved)
     # the worst of all first: to judge each takes a twentieth of the time
     if doubtful(np.fmin.reduce(sigma, axis=None, initial=1.0), np.fmax.reduce(closure, axis=None, initial=0.0), tol):
@@ -101,6 +108,33 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         )
         messages[k] = "; ".join(filter(None, [messages.get(k, ""), f"{refused}solve this variant by itself, or keep away from it"]))
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
+
+
+def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int, str]:
+    """Variants that cannot move, and what holds them.
+
+    At its design every variant closes. Where rows that are redundant at the nominal design hold it there, those that are solved
+    give it rates all the same, and the residuals do not tell: only where it has gone somewhere do they.
+
+    Args:
+        solved: shape (n, V), by time.
+    """
+    model, found = route.model, dict[int, str]()
+    if not (model.selection.dropped and route.from_design):
+        return found
+    away = route.path.times[route.order] != route.start
+    for k in np.flatnonzero(solved.any(axis=0) & ~solved[away].any(axis=0)).tolist():
+        try:
+            require_driven(_variant(model, geometry[:, k]))
+        except SolveError as error:
+            found[k] = str(error)
+    return found
+
+
+def _variant(model: Model, numbers: Array) -> Mechanism:
+    """The mechanism with the numbers of a variant at the varied places."""
+    known, given = places(model.mechanism), iter(numbers.tolist())
+    return placed(model.mechanism, {name: [next(given) for _ in known[name]] for name in model.request.varied})
 
 
 def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tuple[Array, NDArray[np.bool_]]:

@@ -55,12 +55,13 @@ def onward(route: Route, lane: Array, times: Array) -> Route:
     return Route(route.model, Path(route.path.motions, times, route.path.design), arrived(route.model, lane), since)
 
 
-def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | None) -> Bridge | None:
+def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | None, *, rates: bool = True) -> Bridge | None:
     """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not known well enough.
 
     Args:
         near: a lane that stands there, where the motion was followed to, at or right before the singular pose: it must be on the
             same curve. Without one, only what is interpolated may be believed, and not that the motion goes on.
+        rates: whether they are wanted there too. To go on beyond the pose itself is enough, whatever a request wants elsewhere.
     """
     model = route.model
     speed = float(np.abs(lane[model.vectors[FROM + RATE]]).max())
@@ -73,7 +74,8 @@ def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | Non
         closure, sigma = (whole[model.rows[name].start] for name in ("closure", SIGMA))
         own = WORSE * float((np.maximum(closure, EPSILON) / sigma).max())
         differences = np.abs(whole @ (EIGHT - SIX))
-        off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in _scales(model, whole, speed))])
+        scales = _scales(model, whole, speed, rates=rates)
+        off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in scales)])
         if off <= AMPLIFIED * tol and (near is None or _on_curve(route, lanes, near)):
             kept = whole @ EIGHT
             tests = slice(model.rows[TESTS[0]].start, None)
@@ -104,7 +106,7 @@ def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
     return bool((off <= known + WORSE * solved.error[0, 0]).all())
 
 
-def _scales(model: Model, kept: Array, speed: float) -> Iterator[tuple[slice, float]]:
+def _scales(model: Model, kept: Array, speed: float, *, rates: bool) -> Iterator[tuple[slice, float]]:
     """Rows of every motion and what errors of it are measured by: the mechanism's size, and the motion's own where it is a rate."""
     for name, rows in model.rows.items():
         label = name.split(" ")[0]
@@ -112,5 +114,7 @@ def _scales(model: Model, kept: Array, speed: float) -> Iterator[tuple[slice, fl
             continue
         length = model.frame.unit if label in (*QUANTITIES, "r", "rdot", "rddot") else 1.0
         order = 1 if label in ("velocity", "rdot", "omega") else 2 if label in ("acceleration", "rddot", "omega_t") else 0
+        if order and not rates:
+            continue
         own = float(np.abs(kept[rows]).max()) if order else 0.0
         yield rows, max(own, length * speed**order)

@@ -151,7 +151,7 @@ class Followed:
         if len(self.passages) == MOST:
             return None
         lane = self.before(here, side, number) if number is not None else end.route.departure
-        passed = bridge(end.route, lane, here, self.tol, end.lane) if lane is not None else None
+        passed = bridge(end.route, lane, here, self.tol, end.lane, rates=False) if lane is not None else None
         if passed is None:
             return None
         self.passages.append(Passage(end.lane, here, end.route))
