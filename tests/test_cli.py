@@ -18,6 +18,7 @@ from kincheck.core.harness.console import how_to_install
 from kincheck.core.harness.reading.results import read_results
 from kincheck.core.harness.reporting.caveats import caveats
 from kincheck.core.harness.reporting.report import headline
+from kincheck.core.version import VERSION
 
 from .fakes import Fake, crank, off, partial, raising
 
@@ -257,6 +258,14 @@ def test_the_version_is_that_of_the_installation(capsys):
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out == f"kincheck {kincheck.core.__version__}\n"
     assert kincheck.core.__version__ == importlib.metadata.version("kincheck")
+
+
+def test_the_package_is_the_command_too(tmp_path):
+    module = [sys.executable, "-m", "kincheck"]
+    done = subprocess.run([*module, "--version"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == f"kincheck {VERSION}\n"
+    wrong = subprocess.run([*module, "run", "no_such_case"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (wrong.returncode, wrong.stderr[:9]) == (2, "kincheck:")
 
 
 def test_a_command_loads_no_other():
