@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ...errors import shortened
-from ..reporting.wording import motion_unit, number, product
+from ..reporting.wording import motion_unit, number, product, unread_count
 from .findings import Finding, Kind, Loose, Regressions, Step
 
 LONGEST = 12
@@ -48,9 +48,12 @@ def headline(found: Regressions) -> str:
     if found.against is None:
         failing = f"{len(found.failing)} of {found.pairs} not right" if found.failing else f"all {found.pairs} right"
         # with nothing to compare with there are no other regressions
-        failing += f", {len(found.regressions)} never made" if found.regressions else ""
-        return f"{found.run.name}: {failing}; compared with nothing: {found.reason}"
-    counts = [f"{len(pairs(found, kind))} {_plural(kind, found)}" for kind in Kind if kind.regression and pairs(found, kind)]
+        never = _counted(found, Kind.LOST)
+        rest = [f"{never} never made"] if never else []
+        rest += [unread_count(len(found.unread))] if found.unread else []
+        return f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing: {found.reason}"
+    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if kind.regression and _counted(found, kind)]
+    counts += [unread_count(len(found.unread))] if found.unread else []
     said = ", ".join(counts) or "nothing regressed"
     fixed = len(pairs(found, Kind.FIXED))
     known = len(found.failing) - len(pairs(found, Kind.FAILURE))
@@ -68,6 +71,11 @@ def versions(found: Regressions) -> list[str]:
 def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
     """The pairs that findings of a kind are about."""
     return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
+
+
+def _counted(found: Regressions, kind: Kind) -> int:
+    """How many pairs findings of a kind are about; without those of a case that could not be read, which is one fault."""
+    return sum(case not in found.unread for case, _, _ in pairs(found, kind))
 
 
 def _plural(kind: Kind, found: Regressions) -> str:

@@ -21,7 +21,7 @@ from .caveats import COMPARED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
-from .wording import TRUTHS, against, engine_name, known, number, output_label, product
+from .wording import TRUTHS, against, engine_name, known, number, output_label, product, unread_count
 
 NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
@@ -145,7 +145,7 @@ def headline(results: Results) -> str:
             else "The one comparison is within tolerance"
         )
     said += f", {broken} could not be completed" if broken else ""
-    said += f"; {unread} {'case' if unread == 1 else 'cases'} could not be read" if unread else ""
+    said += f"; {unread_count(unread)}" if unread else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
 
 

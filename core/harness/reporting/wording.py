@@ -54,7 +54,12 @@ def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
 def unread(run: Mapping[str, Any]) -> str:
     """Which cases could not be read, by the circumstances of a run; empty where all could."""
     names = run.get("unread", {})
-    return f"{len(names)} {'case' if len(names) == 1 else 'cases'} could not be read: {', '.join(names)}" if names else ""
+    return f"{unread_count(len(names))}: {', '.join(names)}" if names else ""
+
+
+def unread_count(count: int) -> str:
+    """So many cases could not be read."""
+    return f"{count} {'case' if count == 1 else 'cases'} could not be read"
 
 
 def motion_unit(unit: str, motion: str) -> str:
