@@ -171,11 +171,13 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     unread: dict[str, str] = {}
     cases = house.find_cases(named, unread, list(probes()) if options.joints else [], foreign.supplied(options))
     foreign.tell_left_out(cases)
+    unused: list[str] = []
     if options.reference and not problems:
         from ..references import judged_by
 
         try:
-            cases = judged_by(cases, options.reference)
+            # a reference names its case, which may be the one that cannot be read: that ends no run of the others
+            cases = judged_by(cases, options.reference, unused if unread else None)
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, house, problems)
@@ -184,7 +186,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     # what could not be read at all is recorded too, where records are kept: a night that ran nothing is not the night before
     if problems or not (cases or to.wanted or options.history is not None):
         raise KincheckError("\n".join([*unread.values(), *problems]))
-    complain(line for message in unread.values() for line in message.splitlines())
+    complain(line for message in (*unread.values(), *unused) for line in message.splitlines())
     return _Plan(cases, engines, baseline, {visible(name): visible(message, also="\n") for name, message in unread.items()})
 
 
