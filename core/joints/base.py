@@ -20,6 +20,7 @@ from ..errors import MechanismError
 from ..given import held, plain, require_direction, require_finite, triple
 from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
+from ..primitives.base import GROUND_POSE
 
 
 class Kind(Enum):
@@ -212,6 +213,12 @@ class Joint(ABC):
     def notes(self) -> Sequence[str]:
         """What a reader of results should know of its geometry: where it can be meant, and yet be a mistake."""
         return ()
+
+    @property
+    def gap(self) -> float:
+        """Largest residual at the design position [m or -]: zero, but where lengths contradict points."""
+        here = Attachment(ZERO)
+        return max(abs(x) for each in self.primitives(here, here) for x in each.phi(GROUND_POSE, GROUND_POSE))
 
     @property
     def rows(self) -> int:
