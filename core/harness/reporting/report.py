@@ -124,7 +124,9 @@ def headline(results: Results) -> str:
     """The run in one sentence."""
     records, unread = results.records, len(results.unread)
     missing = sum(case not in results.unread for case, _, _ in results.missing)
-    compared, broken = [record for record in records if judged([record]) or _lost(record)], _count(records, *BROKEN)
+    # of a failure there may be no deviation at all: no sample, or no output, has a value
+    compared = [record for record in records if judged([record]) or record.outcome is Outcome.FAIL]
+    broken = _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
     within = [record for record in failed if all(each.within for each in record.errors.values())]  # where there is a deviation
     outside, without = len(failed) - len(within), sum(map(_lost, within))
