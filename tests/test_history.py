@@ -222,11 +222,27 @@ def test_a_run_keeps_how_long_it_was_kept_waiting(path):
     assert math.isclose(entry.seconds, 0.006)
 
 
+def test_what_has_no_value_in_any_run_is_not_drawn(path, tmp_path):
+    def past(error, time):
+        return [Past(run=run, engine="native", max_error=error, us_per_step=time) for run in ("1", "2")]
+
+    assert [*trend_figures(past(None, 2.0), {})] == ["time"]
+    assert [*trend_figures(past(0.0, None), {})] == ["error"]
+    assert trend_figures(past(None, None), {}) == {}
+    keep(path, [msgspec.structs.replace(each, errors={}, us_per_step=None) for each in records()])
+    assert history(path, "--plot", tmp_path / "trends.html") == 0
+    text = (tmp_path / "trends.html").read_text()
+    assert "1 run, oldest first" in text
+    assert text.count("No engine has solved it in these runs.") == 2
+    assert "data-figure" not in text.split('id="plotly"')[0]
+
+
 def test_times_that_are_close_are_drawn_over_a_decade():
     """Else a tenth looks like a step; a decade or more is drawn as it is."""
-    for factor, spread in ((1.1, 1.0), (20.0, None)):
+    for factor, spread, ticks in ((1.1, 1.0, "D2"), (20.0, None, "D2"), (2000.0, None, 1)):
         past = [Past(run=str(k), engine="native", max_error=None, us_per_step=time) for k, time in enumerate((2.0, 2.0 * factor))]
         axis = trend_figures(past, {})["time"]["layout"]["yaxis"]
+        assert axis["dtick"] == ticks  # 1, 2 and 5 of a few decades
         if spread is None:
             assert "range" not in axis
         else:

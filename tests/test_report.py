@@ -17,6 +17,8 @@ from kincheck.core import solve
 from kincheck.core.harness.bench.ring import ring
 from kincheck.core.harness.record import Deviation, Deviations, Results
 from kincheck.core.harness.reporting.axis import SAMPLES
+from kincheck.core.harness.reporting.figures import SYMBOLS
+from kincheck.core.harness.reporting.measures import Past
 from kincheck.core.harness.reporting.report import headline, write_report
 from kincheck.core.harness.reporting.wording import number
 
@@ -262,6 +264,23 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
     [drawn] = traces(page, "case-0-0-position", "one", "lines+markers")
     assert max(drawn["y"]) == pytest.approx(1e-7, rel=5e-3)
     assert "Thinned figures: strut" in page.text
+
+
+def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
+    runs = [Past(run=str(k), engine="one", max_error=1e-9, us_per_step=2.0) for k in range(2)]
+    for past, drawn in ((runs[1:], False), (runs, True)):
+        write_report(results(), tmp_path / "report.html", history={"strut": past})
+        text = (tmp_path / "report.html").read_text("utf-8")
+        assert ("<h3>Earlier runs</h3>" in text, "case-0-trend-error" in text) == (drawn, drawn)
+
+
+def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
+    """What the legend shows is what is drawn: symbols without one would all be told by the same cross."""
+    records = [record("strut", "closed_form", f"engine {k}", 1e-12, GRID) for k in range(len(SYMBOLS))]
+    write_report(Results(run={}, records=records), tmp_path / "report.html")
+    legend = (tmp_path / "report.html").read_text("utf-8").split("Curves shown")[1].split("</div>")[0]
+    shapes = [each.partition("/>")[2] for each in re.findall(r"<svg(.*?)</svg>", legend, re.DOTALL)]
+    assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
 
 
 def test_an_empty_run_says_so(tmp_path: Path) -> None:
