@@ -283,6 +283,13 @@ def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
     assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
 
 
+def test_what_could_not_be_read_comes_first_and_how_it_was_made_last(tmp_path: Path) -> None:
+    run = {**results().run, "unread": {"gone.toml": "gone.toml: schema: found 'x'"}, "processor": "an abacus"}
+    text = report(msgspec.structs.replace(results(), run=run), tmp_path).text
+    places = [text.index(words) for words in ("not read", "gone.toml: schema", "Overview", "Largest deviations", "an abacus")]
+    assert places == sorted(places)
+
+
 def test_an_empty_run_says_so(tmp_path: Path) -> None:
     empty = Results(run={}, records=[])
     assert headline(empty) == "Nothing was compared"

@@ -81,6 +81,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
             problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
             not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
             circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
+            unread=given.results.unread,
             settings=_settings(records),
             styles=styles,
             cases=cases,
