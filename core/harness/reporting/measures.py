@@ -60,7 +60,10 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
         # a category each: a date would otherwise become a place on a calendar, and runs of one night one point
         names = [plain(run) for run in runs]
         curves = [_curve(style, names, [values.get((style.name, run)) for run in runs]) for style in drawn]
-        return {"data": curves, "layout": {"xaxis": {"type": "category", "zeroline": False, "nticks": 6}, "hovermode": "x unified"}}
+        return {
+            "data": curves,
+            "layout": {"xaxis": {"type": "category", "zeroline": False, "nticks": 6, "tickangle": -30}, "hovermode": "x unified"},
+        }
 
     errors = figure({(each.engine, each.run): _finite(each.max_error) for each in history})
     times = figure({(each.engine, each.run): _finite(each.us_per_step) for each in history})
