@@ -199,7 +199,8 @@ def _standard(
 
 def _band_caption(standard: OutputSeries, tolerance: float, whose: str) -> str:
     band = "narrower than the line" if band_is_thin(standard, tolerance) else "the grey band"
-    return f"Tolerance ±{number(tolerance)} {standard.unit} around the {whose}: {band}."
+    unit = "" if standard.unit == "1" else f" {standard.unit}"
+    return f"Tolerance ±{number(tolerance)}{unit} around the {whose}: {band}."
 
 
 def _worst_caption(deviations: Sequence[Judged], axis: Axis) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from ...trajectory import PER_TIME, QUANTITIES
-from ..case import Truth
+from ..case import PER_TRAVEL, Truth
 from ..record import Deviation, Record
 
 TRUTHS = {
@@ -34,6 +34,8 @@ def product(engine: str, mode: str) -> str:
 
 def output_label(name: str) -> str:
     """An output's name as suspension engineers write it."""
+    if name.endswith(PER_TRAVEL):
+        return f"{output_label(name.removesuffix(PER_TRAVEL))} per travel"
     return _LABELS.get(name, name.replace("_", " "))
 
 
