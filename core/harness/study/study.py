@@ -20,7 +20,7 @@ from ...motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..case import Case, Quantity
 from .reduce import Summary, merged, summary
-from .variation import DRAWN, Mode, Stream, Variation, drawn
+from .variation import DRAWN, Mode, Stream, Variation, generator
 
 # Variants that are solved together: what Python adds to each is lost among as many.
 TOGETHER = 1024
@@ -210,7 +210,7 @@ class Ready:
         study, first = self.study, index * self.study.of_a_chunk
         count = min(study.of_a_chunk, study.samples - first)
         offsets = study.variation.offsets(study.seed, first, count)
-        chosen = drawn(study.seed, Stream.SUBSET, first, count, lambda random: random.random(DRAWN)) < study.subset
+        chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
         parts, picked, kept = list[Summary](), dict[int, Array](), list[Array]()
         unsolved: list[Unsolved] = []
         effects: list[Array] = []

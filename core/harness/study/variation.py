@@ -6,7 +6,7 @@ study's spawned by their place, so that any machine can make any variants, and o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from functools import cached_property
@@ -116,14 +116,21 @@ class Variation:
     def offsets(self, seed: int, first: int, count: int) -> Array:
         """Offsets of variants from the nominal design [units], shape (coordinates, count)."""
         if self.mode is Mode.MONTE_CARLO:
-            return drawn(seed, Stream.GEOMETRY, first, count, self._draw)
+            return self._drawn(seed, first, count)
         return self._listed(first + np.arange(count))
 
     def of_variant(self, seed: int, index: int) -> Array:
         """Offsets of one variant [units], shape (coordinates,)."""
         return self.offsets(seed, index, 1)[:, 0]
 
+    def _drawn(self, seed: int, first: int, count: int) -> Array:
+        places = range(first // DRAWN, -(-(first + count) // DRAWN))
+        found = np.concatenate([self._draw(generator(seed, place, Stream.GEOMETRY)) for place in places], axis=1)
+        skipped = first - places.start * DRAWN
+        return found[:, skipped : skipped + count]
+
     def _draw(self, random: np.random.Generator) -> Array:
+        """A whole draw, however much of it is wanted: what a variant is must not depend on how many there are."""
         rows = [
             each.scale * (random.standard_normal(DRAWN) if each.law is Law.NORMAL else random.uniform(-1.0, 1.0, DRAWN))
             for each in self.coordinates
@@ -150,17 +157,6 @@ class Variation:
         return np.array([row for row, _ in pairs], dtype=np.int64), np.array([value for _, value in pairs])
 
 
-def drawn(seed: int, stream: Stream, first: int, count: int, draw: Callable[[np.random.Generator], Array]) -> Array:
-    """Random numbers of variants, the last axis.
-
-    Args:
-        draw: makes those of `DRAWN` variants, always of as many, for what a variant is must not depend on how many are wanted.
-    """
-    places = range(first // DRAWN, -(-(first + count) // DRAWN))
-    found = np.concatenate([draw(_generator(seed, place, stream)) for place in places], axis=-1)
-    return found[..., first - places.start * DRAWN :][..., :count]
-
-
-def _generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
+def generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
     """Philox, seeded by a child of the study's seed sequence: the place-th draw of a stream."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream)))))
