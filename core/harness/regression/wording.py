@@ -19,9 +19,10 @@ NAMED = 4
 
 @dataclass(frozen=True)
 class Row:
-    """One or several findings of an engine that say the same.
+    """One or several findings that say the same.
 
     Attributes:
+        engine: the engine, or the engines.
         more: how many further findings the pair has of that kind.
     """
 
@@ -85,7 +86,7 @@ def _plural(kind: Kind, found: Regressions) -> str:
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
-    """Findings of one kind: a pair once, with the worst of its ratios; pairs that say the same together."""
+    """Findings of one kind: a pair once, with the worst of its ratios; cases, then engines, that say the same together."""
     by_pair: dict[tuple[str, str, str], list[Finding]] = {}
     for finding in findings:
         by_pair.setdefault((finding.case, finding.engine, finding.mode), []).append(finding)
@@ -93,7 +94,10 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
     for (case, engine, mode), each in by_pair.items():
         first = max(each, key=lambda finding: finding.ratio or 0.0)
         alike.setdefault((product(engine, mode), first.message, first.since, len(each) - 1), []).append(case)
-    return [Row(engine, cases, message, since, more) for (engine, message, since, more), cases in alike.items()]
+    engines: dict[tuple[tuple[str, ...], str, int | None, int], list[str]] = {}
+    for (engine, message, since, more), cases in alike.items():
+        engines.setdefault((tuple(cases), message, since, more), []).append(engine)
+    return [Row(", ".join(names), *said) for said, names in engines.items()]
 
 
 def step_says(step: Step) -> str:
