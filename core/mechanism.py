@@ -22,6 +22,8 @@ GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
 
 Vector: TypeAlias = tuple[float, float, float]
+# How far a joint between fixed bodies may be off [m]: no output is held to less, unless a case says so.
+HOLDS = 1e-9
 FOUR_NUMBERS = "four numbers, e0 first"
 
 
@@ -74,8 +76,13 @@ class Point:
 class Mechanism:
     """A named set of bodies, joints, points and drivers.
 
+    Attributes:
+        grounded: joints between two fixed bodies, as CAD exports have them. They are taken out of `joints`: they hold whatever
+            moves, and no engine has rows for them.
+
     Raises:
-        MechanismError: a name is used twice, or something refers to a name that does not exist.
+        MechanismError: a name is used twice, something refers to a name that does not exist, or a joint between fixed bodies does
+            not hold at the design position, or is driven or coupled.
     """
 
     name: str
@@ -84,8 +91,10 @@ class Mechanism:
     points: Sequence[Point] = field(default=())
     drivers: Sequence[Driver] = field(default=())
     couplers: Sequence[Coupler] = field(default=())
+    grounded: Sequence[Joint] = field(default=())
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", (*self.joints, *self.grounded))
         for what in ("bodies", "joints", "points", "drivers", "couplers"):
             object.__setattr__(self, what, tuple(getattr(self, what)))
             _unique(what, [each.name for each in getattr(self, what)])
@@ -95,12 +104,7 @@ class Mechanism:
         for joint in self.joints:
             for name in joint.bodies:
                 _known(f"joint {joint.name!r} ({joint.type})", "body", name, known, f"joints.{joint.name}.bodies")
-            if self.is_fixed(joint.bodies[0]) and self.is_fixed(joint.bodies[1]):
-                raise MechanismError(
-                    f"joint {joint.name!r} ({joint.type}): {joint.bodies[0]!r} and {joint.bodies[1]!r} are both fixed; "
-                    "free one of them, join a moving body or remove the joint",
-                    f"joints.{joint.name}.bodies",
-                )
+        self._leave_out_grounded()
         for point in self.points:
             _known(f"point {point.name!r}", "body", point.body, known, f"points.{point.name}.body")
         for coupler in self.couplers:
@@ -128,6 +132,29 @@ class Mechanism:
                 key = f"drivers.{driver.name}.joint"
                 _known(f"driver {driver.name!r}", "joint", driver.joint, self._named["joints"], key)
                 driver.check(self.joint(driver.joint))
+
+    def _leave_out_grounded(self) -> None:
+        """Part the joints that can move from those that cannot."""
+        still = tuple(joint for joint in self.joints if all(map(self.is_fixed, joint.bodies)))
+        object.__setattr__(self, "grounded", still)
+        if not still:
+            return
+        names = {joint.name for joint in still}
+        object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint.name not in names))
+        needed = {driver.joint: f"driver {driver.name!r}" for driver in self.drivers if isinstance(driver, JointDriver)}
+        needed |= {name: f"joint {coupler.name!r} ({coupler.type})" for coupler in self.couplers for name in coupler.joints}
+        for joint in still:
+            who = f"{joint}: {joint.i!r} and {joint.j!r} are both fixed"
+            if joint.name in needed:
+                raise MechanismError(
+                    f"{who}, and {needed[joint.name]} needs it to move; free one of them", f"joints.{joint.name}.bodies"
+                )
+            if joint.gap > HOLDS:
+                raise MechanismError(
+                    f"{who}, and at the design position it is off by {joint.gap:.3g} m; correct its length, free one of them or "
+                    "remove the joint",
+                    f"joints.{joint.name}",
+                )
 
     def is_fixed(self, name: str) -> bool:
         """Whether the body of that name is the ground or fixed to it."""
@@ -159,7 +186,8 @@ class Mechanism:
     @cached_property
     def _named(self) -> Mapping[str, Mapping[str, Any]]:
         """What there is of each kind, by name."""
-        return {what: {each.name: each for each in getattr(self, what)} for what in ("bodies", "joints", "points", "drivers")}
+        all_of = {"bodies": self.bodies, "joints": (*self.joints, *self.grounded), "points": self.points, "drivers": self.drivers}
+        return {what: {each.name: each for each in found} for what, found in all_of.items()}
 
     @property
     def moving(self) -> tuple[Body, ...]:

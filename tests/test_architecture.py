@@ -260,10 +260,12 @@ def test_nothing_is_called_utils():
 
 def test_packages_are_the_folders():
     """What is not listed would be missing from a wheel, though an editable install finds it."""
-    listed = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]
-    folders = {".".join(["kincheck", *path.parent.parts]) for path in SOURCES}
-    assert sorted(listed) == sorted(folders)
-    assert all((ROOT / path.parent / "__init__.py").exists() for path in SOURCES)
+    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    own = Path(setuptools["package-dir"]["kincheck"])  # of kincheck itself: without an __init__, which would hide the other parts
+    folders = {path.parent for path in SOURCES} - {own}
+    assert sorted(setuptools["packages"]) == sorted(["kincheck", *(".".join(["kincheck", *each.parts]) for each in folders)])
+    assert all((ROOT / each / "__init__.py").exists() for each in folders)
+    assert [path.name for path in SOURCES if path.parent == own] == ["__main__.py"]
 
 
 def test_packages_are_typed():

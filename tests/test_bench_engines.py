@@ -162,6 +162,8 @@ def test_modes_share_neither_table_nor_diagram():
     }
     drawn = {mode: precision_diagram(found, "crank", mode).figure["data"] for mode in ("projection", "simulate")}
     assert {trace["meta"] for trace in drawn["projection"]} == {"native", "fake", "native: floor", "fake: floor"}
+    captions = {mode: precision_diagram(found, "crank", mode).plot.caption for mode in drawn}
+    assert {mode for mode, caption in captions.items() if "A cross is a simulator's floor" in caption} == {"projection"}
     assert {trace["meta"] for trace in drawn["simulate"]} == {"fake · simulate"}
     tables = {section.title: section.rows for section in report(found).sections}
     assert {row[0] for row in tables["crank, simulate: work and precision"]} == {"fake"}

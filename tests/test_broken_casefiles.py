@@ -39,7 +39,10 @@ BROKEN = {
     ),
     "one body": (('["ground", "slider"]', '["slider"]'), ["joints.guide.bodies", "['slider']", "two names"]),
     "same body twice": (('["ground", "slider"]', '["slider", "slider"]'), ["joints.guide", "with itself"]),
-    "both fixed": (("origin = [1.0, 2.0, 3.0]", "fixed = true"), ["joints.guide.bodies", "joint 'guide'", "both fixed"]),
+    "both fixed": (
+        ("origin = [1.0, 2.0, 3.0]", "fixed = true"),
+        ["joints.guide.bodies", "joint 'guide'", "are both fixed, and driver 'push' needs it to move; free one of them"],
+    ),
     "body of a point": (('body = "slider"', 'body = "sldr"'), ["points.tip.body", "point 'tip'", "no body 'sldr'"]),
     "zero axis": (("axis = [1.0, 0.0, 0.0]", "axis = [0, 0.0, 0]"), ["joints.guide", "axis is zero"]),
     "missing axis": (("axis = [1.0, 0.0, 0.0]", ""), ["joints.guide.axis", "missing", "a direction [x, y, z]", "add the key"]),

@@ -18,6 +18,7 @@ from kincheck.core.harness.console import how_to_install
 from kincheck.core.harness.reading.results import read_results
 from kincheck.core.harness.reporting.caveats import caveats
 from kincheck.core.harness.reporting.report import headline
+from kincheck.core.version import VERSION
 
 from .fakes import Fake, crank, off, partial, raising
 
@@ -184,7 +185,16 @@ def test_the_other_cases_of_a_bad_one_are_run_and_recorded(kincheck_main, capsys
     assert error.get("message") == found.unread[bad]
     # what is broken tonight is told, and tomorrow too
     assert kincheck_main("report", "--history", "history") == 1
-    assert message.partition(":")[0].replace("_", r"\_") in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert message.partition(":")[0].replace("_", r"\_") in told
+    assert told.startswith("## run 2: all 2 right, 1 case could not be read; compared with nothing: no earlier run in which")
+    # and is one fault, however many engines were to solve it
+    engines = [RIGHT, Fake("other")]
+    assert kincheck_main("run", "crank", "--history", "history", engines=engines) == 0
+    assert kincheck_main("run", "crank", bad, "--history", "history", engines=engines) == 2
+    capsys.readouterr()
+    assert kincheck_main("report", "--history", "history") == 1
+    assert capsys.readouterr().out.startswith("## run 4 against run 3 (last green): 1 case could not be read\n")
 
 
 def test_a_night_in_which_no_case_can_be_read_is_recorded(kincheck_main, capsys, tmp_path, monkeypatch):
@@ -202,7 +212,7 @@ def test_a_night_in_which_no_case_can_be_read_is_recorded(kincheck_main, capsys,
     assert [test.get("name") for test in ElementTree.parse("junit.xml").iter("testcase")] == ["never made"]
     assert "1 case could not be read: nosuch" in Path("cases.md").read_text()
     assert kincheck_main("report", "--history", "history") == 1
-    assert "never made" in capsys.readouterr().out
+    assert capsys.readouterr().out.startswith("## run 3: all 0 right, 1 case could not be read; compared with nothing")
 
 
 def test_an_option_that_is_wrong_ends_a_run_and_the_bad_cases_are_told_too(kincheck_main, capsys):
@@ -257,6 +267,14 @@ def test_the_version_is_that_of_the_installation(capsys):
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out == f"kincheck {kincheck.core.__version__}\n"
     assert kincheck.core.__version__ == importlib.metadata.version("kincheck")
+
+
+def test_the_package_is_the_command_too(tmp_path):
+    module = [sys.executable, "-m", "kincheck"]
+    done = subprocess.run([*module, "--version"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == f"kincheck {VERSION}\n"
+    wrong = subprocess.run([*module, "run", "no_such_case"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (wrong.returncode, wrong.stderr[:9]) == (2, "kincheck:")
 
 
 def test_a_command_loads_no_other():

@@ -14,6 +14,7 @@ from kincheck.core.harness.case import Truth
 from kincheck.core.harness.reading.results import read_results
 from kincheck.core.harness.record import from_json
 from kincheck.core.harness.reporting.caveats import caveats
+from kincheck.core.harness.reporting.junit import to_junit
 
 from .fakes import Fake, crank, off, raising
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
@@ -95,6 +96,37 @@ def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(tmp_p
     assert (f"note: rod: {note}\n" in capsys.readouterr().out) is told
     assert ("Note: rod: joint 'rod'" in (tmp_path / "rod.md").read_text()) is told
     assert ("Geometry of rod" in dict(caveats(results))) is told
+    suite = ET.fromstring(to_junit(results)).find("testsuite")
+    assert suite is not None
+    assert suite.findtext("system-out") == (f"note: {note}" if told else None)
+
+
+@pytest.mark.parametrize("length", ["1.1", "1.0"])
+def test_a_length_that_contradicts_the_points_is_told_where_a_case_is_explained_or_its_design_varied(tmp_path, capsys, length):
+    file, vary, out = tmp_path / "rod.toml", tmp_path / "vary.toml", tmp_path / "out"
+    file.write_text(ROD.replace("LENGTH", length))
+    vary.write_text(
+        'schema = "kincheck-vary/1"\nmode = "one_at_a_time"\nunits = { length = "mm" }\n'
+        '[hardpoints.tip]\nat = "tip"\nvalues = [1.0]\n'
+    )
+    note, told = "joint 'rod' (distance): length 1.1 m, points 1 m apart at design", length == "1.1"
+    for command in (["explain", str(file)], ["sweep", str(file), "--vary", str(vary), "--out", str(out)]):
+        assert cli.main(command) == 0
+        assert (f"\nnote: {note}" in capsys.readouterr().out) is told
+    assert ("Nominal design of rod: joint &#39;rod&#39;" in (out / "sweep.html").read_text()) is told
+    assert cli.main(["run", str(file), "--engine", "native", "--explain"]) == 0
+    assert (f"\n  note: {note}" in capsys.readouterr().out) is told
+
+
+def test_a_case_that_cannot_be_solved_keeps_no_other_from_being_explained(tmp_path, capsys):
+    (tmp_path / "far.toml").write_text(ROD.replace("LENGTH", "5.0").replace('name = "rod"', 'name = "far"'))
+    (tmp_path / "rod.toml").write_text(ROD.replace("LENGTH", "1.0"))
+    files = [str(tmp_path / f"{name}.toml") for name in ("far", "rod")]
+    assert cli.main(["run", *files, "--engine", "native", "--explain"]) == 1
+    printed = capsys.readouterr().out
+    assert "\nfar: nothing is computed: mechanism 'far' does not close at the design position" in printed
+    assert "\n  note: joint 'rod' (distance): length 5 m" in printed
+    assert "\nrod: 12 unknowns for crank, rocker\n" in printed
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="has /dev/stdout")

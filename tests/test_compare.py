@@ -12,7 +12,7 @@ from kincheck.core.harness.case import ORDERS, Output, Series
 from kincheck.core.harness.compare import NO_SIZE, as_numbers, describe, deviation, deviations, output_series, pace, size
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.reporting.junit import to_junit
-from kincheck.core.harness.reporting.report import headline
+from kincheck.core.harness.reporting.report import headline, write_report
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism import Mechanism
 from msgspec import UNSET
@@ -216,6 +216,18 @@ def test_an_output_without_any_value_fails_where_all_samples_were_solved(complet
     assert (f"x: position: {SAMPLES} samples without a value where closed_form has one" in record.message) is complete
     failed = ElementTree.fromstring(to_junit(results)).findall(".//testcase[failure]")
     assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
+
+
+def test_an_engine_that_solves_no_sample_is_in_the_headline_and_in_the_overview(tmp_path):
+    def nothing(case):
+        return solution(case, solved=np.zeros(SAMPLES, dtype=bool), position=np.full((SAMPLES, 3), np.nan))
+
+    results = run([crank()], [Fake("native"), Fake("none", answer=nothing)], tol=1e-12)
+    assert headline(results) == "1 of 2 comparisons lacks samples"
+    write_report(results, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text("utf-8")
+    assert "<small>no sample solved</small>" in text
+    assert "<small>nothing to compare with</small>" not in text
 
 
 @pytest.mark.parametrize("rates", [(), ("velocity",), ("velocity", "acceleration")], ids=["positions", "velocities", "all"])

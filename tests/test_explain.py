@@ -4,9 +4,13 @@ import re
 from dataclasses import replace
 
 from kincheck import cases
-from kincheck.core import Point
+from kincheck.core import Distance, Point, Revolute
+from kincheck.core.harness.case_writer import case_text
 from kincheck.core.harness.cli import main
 from kincheck.core.harness.explain import explain
+from kincheck.core.harness.reading.files import load
+from kincheck.core.harness.reading.results import read_results
+from kincheck.core.harness.record import Outcome
 
 
 def totals(lines):
@@ -40,3 +44,20 @@ def test_the_command_line_prints_it(capsys):
     captured = capsys.readouterr()
     assert captured.out.startswith("{")
     assert "12 unknowns" in captured.err
+
+
+def test_joints_between_fixed_bodies_are_named_and_in_no_engine(tmp_path, capsys):
+    """As a CAD export has them. What is written is read as the same case."""
+    case = cases.load("mcpherson_strut")
+    bolts = [
+        Revolute("bolt", "chassis", "rack", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        Distance("stay", "ground", "chassis", ((0, 0, 0), (0, 0, 1))),
+    ]
+    file = tmp_path / "strut.toml"
+    bolted = replace(case.mechanism, joints=[*bolts, *case.mechanism.joints])
+    file.write_text(case_text(replace(case, mechanism=bolted)))
+    assert load(file).mechanism == bolted
+    assert main(["run", str(file), "--explain", "--json", str(tmp_path / "out.json")]) == 0
+    assert "  joints between fixed bodies, which hold at the design: left out: bolt, stay" in capsys.readouterr().out.splitlines()
+    for record in read_results(tmp_path / "out.json").records:
+        assert record.outcome in (Outcome.PASS, Outcome.UNAVAILABLE), record.message

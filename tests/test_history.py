@@ -135,31 +135,36 @@ def test_green_runs_are_those_in_which_something_passed_and_nothing_went_wrong(p
 # Plots
 
 
+def drawn(page):
+    """The figures of a page, by name."""
+    packed = page.read_text().split('id="report-data">')[1].split("<")[0]
+    return json.loads(zlib.decompress(b64decode(packed)))["figures"]
+
+
 def test_the_plot_holds_the_numbers_of_the_history(path, tmp_path):
     nights(path, 4)
     page = tmp_path / "trends.html"
     assert history(path, "--engine", "mujoco", "--plot", page) == 0
     text = page.read_text()
     assert "http://" not in text.split('id="plotly"')[0]
-    packed = text.split('id="data">')[1].split("<")[0]
-    figures = json.loads(zlib.decompress(b64decode(packed)))
-    assert len(figures) == 4  # error and time of two cases
+    figures = drawn(page)
+    assert [*figures] == ["error-1", "time-1", "error-2", "time-2"]  # of two cases
     with Store(path) as store:
         past = trends(read(store))["first"]
     mine = [each for each in past if each.engine == "mujoco"]
-    assert figures[0]["data"][0]["y"] == [each.max_error for each in mine] == pytest.approx([5e-13] * 4, rel=1e-3)
-    assert figures[1]["data"][0]["y"] == [each.us_per_step for each in mine]
-    assert figures[1]["data"][0]["x"] == [each.run for each in mine]
+    assert figures["error-1"]["data"][0]["y"] == [each.max_error for each in mine] == pytest.approx([5e-13] * 4, rel=1e-3)
+    assert figures["time-1"]["data"][0]["y"] == [each.us_per_step for each in mine]
+    assert figures["time-1"]["data"][0]["x"] == [each.run for each in mine]
     assert mine[0].run == "2026-11-01 03:00 #1"
 
 
-def test_errors_of_exactly_zero_are_drawn_on_the_floor(path, tmp_path):
+def test_errors_of_exactly_zero_have_a_floor_to_be_drawn_on(path, tmp_path):
     nights(path, 1)
     page = tmp_path / "trends.html"
     history(path, "--engine", "native", "--plot", page)
-    figure = json.loads(zlib.decompress(b64decode(page.read_text().split('id="data">')[1].split("<")[0])))[0]
-    assert figure["data"][0]["y"] == [figure["layout"]["meta"]["floor"]]
-    assert figure["data"][0]["y"][0] > 0.0
+    figure = drawn(page)["error-1"]
+    assert figure["data"][0]["y"] == [0.0]
+    assert figure["layout"]["meta"]["floor"] > 0.0
 
 
 # Exports
@@ -222,11 +227,27 @@ def test_a_run_keeps_how_long_it_was_kept_waiting(path):
     assert math.isclose(entry.seconds, 0.006)
 
 
+def test_what_has_no_value_in_any_run_is_not_drawn(path, tmp_path):
+    def past(error, time):
+        return [Past(run=run, engine="native", max_error=error, us_per_step=time) for run in ("1", "2")]
+
+    assert [*trend_figures(past(None, 2.0), {})] == ["time"]
+    assert [*trend_figures(past(0.0, None), {})] == ["error"]
+    assert trend_figures(past(None, None), {}) == {}
+    keep(path, [msgspec.structs.replace(each, errors={}, us_per_step=None) for each in records()])
+    assert history(path, "--plot", tmp_path / "trends.html") == 0
+    text = (tmp_path / "trends.html").read_text()
+    assert "1 run, oldest first" in text
+    assert text.count("No engine has solved it in these runs.") == 2
+    assert "data-figure" not in text.split('id="plotly"')[0]
+
+
 def test_times_that_are_close_are_drawn_over_a_decade():
     """Else a tenth looks like a step; a decade or more is drawn as it is."""
-    for factor, spread in ((1.1, 1.0), (20.0, None)):
+    for factor, spread, ticks in ((1.1, 1.0, "D2"), (20.0, None, "D2"), (2000.0, None, 1)):
         past = [Past(run=str(k), engine="native", max_error=None, us_per_step=time) for k, time in enumerate((2.0, 2.0 * factor))]
         axis = trend_figures(past, {})["time"]["layout"]["yaxis"]
+        assert axis["dtick"] == ticks  # 1, 2 and 5 of a few decades
         if spread is None:
             assert "range" not in axis
         else:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kincheck.core import Body, Distance, JointAngle, Mechanism, MechanismError, Point, PointCoordinate, Revolute, solve
-from kincheck.core.joints import Gear, RackPinion, Screw
+from kincheck.core.harness.joint_check.specimens import specimens
+from kincheck.core.joints import Gear, Joint, RackPinion, Screw
 from kincheck.core.motions import Ramp, Table
 
 from .running import forget_recent
@@ -114,3 +117,40 @@ def test_an_array_that_is_a_number_is_one():
     lead[...] = ratio[...] = 7.0
     assert (screw.lead, gear.ratio) == (0.5, 2.0)
     assert hash(screw) == hash(Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), 0.5))
+
+
+def held(*joints, drivers=(), couplers=()):
+    """A crank on a bed, and joints between the bed and the bench, which are both fixed."""
+    bodies = [Body("bed", fixed=True), Body("bench", (1.0, 2.0, 3.0), fixed=True), Body("crank")]
+    pivot = Revolute("pivot", "bed", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    tip = Point("tip", "crank", (1.0, 0.0, 0.0))
+    return Mechanism("held", bodies, [*joints, pivot], [tip], [JointAngle("turn", "pivot"), *drivers], couplers)
+
+
+@pytest.mark.parametrize("name", sorted(name for name, kind in Joint.registry.items() if kind.__module__.startswith("kincheck.")))
+def test_a_joint_between_fixed_bodies_is_left_out(name):
+    (joint,) = (replace(each, i="bed", j="bench") for each in specimens(Joint.registry[name], np.random.default_rng(1), 1))
+    mechanism = held(joint)
+    assert mechanism.joints == held().joints
+    assert mechanism.grounded == (joint,)
+    assert replace(mechanism, name="again").grounded == (joint,)
+    freed = replace(mechanism, bodies=[Body("bed", fixed=True), Body("bench"), Body("crank")])
+    assert (freed.joints, freed.grounded) == ((*held().joints, joint), ())
+    found, expected = (each.points["tip"] for each in (solve(each, "turn", [0.0, 1.0]) for each in (mechanism, held())))
+    np.testing.assert_array_equal(found.position, expected.position)
+
+
+def test_a_joint_between_fixed_bodies_must_hold_and_nothing_may_need_it_to_move():
+    apart = ((0.0, 0.0, 0.0), (0.4, 0.0, 0.0))
+    assert held(Distance("rod", "bed", "ground", apart, 0.4 + 1e-10)).grounded
+    with pytest.raises(
+        MechanismError, match=r"joint 'rod' \(distance\): 'bed' and 'ground' are both fixed, and at the design .* off by 0.1"
+    ):
+        held(Distance("rod", "bed", "ground", apart, 0.5124))
+    hinge = Revolute("hinge", "ground", "bench", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    with pytest.raises(MechanismError, match="'bench' are both fixed, and driver 'd' needs it to move; free one of them"):
+        held(hinge, drivers=[JointAngle("d", "hinge")])
+    with pytest.raises(MechanismError, match=r"are both fixed, and joint 'g' \(gear\) needs it to move"):
+        held(hinge, couplers=[Gear("g", ("pivot", "hinge"), ratio=2.0)])
+    with pytest.raises(MechanismError, match="the name 'pivot' is used more than once"):
+        held(replace(hinge, name="pivot"))

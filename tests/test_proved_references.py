@@ -181,6 +181,22 @@ def test_the_command_writes_what_the_run_is_judged_by(kincheck_main, tmp_path, c
     assert record["errors"]["x"]["position"]["against"] == "in_house_oracle"
 
 
+def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(kincheck_main, tmp_path, capsys, made, file):
+    stray = tmp_path / "gone.json"
+    stray.write_bytes(msgspec.json.encode(msgspec.structs.replace(made[0], case="gone")))
+    (tmp_path / "gone.toml").write_text('schema = "kincheck-case/9"\n')
+    told = f"kincheck: {stray}: case: found 'gone', expected one of the cases to be run: crank"
+    options = "--engine", "native", "--json", tmp_path / "out.json", "--reference", file, stray
+    assert kincheck_main("run", "crank", tmp_path / "gone.toml", *options) == 2
+    assert told in capsys.readouterr().err
+    (record,) = json.loads((tmp_path / "out.json").read_text())["records"]
+    assert record["errors"]["x"]["position"]["against"] == "in_house_oracle"
+    (tmp_path / "out.json").unlink()
+    assert kincheck_main("run", "crank", *options) == 2  # here it can only be a mistake
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "out.json").exists()
+
+
 def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsys):
     two = replace(crank().sweep, values=np.array([0.0, 1.0]))
     monkeypatch.setattr(kincheck.cases, "load", lambda name: replace(crank(), sweep=two, reference={}))

@@ -60,5 +60,5 @@ def test_markdown_takes_foreign_text_as_text_and_folds_what_is_alike(path):
     message = "</details> | `x` @team"
     keep(path, [msgspec.structs.replace(each, outcome=Outcome.ERROR, message=message) for each in records()])
     text = to_markdown(reported(path))
-    assert "| mujoco | first, second | pass → error: &lt;/details&gt; \\| \\`x\\` @\u2060team" in text
+    assert "| native, mujoco | first, second | pass → error: &lt;/details&gt; \\| \\`x\\` @\u2060team" in text
     assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")

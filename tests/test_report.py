@@ -17,8 +17,10 @@ from kincheck.core import solve
 from kincheck.core.harness.bench.ring import ring
 from kincheck.core.harness.record import Deviation, Deviations, Results
 from kincheck.core.harness.reporting.axis import SAMPLES
+from kincheck.core.harness.reporting.figures import SYMBOLS
+from kincheck.core.harness.reporting.measures import Past
 from kincheck.core.harness.reporting.report import headline, write_report
-from kincheck.core.harness.reporting.wording import number
+from kincheck.core.harness.reporting.wording import number, output_label
 
 from .made_up import CRANK, GRID, distances, judged, record, results, series
 from .test_chain import chain
@@ -264,10 +266,41 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
     assert "Thinned figures: strut" in page.text
 
 
+def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
+    runs = [Past(run=str(k), engine="one", max_error=1e-9, us_per_step=2.0) for k in range(2)]
+    for past, drawn in ((runs[1:], False), (runs, True)):
+        write_report(results(), tmp_path / "report.html", history={"strut": past})
+        text = (tmp_path / "report.html").read_text("utf-8")
+        assert ("<h3>Earlier runs</h3>" in text, "case-0-trend-error" in text) == (drawn, drawn)
+
+
+def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
+    """What the legend shows is what is drawn: symbols without one would all be told by the same cross."""
+    records = [record("strut", "closed_form", f"engine {k}", 1e-12, GRID) for k in range(len(SYMBOLS))]
+    write_report(Results(run={}, records=records), tmp_path / "report.html")
+    legend = (tmp_path / "report.html").read_text("utf-8").split("Curves shown")[1].split("</div>")[0]
+    shapes = [each.partition("/>")[2] for each in re.findall(r"<svg(.*?)</svg>", legend, re.DOTALL)]
+    assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
+
+
+def test_what_could_not_be_read_comes_first_and_how_it_was_made_last(tmp_path: Path) -> None:
+    run = {**results().run, "unread": {"gone.toml": "gone.toml: schema: found 'x'"}, "processor": "an abacus"}
+    text = report(msgspec.structs.replace(results(), run=run), tmp_path).text
+    places = [text.index(words) for words in ("not read", "gone.toml: schema", "Overview", "Largest deviations", "an abacus")]
+    assert places == sorted(places)
+
+
 def test_an_empty_run_says_so(tmp_path: Path) -> None:
     empty = Results(run={}, records=[])
     assert headline(empty) == "Nothing was compared"
     assert "Nothing was compared" in report(empty, tmp_path).text
+
+
+def test_outputs_are_labelled_in_words() -> None:
+    assert output_label("half_track_change") == "half-track change"
+    assert output_label("half_track_change.per_travel") == "half-track change per travel"
+    assert output_label("kingpin_inclination.per_travel") == "kingpin inclination per travel"
+    assert output_label("tip.x") == "tip.x"
 
 
 @pytest.mark.parametrize(

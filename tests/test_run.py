@@ -9,7 +9,7 @@ from kincheck.core.errors import CaseError, SolveError
 from kincheck.core.harness.case import Series, Truth
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
+from kincheck.core.harness.run import UNTOLD, run
 
 from .fakes import SAMPLES, Fake, at, crank, exact, off, partial, raising, solution
 
@@ -163,6 +163,27 @@ def test_missing_samples_fail_and_the_others_are_kept_and_compared():
     assert record.errors["x"].position.within
     assert record.us_per_step is None  # a time per sample would count samples that were not made
     assert record.seconds.warm > 0
+
+
+@pytest.mark.parametrize(
+    ("engine", "reasons"),
+    [
+        (Fake(), {}),
+        (Fake(answer=partial), {"us_per_step": UNTOLD["us_per_step"]}),
+        (
+            Fake(answer=lambda case: solution(case, solved=np.zeros(SAMPLES, dtype=bool))),
+            {key: UNTOLD[key] for key in ("residual_max", "iterations", "us_per_step")},
+        ),
+        (Fake(answer=lambda case: replace(solution(case), details={})), {key: UNTOLD[key] for key in ("rank", "dof")}),
+        (Fake(answer=raising(ValueError("no"))), dict.fromkeys(UNTOLD, "error: see message")),
+        (Fake(installed=None), dict.fromkeys(UNTOLD, "unavailable: see message")),
+    ],
+    ids=["all", "some samples", "no sample", "no details", "error", "unavailable"],
+)
+def test_every_number_that_is_null_says_why(engine, reasons):
+    record = record_of(engine)
+    assert record.reasons == reasons
+    assert {key for key in UNTOLD if getattr(record, key) is None} == set(reasons)
 
 
 def test_missing_samples_do_not_hide_a_deviation():

@@ -27,6 +27,7 @@ from kincheck.core import (
 )
 from kincheck.core.harness import cli
 from kincheck.core.harness.case import Case, Sweep, Truth
+from kincheck.core.harness.commands.export import FORMATS
 from kincheck.core.harness.model_writer import way_to
 from kincheck.core.harness.probe import probes
 from kincheck.core.topology import Branch, SpanningTree, spanning_tree
@@ -272,3 +273,10 @@ def test_what_cannot_be_exported_is_said(argv, said, tmp_path, monkeypatch, caps
     assert cli.main(["export", "mcpherson_strut", *argv]) == 2
     assert said in capsys.readouterr().err
     assert (tmp_path / "mcpherson_strut.xml").read_text() == "mine"
+
+
+def test_help_names_the_formats_that_there_are(capsys):
+    assert tuple(FORMATS) == adapters.WRITERS
+    for command in ("export", "assemblies"):
+        assert cli.main([command, "--help"]) == 0
+        assert "mjcf (MuJoCo), exudyn (a Python script) or urdf (Pinocchio)" in " ".join(capsys.readouterr().out.split())

@@ -216,6 +216,11 @@ class Case:
         return tuple(dict.fromkeys(point for output in self.outputs for point in output.points))
 
     @property
+    def notes(self) -> list[str]:
+        """What a reader of results should know of the joints' geometry; see `Joint.notes`."""
+        return [note for joint in self.mechanism.joints for note in joint.notes]
+
+    @property
     def signs(self) -> str:
         """The convention of signs of the outputs that have one, in words; what heads every table of them. Empty without."""
         return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))

@@ -35,7 +35,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     for body in mechanism.bodies:
         given = {f.name: getattr(body, f.name) for f in fields(body) if f.name != "name"}
         lines += _table("bodies", body.name, {key: value for key, value in given.items() if value != PLAIN[key]})
-    for joint in (*mechanism.joints, *mechanism.couplers):
+    for joint in (*mechanism.joints, *mechanism.grounded, *mechanism.couplers):
         what = {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         lines += _table("joints", joint.name, {"type": joint.type, **what, **_own(joint)})
     for point in mechanism.points:

@@ -154,7 +154,7 @@ def _facts(case: Case) -> dict[str, Any]:
         "driver": swept,
         "motions": {name: _driver(case, name) | {"motion": _motion(motion)} for name, motion in sweep.motions.items()},
         "signs": case.signs,
-        "notes": [note for joint in case.mechanism.joints for note in joint.notes],
+        "notes": case.notes,
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
     }
 

@@ -116,7 +116,8 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         dof: degrees of freedom, drivers apart; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: how many samples were reached, out of how many.
-        us_per_step: warm solve by sample [us]; null unless all samples were reached: `solved` and `message` say why.
+        us_per_step: warm solve by sample [us]; null unless all samples were reached.
+        reasons: why a number is null, by its key: residual_max, rank, dof, iterations, us_per_step. Records of before have none.
     """
 
     case: str
@@ -139,6 +140,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     samples: int | None = None
     seconds: Seconds | None = None
     us_per_step: float | None = None
+    reasons: dict[str, str] = {}
     details: dict[str, Any] = {}
 
     @property

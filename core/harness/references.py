@@ -150,8 +150,11 @@ def _numbers(file: Path, key: str, column: Sequence[str | None], count: int) -> 
     return np.array([np.nan if text is None else float(text) for text in column])
 
 
-def judged_by(cases: Sequence[Case], files: Sequence[Path]) -> list[Case]:
+def judged_by(cases: Sequence[Case], files: Sequence[Path], unused: list[str] | None = None) -> list[Case]:
     """The cases with the proved references in these files as their truth, which makes it an in_house_oracle.
+
+    Args:
+        unused: takes a message on each file that is for a case that is not among these; without, it is an error.
 
     Raises:
         CaseError: a file cannot be used, or is for a case that is not among these.
@@ -160,7 +163,11 @@ def judged_by(cases: Sequence[Case], files: Sequence[Path]) -> list[Case]:
     for file in files:
         proved = read(file)
         if proved.case not in found:
-            raise fault(file, "case", f"found {proved.case!r}, expected one of the cases to be run: {', '.join(found)}")
+            stray = fault(file, "case", f"found {proved.case!r}, expected one of the cases to be run: {', '.join(found) or 'none'}")
+            if unused is None:
+                raise stray
+            unused.append(str(stray))
+            continue
         case = found[proved.case]
         truth = series(file, proved, case.sweep.values, case.outputs)
         found[case.name] = replace(case, truth=Truth.IN_HOUSE_ORACLE, reference=truth)

@@ -23,6 +23,15 @@ from .record import Deviations, Outcome, OutputSeries, Record, Results, Seconds
 NATIVE = "native"
 """Name of the engine that stands in where a case has no reference."""
 
+UNTOLD = {
+    "residual_max": "no sample was solved",
+    "rank": "the engine does not tell it",
+    "dof": "the engine does not tell it",
+    "iterations": "no sample was solved",
+    "us_per_step": "known only where all samples are solved, and solved again for the time",
+}
+"""Why a number of a record is null, by its key, where the engine has answered."""
+
 Progress = Callable[[Record, int, int], None]
 """Told of each record as it is made, how many there are now, and how many there will be."""
 
@@ -196,6 +205,7 @@ def _record(pair: Pair, attempt: Attempt, native: _Standard) -> Record:
         message=result.message,
         errors={output.name: nothing for output in case.outputs},
         seconds=attempt.seconds,
+        reasons=dict.fromkeys(UNTOLD, f"{result.outcome}: see message"),
         details={"printed": result.printed} if result.printed else {},
     )
 
@@ -228,6 +238,13 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
         messages += _not_compared(errors)
     details = dict(answer.details)
     messages += details.pop("notes", [])  # a right answer that passed a singular pose says so
+    numbers = {
+        "residual_max": answer.residual if solved else None,
+        "rank": details.pop("rank", None),
+        "dof": details.pop("dof", None),
+        "iterations": answer.iterations if solved else None,
+        "us_per_step": 1e6 * seconds.warm / samples if complete and seconds.warm is not None else None,
+    }
     return _made(
         case,
         engine,
@@ -237,14 +254,11 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
         driver={name: each.tolist() for name, each in case.sweep.moved.items()},
         outputs={output.name: as_numbers(found[output.name], output) for output in case.outputs},
         errors=errors,
-        residual_max=answer.residual if solved else None,
-        rank=details.pop("rank", None),
-        dof=details.pop("dof", None),
-        iterations=answer.iterations if solved else None,
+        **numbers,
+        reasons={key: UNTOLD[key] for key, number in numbers.items() if number is None},
         solved=solved,
         samples=samples,
         seconds=msgspec.structs.replace(seconds, compare=perf_counter() - begin),
-        us_per_step=1e6 * (seconds.warm or 0.0) / samples if complete else None,
         details=details,
     )
 

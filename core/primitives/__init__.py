@@ -17,7 +17,7 @@ Table 3, the operations, is counted by `kincheck bench formulation`; Tables 4 an
 tie rod's distance condition and the drivers have no numbers in the paper: formulation section 2.
 """
 
-from .base import Drive, Pose, Primitive, Row, Twist
+from .base import GROUND_POSE, Drive, Pose, Primitive, Row, Twist
 from .constant_velocity import ConstantVelocity
 from .distance import Distance
 from .dot10 import Dot10
@@ -31,6 +31,7 @@ from .named import NamedSlide, NamedTurn
 from .spherical import Spherical
 
 __all__ = [
+    "GROUND_POSE",
     "ConstantVelocity",
     "Distance",
     "Dot10",

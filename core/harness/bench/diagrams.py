@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ..reporting.figures import Figure, Style, plain
-from ..reporting.measures import precision_figure
+from ..reporting.measures import precision_figure, ticked_axis
 from ..reporting.views import Plot
 from .engines import Bench, effort
 from .pages import Diagram
@@ -18,7 +18,7 @@ def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:
     """Error against time of the engines of one mode on a case; beside each simulator, its floor."""
     entries = [entry for entry in found.entries if (entry.case, entry.mode) == (case, mode)]
     efforts = [each for entry in entries for each in effort(entry)]
-    styles = _styles(each.engine for each in efforts)
+    styles, floors = _styles(each.engine for each in efforts), ""
     for floor in found.floors:
         finest = [entry for entry in entries if entry.engine == floor.engine and effort(entry)]
         if (floor.case, floor.mode) == (case, mode) and finest:
@@ -26,9 +26,10 @@ def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:
             name = f"{best.engine}: floor"
             efforts.append(replace(best, engine=name, setting=f"floor of {best.setting}", us_per_sample=floor.us_per_sample))
             own = next(style for style in styles if style.name == best.engine)
-            styles.append(replace(own, name=name, symbol="x-open", dash="3px,3px"))
+            styles.append(replace(own, name=name, symbol="x-thin-open", dash="3px,3px"))
+            floors = " A cross is a simulator's floor: a bound, no solver."
     drawn = [each for each in efforts if each.us_per_sample > 0.0]
-    caption = "Left is faster, down is more exact; a point is one effort. A cross is a simulator's floor: a bound, no solver."
+    caption = f"Left is faster, down is more exact; a point is one effort.{floors}"
     plot = Plot(f"{case}-{mode}", f"{case}, {mode}: error against time per sample, both log axes", caption)
     return Diagram(plot, precision_figure(drawn, {style.name: style for style in styles}), styles)
 
@@ -93,8 +94,8 @@ def _against(plot: Plot, x_title: str, y_title: str, points: Sequence[tuple[str,
         x, y = ([each[k] for each in mine] for k in range(2))
         curves.append({"type": "scatter", "mode": "lines+markers", "x": x, "y": y, "hovertemplate": "%{x}: %{y:.3~g} µs", **look})
     axes: Figure = {
-        side: {"type": "log", "title": {"text": title}, "exponentformat": "power"}
-        for side, title in (("xaxis", x_title), ("yaxis", y_title))
+        "xaxis": ticked_axis(x_title, [x for _, x, _ in points]),
+        "yaxis": ticked_axis(y_title, [y for *_, y in points]),
     }
     return Diagram(plot, {"data": curves, "layout": {**axes, "hovermode": "closest"}}, styles)
 

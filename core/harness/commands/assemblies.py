@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, unknown
 from . import foreign
-from .export import keep_texts
+from .export import formats, keep_texts
 from .house import House, Status, given, whole
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
     listing.add_argument("--samples", type=whole(1), default=200, metavar="N", help="random starts; default %(default)s")
     listing.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random starts; default %(default)s")
     listing.add_argument("--json", metavar="FILE", help="write the assemblies with all poses as JSON; - for standard output")
-    listing.add_argument("--export", metavar="FORMAT", help="write the mechanism, started in one of them: mjcf, exudyn or urdf")
+    listing.add_argument("--export", metavar="FORMAT", help=f"write the mechanism, started in one of them: {formats()}")
     listing.add_argument("--number", type=whole(1), metavar="K", help="which one to export; default 1, the first of the list")
     listing.add_argument("--out", type=Path, metavar="FILE", help="of the export; default: CASE.K in this folder")
     foreign.add_options(listing)

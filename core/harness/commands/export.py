@@ -13,6 +13,15 @@ from ..visible import file_name
 from . import foreign
 from .house import House, Status
 
+FORMATS = {"mjcf": "MuJoCo", "exudyn": "a Python script", "urdf": "Pinocchio"}
+"""The formats that the adapters write, for help texts: those are made before adapters are loaded. A test has them equal."""
+
+
+def formats() -> str:
+    """The formats in words."""
+    *first, last = (f"{name} ({what})" for name, what in FORMATS.items())
+    return f"{', '.join(first)} or {last}"
+
 
 def add(commands: Any) -> None:
     """Add the command to the parser."""
@@ -20,7 +29,7 @@ def add(commands: Any) -> None:
     export = commands.add_parser("export", help="write a mechanism for a simulator", description=_export.__doc__)
     export.set_defaults(do=_export)
     export.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
-    export.add_argument("--to", required=True, metavar="FORMAT", help="mjcf (MuJoCo), exudyn (a Python script) or urdf (Pinocchio)")
+    export.add_argument("--to", required=True, metavar="FORMAT", help=formats())
     export.add_argument("--out", type=Path, metavar="FILE", help="default: the case's name, in this folder")
     export.add_argument(
         "--at",

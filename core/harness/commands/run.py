@@ -6,14 +6,14 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import KincheckError
+from ...errors import KincheckError, SolveError
 from ..console import complain, lacking, progress, unsolved
 from ..visible import visible
 from . import foreign, isolation
@@ -144,10 +144,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
         history = _trends(keeping) if to.out and not keeping.problems else None
     delivery.deliver(results, problems, to, matrix=options.joints, precision=precision, history=history)
     if options.explain:
-        from ..explain import explain
-
-        lines = (line for case in plan.cases for line in explain(case))
-        print(*lines, sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
+        print(*_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
     problems += lacking(results, options.require) + unsolved(results)
     complain(problems)
     if problems or plan.unread:
@@ -174,11 +171,13 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     unread: dict[str, str] = {}
     cases = house.find_cases(named, unread, list(probes()) if options.joints else [], foreign.supplied(options))
     foreign.tell_left_out(cases)
+    unused: list[str] = []
     if options.reference and not problems:
         from ..references import judged_by
 
         try:
-            cases = judged_by(cases, options.reference)
+            # a reference names its case, which may be the one that cannot be read: that ends no run of the others
+            cases = judged_by(cases, options.reference, unused if unread else None)
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, house, problems)
@@ -187,7 +186,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     # what could not be read at all is recorded too, where records are kept: a night that ran nothing is not the night before
     if problems or not (cases or to.wanted or options.history is not None):
         raise KincheckError("\n".join([*unread.values(), *problems]))
-    complain(line for message in unread.values() for line in message.splitlines())
+    complain(line for message in (*unread.values(), *unused) for line in message.splitlines())
     return _Plan(cases, engines, baseline, {visible(name): visible(message, also="\n") for name, message in unread.items()})
 
 
@@ -223,6 +222,18 @@ def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str
         records.sort(key=lambda each: pairs.index((each.case, each.engine, each.mode)))
         problem = f"{str(reason) or 'interrupted'}: {len(records)} of {len(pairs)} records were made and are kept"
         return running.results(plan.cases, records, started=started, plan=pairs, **about), [problem], keeping
+
+
+def _explained(cases: Sequence[Case]) -> Iterator[str]:
+    """What the native engine computes for each case, or why nothing, and what is to be known of its geometry."""
+    from ..explain import explain
+
+    for case in cases:
+        try:
+            yield from explain(case)
+        except SolveError as error:  # of this case alone: its records are there, and say it too
+            yield f"{case.name}: nothing is computed: {error}"
+        yield from (f"  note: {note}" for note in case.notes)
 
 
 def _keeping(options: argparse.Namespace, plan: _Plan, settings: dict[str, Any]) -> Keeping | None:

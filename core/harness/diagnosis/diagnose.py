@@ -50,6 +50,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     """All that is found. findings: why the case cannot be solved as described; empty where it can.
 
     Attributes:
+        notes: what is to be known of the joints' geometry.
         binding: numbers of the geometry that cannot be changed alone without contradiction.
         signs: the convention of the outputs that have one, in words; empty without.
         not_derived: outputs that are not functions of the pose alone, and have no budget and sensitivities.
@@ -59,6 +60,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     schema: str
     case: str
     findings: list[str]
+    notes: list[str]
     freedom: Freedom
     components: list[ComponentCount]
     redundant: list[Dependency]
@@ -123,6 +125,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         schema=SCHEMA,
         case=case.name,
         findings=findings,
+        notes=case.notes,
         freedom=freedom,
         components=ranks.components,
         redundant=ranks.dependencies,

@@ -28,6 +28,8 @@ def _parts(found: Diagnosis) -> Iterator[Text | Table]:
     yield Text(found.case, "bold")
     for finding in found.findings:
         yield Text(f"finding: {finding}", "bold red")
+    for note in found.notes:
+        yield Text(f"note: {note}", "yellow")
     yield from _freedom(found)
     if found.samples:
         yield from _conditioning(found)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import importlib
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from ..reporting.figures import Figure, Style
 from ..reporting.measures import trend_figures
 from ..reporting.report import packed
+from ..reporting.views import Plot
+from ..reporting.wording import known, number
 from ..writing import write
 from .series import History
 from .trends import trends
@@ -35,31 +37,24 @@ def page(history: History, *, title: str) -> str:
     by_case = trends(history)
     names = dict.fromkeys(past.engine for each in by_case.values() for past in each)
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}
-    figures: list[Figure] = []
-    cases: list[tuple[str, list[tuple[int, str]]]] = []
-    for case, each in sorted(by_case.items()):
-        places: list[tuple[int, str]] = []
+    figures: dict[str, Figure] = {}
+    cases: list[tuple[str, list[Style], list[Plot]]] = []
+    for place, (case, each) in enumerate(sorted(by_case.items()), 1):
+        plots: list[Plot] = []
         for what, figure in trend_figures(each, styles).items():
-            places.append((len(figures), f"{what} of each engine on {case}, by run, log axis"))
-            figures.append(_grounded(figure))
-        cases.append((case, places))
+            plots.append(Plot(f"{what}-{place}", f"{what} of each engine on {case}, by run, log axis", ""))
+            figures[plots[-1].figure] = figure
+        cases.append((case, [styles[name] for name in dict.fromkeys(past.engine for past in each)], plots))
     environment = Environment(
         loader=FileSystemLoader([_HERE, _LOOK]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    cast("dict[str, Any]", environment.filters).update(number=number, known=known)  # which the macros use
     return environment.get_template("history.html").render(
         title=title,
         runs=len(history.runs),
         cases=cases,
         css=(_LOOK / "report.css").read_text("utf-8"),
-        data=packed(json.dumps(figures, allow_nan=False)),
+        script=(_LOOK / "report.js").read_text("utf-8"),
+        data=packed(json.dumps({"drivers": {}, "figures": figures, "scenes": {}}, allow_nan=False)),
         plotlyjs=packed(plotly.get_plotlyjs()),
     )
-
-
-def _grounded(figure: Figure) -> Figure:
-    """The figure with errors of exactly zero on the floor that its axis has for them."""
-    floor = figure["layout"].get("meta", {}).get("floor")
-    if floor is None:
-        return figure
-    data = [trace | {"y": [floor if value == 0 else value for value in trace["y"]]} for trace in figure["data"]]
-    return {"data": data, "layout": figure["layout"]}

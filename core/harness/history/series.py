@@ -104,16 +104,18 @@ def own_seconds(warm: float | None, waited: float | None) -> float | None:
 
 
 def green(store: Store, *, before: int | None = None) -> list[RunRow]:
-    """The runs in which something passed and nothing went wrong, the latest first.
+    """The runs that have all the pairs they were to make, in which something passed and nothing went wrong, the latest first.
 
     Raises:
         HistoryError: the file cannot be read.
     """
     bad = ", ".join(f"'{outcome}'" for outcome in Outcome if outcome.bad)
-    query = f"SELECT run_id FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0 AND sum(outcome = 'pass') > 0"
+    query = f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0 AND sum(outcome = 'pass') > 0"
     with store.explained("read"):
-        good = {run for (run,) in store.connection.execute(query)}
-    return [row for row in store.runs() if row.status == "finished" and row.id in good and (before is None or row.id < before)]
+        good: dict[int, int] = dict(store.connection.execute(query).fetchall())
+    # a finished run lacks the pairs of cases that could not be read: its status was 2
+    whole = [row for row in store.runs() if row.status == "finished" and good.get(row.id) == len(row.plan)]
+    return [row for row in whole if before is None or row.id < before]
 
 
 def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:

@@ -28,9 +28,10 @@ def _raised(error: Exception) -> str:
 
 
 def _joints(module: ModuleType) -> list[str]:
-    """Names of the joint types of a module, also of one that loads them when they are asked for."""
+    """Names of the joint types that a module or package defines itself, also of one that loads them when they are asked for."""
     offered = {name: getattr(module, name, None) for name in sorted({*dir(module), *getattr(module, "__all__", ())})}
-    return [name for name, each in offered.items() if isinstance(each, type) and issubclass(each, Joint) and each is not Joint]
+    joints = {name: each for name, each in offered.items() if isinstance(each, type) and issubclass(each, Joint)}
+    return [name for name, each in joints.items() if each is not Joint and f"{each.__module__}.".startswith(f"{module.__name__}.")]
 
 
 def load_joint(where: str) -> type[Joint]:

@@ -148,6 +148,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         against: the run compared with; null, and `reason` says why, where there is none.
         pairs: how many records the run has.
         failing: case, engine and mode of all that is not within tolerance or broken, new or not.
+        unread: cases that were asked for and make no sense; their pairs are among the findings, lost.
         time_limit: the ratio from which on a time was called slower.
     """
 
@@ -157,6 +158,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
     reason: str
     pairs: int
     failing: list[tuple[str, str, str]]
+    unread: list[str] = []
     time_limit: float
     findings: list[Finding]
     changes: list[Change]

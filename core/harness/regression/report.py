@@ -42,6 +42,7 @@ def regressions(subject: Subject, against: Subject | None, reason: str, store: S
         reason=reason,
         pairs=len(records),
         failing=[(record.case, record.engine, record.mode) for record in records if record.outcome.bad],
+        unread=[*subject.results.unread],
         time_limit=limit,
         findings=[_since(finding, standing) for finding in found],
         changes=changes(subject.facts, against.facts) if against else [],

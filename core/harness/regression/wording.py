@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ...errors import shortened
-from ..reporting.wording import motion_unit, number, product
+from ..reporting.wording import motion_unit, number, product, unread_count
 from .findings import Finding, Kind, Loose, Regressions, Step
 
 LONGEST = 12
@@ -19,9 +19,10 @@ NAMED = 4
 
 @dataclass(frozen=True)
 class Row:
-    """One or several findings of an engine that say the same.
+    """One or several findings that say the same.
 
     Attributes:
+        engine: the engine, or the engines.
         more: how many further findings the pair has of that kind.
     """
 
@@ -48,9 +49,12 @@ def headline(found: Regressions) -> str:
     if found.against is None:
         failing = f"{len(found.failing)} of {found.pairs} not right" if found.failing else f"all {found.pairs} right"
         # with nothing to compare with there are no other regressions
-        failing += f", {len(found.regressions)} never made" if found.regressions else ""
-        return f"{found.run.name}: {failing}; compared with nothing: {found.reason}"
-    counts = [f"{len(pairs(found, kind))} {_plural(kind, found)}" for kind in Kind if kind.regression and pairs(found, kind)]
+        never = _counted(found, Kind.LOST)
+        rest = [f"{never} never made"] if never else []
+        rest += [unread_count(len(found.unread))] if found.unread else []
+        return f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing: {found.reason}"
+    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if kind.regression and _counted(found, kind)]
+    counts += [unread_count(len(found.unread))] if found.unread else []
     said = ", ".join(counts) or "nothing regressed"
     fixed = len(pairs(found, Kind.FIXED))
     known = len(found.failing) - len(pairs(found, Kind.FAILURE))
@@ -70,6 +74,11 @@ def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
     return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
 
 
+def _counted(found: Regressions, kind: Kind) -> int:
+    """How many pairs findings of a kind are about; without those of a case that could not be read, which is one fault."""
+    return sum(case not in found.unread for case, _, _ in pairs(found, kind))
+
+
 def _plural(kind: Kind, found: Regressions) -> str:
     if kind is Kind.FAILURE:
         return "new failure" + ("s" if len(pairs(found, kind)) > 1 else "")
@@ -77,7 +86,7 @@ def _plural(kind: Kind, found: Regressions) -> str:
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
-    """Findings of one kind: a pair once, with the worst of its ratios; pairs that say the same together."""
+    """Findings of one kind: a pair once, with the worst of its ratios; cases, then engines, that say the same together."""
     by_pair: dict[tuple[str, str, str], list[Finding]] = {}
     for finding in findings:
         by_pair.setdefault((finding.case, finding.engine, finding.mode), []).append(finding)
@@ -85,7 +94,10 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
     for (case, engine, mode), each in by_pair.items():
         first = max(each, key=lambda finding: finding.ratio or 0.0)
         alike.setdefault((product(engine, mode), first.message, first.since, len(each) - 1), []).append(case)
-    return [Row(engine, cases, message, since, more) for (engine, message, since, more), cases in alike.items()]
+    engines: dict[tuple[tuple[str, ...], str, int | None, int], list[str]] = {}
+    for (engine, message, since, more), cases in alike.items():
+        engines.setdefault((tuple(cases), message, since, more), []).append(engine)
+    return [Row(", ".join(names), *said) for said, names in engines.items()]
 
 
 def step_says(step: Step) -> str:

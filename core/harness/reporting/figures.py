@@ -25,7 +25,7 @@ THIN = 1 / 2000  # a band narrower than this part of the curve's range is less t
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito: told apart by colour-blind readers
 DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
-SYMBOLS = ("circle-open", "square-open", "diamond-open", "triangle-up-open", "x-open", "cross-open", "star-open")
+SYMBOLS = ("circle-open", "square-open", "diamond-open", "triangle-up-open", "x-thin-open", "cross-thin-open", "asterisk-open")
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,17 @@ from xml.etree import ElementTree
 
 from ..compare import describe
 from ..record import Deviations, Outcome, Record, Results
-from .wording import UNMADE
+from .wording import UNMADE, notes
 
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
 
 
 def to_junit(results: Results) -> bytes:
-    """The results as JUnit XML; a missing engine or feature is a skip with its reason, a pair that was never made an error."""
+    """The results as JUnit XML; a missing engine or feature is a skip with its reason, a pair that was never made an error.
+
+    What is to be known of a case's geometry is the output of its suite.
+    """
     root = ElementTree.Element("testsuites", name="kincheck")
     for case in dict.fromkeys([*(record.case for record in results.records), *(case for case, _, _ in results.missing)]):
         suite = ElementTree.SubElement(root, "testsuite", name=case)
@@ -28,6 +31,8 @@ def to_junit(results: Results) -> bytes:
                     suite, "testcase", classname=f"{case}.{engine}.{mode}", name="never made", time="0.000000"
                 )
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
+        if said := [note for named, note in notes(results.run) if named == case]:
+            ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub("\ufffd", "\n".join(f"note: {note}" for note in said))
         for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
             suite.set(count, str(sum(1 for _ in suite.iter(tag))))
     ElementTree.indent(root)

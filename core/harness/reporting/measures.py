@@ -9,7 +9,7 @@ from typing import Any
 
 from .figures import Figure, Style, log_axis, plain
 
-TIMES: Figure = {"type": "log", "title": {"text": "time per sample [µs]"}, "exponentformat": "power", "hoverformat": ".3~g"}
+TIMES = "time per sample [µs]"
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Effort:
 
 
 def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[str, Figure]:
-    """Error and time of each engine over the runs, on log axes.
+    """Error and time of each engine over the runs, on log axes; what has no value in any run is left out.
 
     An error of zero has no place on the axis: the page draws it on a labelled floor, as in the error figures.
     """
@@ -60,12 +60,23 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
         # a category each: a date would otherwise become a place on a calendar, and runs of one night one point
         names = [plain(run) for run in runs]
         curves = [_curve(style, names, [values.get((style.name, run)) for run in runs]) for style in drawn]
-        return {"data": curves, "layout": {"xaxis": {"type": "category", "zeroline": False, "nticks": 6}, "hovermode": "x unified"}}
+        return {
+            "data": curves,
+            "layout": {"xaxis": {"type": "category", "zeroline": False, "nticks": 6, "tickangle": -30}, "hovermode": "x unified"},
+        }
 
     errors = figure({(each.engine, each.run): _finite(each.max_error) for each in history})
     times = figure({(each.engine, each.run): _finite(each.us_per_step) for each in history})
-    times["layout"]["yaxis"] = TIMES | _decade([value for trace in times["data"] for value in trace["y"] if value])
-    return {"error": _floored(errors), "time": times}
+    drawn_times = [value for trace in times["data"] for value in trace["y"] if value]
+    times["layout"]["yaxis"] = ticked_axis(TIMES, drawn_times) | _decade(drawn_times)
+    made = {"error": _floored(errors), "time": times}
+    return {what: each for what, each in made.items() if any(y is not None for trace in each["data"] for y in trace["y"])}
+
+
+def ticked_axis(title: str, values: Sequence[float]) -> Figure:
+    """A log axis for values above zero, with ticks at 1, 2 and 5 of every decade; over many decades at 1 alone."""
+    span = max(values, default=1.0) / min(values, default=1.0)
+    return {"type": "log", "title": {"text": title}, "tickformat": "~g", "hoverformat": ".3~g", "dtick": "D2" if span < 1e3 else 1}
 
 
 def _decade(values: Sequence[float]) -> Figure:
@@ -83,7 +94,8 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
         curve = _curve(style, [_finite(each.us_per_sample) for each in mine], [_finite(each.error) for each in mine])
         told = {"text": [plain(each.setting) for each in mine], "hovertemplate": "%{text}: %{x:.3~g} µs, %{customdata:.3~g} m"}
         traces.append(curve | told)
-    return _floored({"data": traces, "layout": {"xaxis": TIMES, "hovermode": "closest"}})
+    times = [value for trace in traces for value in trace["x"] if value]
+    return _floored({"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}})
 
 
 def _curve(style: Style, x: Sequence[Any], y: Sequence[float | None]) -> Figure:

@@ -48,6 +48,11 @@
     return exact.length ? [curve, ticks, told] : [curve, told];
   }
 
+  // without a distance of its own, a title stands where long labels of ticks are
+  function side(given) {
+    return { ...axis, ...given, title: { standoff: 8, ...(given && given.title) } };
+  }
+
   function draw(plot) {
     if (plot.dataset.drawn || plot.closest("[hidden]")) return;
     plot.dataset.drawn = "yes";
@@ -57,7 +62,7 @@
     Plotly.newPlot(
       plot,
       data.flatMap((trace) => completed(trace, drivers[section.dataset.case], floor, hidden.get(section))),
-      { ...common, ...layout, xaxis: { ...axis, ...layout.xaxis }, yaxis: { ...axis, ...layout.yaxis } },
+      { ...common, ...layout, xaxis: side(layout.xaxis), yaxis: side(layout.yaxis) },
       config,
     );
   }

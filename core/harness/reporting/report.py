@@ -21,7 +21,7 @@ from .caveats import COMPARED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
-from .wording import TRUTHS, against, engine_name, known, number, output_label, product
+from .wording import TRUTHS, against, engine_name, known, number, output_label, product, unread_count
 
 NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
@@ -81,6 +81,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
             problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
             not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
             circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
+            unread=given.results.unread,
             settings=_settings(records),
             styles=styles,
             cases=cases,
@@ -124,7 +125,9 @@ def headline(results: Results) -> str:
     """The run in one sentence."""
     records, unread = results.records, len(results.unread)
     missing = sum(case not in results.unread for case, _, _ in results.missing)
-    compared, broken = [record for record in records if judged([record]) or _lost(record)], _count(records, *BROKEN)
+    # of a failure there may be no deviation at all: no sample, or no output, has a value
+    compared = [record for record in records if judged([record]) or record.outcome is Outcome.FAIL]
+    broken = _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
     within = [record for record in failed if all(each.within for each in record.errors.values())]  # where there is a deviation
     outside, without = len(failed) - len(within), sum(map(_lost, within))
@@ -145,7 +148,7 @@ def headline(results: Results) -> str:
             else "The one comparison is within tolerance"
         )
     said += f", {broken} could not be completed" if broken else ""
-    said += f"; {unread} {'case' if unread == 1 else 'cases'} could not be read" if unread else ""
+    said += f"; {unread_count(unread)}" if unread else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
 
 

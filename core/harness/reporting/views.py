@@ -168,11 +168,11 @@ def _output(
 
 
 def _trends(anchor: str, history: Sequence[Past], styles: Mapping[str, Style], figures: dict[str, Figure]) -> list[Plot]:
-    if not history:
+    runs = len(dict.fromkeys(each.run for each in history))
+    if runs < 2:  # the report's own
         return []
     made = trend_figures(history, styles)
     figures.update({f"{anchor}-trend-{what}": figure for what, figure in made.items()})
-    runs = len(dict.fromkeys(each.run for each in history))
     return [Plot(f"{anchor}-trend-{what}", f"{what} over {runs} runs, log axis", f"{runs} runs, oldest first.") for what in made]
 
 
@@ -199,7 +199,8 @@ def _standard(
 
 def _band_caption(standard: OutputSeries, tolerance: float, whose: str) -> str:
     band = "narrower than the line" if band_is_thin(standard, tolerance) else "the grey band"
-    return f"Tolerance ±{number(tolerance)} {standard.unit} around the {whose}: {band}."
+    unit = "" if standard.unit == "1" else f" {standard.unit}"
+    return f"Tolerance ±{number(tolerance)}{unit} around the {whose}: {band}."
 
 
 def _worst_caption(deviations: Sequence[Judged], axis: Axis) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from ...trajectory import PER_TIME, QUANTITIES
-from ..case import Truth
+from ..case import PER_TRAVEL, Truth
 from ..record import Deviation, Record
 
 TRUTHS = {
@@ -34,6 +34,8 @@ def product(engine: str, mode: str) -> str:
 
 def output_label(name: str) -> str:
     """An output's name as suspension engineers write it."""
+    if name.endswith(PER_TRAVEL):
+        return f"{output_label(name.removesuffix(PER_TRAVEL))} per travel"
     return _LABELS.get(name, name.replace("_", " "))
 
 
@@ -54,7 +56,12 @@ def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
 def unread(run: Mapping[str, Any]) -> str:
     """Which cases could not be read, by the circumstances of a run; empty where all could."""
     names = run.get("unread", {})
-    return f"{len(names)} {'case' if len(names) == 1 else 'cases'} could not be read: {', '.join(names)}" if names else ""
+    return f"{unread_count(len(names))}: {', '.join(names)}" if names else ""
+
+
+def unread_count(count: int) -> str:
+    """So many cases could not be read."""
+    return f"{count} {'case' if count == 1 else 'cases'} could not be read"
 
 
 def motion_unit(unit: str, motion: str) -> str:

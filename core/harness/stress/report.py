@@ -21,7 +21,7 @@ SHORT = {
 }
 NOTES = (
     "Right: within 1e-14 of size times condition, of the closed form or of the motion followed from the design in extended "
-    "precision. The last columns: the largest error of specimens without a silent wrong answer, over that.",
+    "precision. Position, velocity, acceleration: the largest error of specimens without a silent wrong answer, over that.",
     "Refused rightly: nothing, or a singular pose, is there, and the message says so. Not judged: nearer to the end of the motion "
     "than the truth can tell, or behind a bifurcation. Shares are of the samples that the engine supports.",
 )
@@ -72,7 +72,7 @@ def _shares(found: Stress) -> Section:
         f"{name} {cell.version}: " + "; ".join(f"{key}: {value}" for key, value in cell.settings.items())
         for name, cell in settings.items()
     ]
-    columns = ["family", "engine", "specimens", *SHORT.values(), *(f"{name} error" for name in QUANTITIES)]
+    columns = ["family", "engine", "specimens", *SHORT.values(), *QUANTITIES]
     return Section("Samples by outcome", [_verdict(found)], [*NOTES, *told], columns, 2, rows)
 
 

@@ -15,7 +15,7 @@ from ..record import Outcome, Record
 from ..reporting.axis import DISPLAY, Axis, driver_axis
 from ..reporting.figures import Figure, plain
 from ..reporting.report import packed
-from ..reporting.wording import known, number, output_label, signs
+from ..reporting.wording import known, notes, number, output_label, signs
 from .results import Envelope, Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
@@ -76,6 +76,7 @@ def page(results: SweepResults) -> str:
             results=results,
             headline=headline(results),
             signs=signs(results.run),
+            notes=notes(results.run),
             outputs=outputs,
             axis=axis,
             circumstances={key: value for key, value in results.run.items() if key not in ("cases", "engines")},

@@ -18,7 +18,7 @@ from rich.text import Text
 from ...errors import KincheckError
 from .. import printing
 from ..reporting.table import print_signs
-from ..reporting.wording import number
+from ..reporting.wording import notes, number
 from ..visible import cell
 from .page import effect, headline
 from .results import SweepResults
@@ -57,7 +57,8 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
 
 def remarks(results: SweepResults) -> list[str]:
     """What the numbers alone do not say, a line each."""
-    lines = [f"unsolved: variant {each.variant}, {each.samples} samples: {each.message}" for each in results.failed[:10]]
+    lines = [f"note: {note}" for _, note in notes(results.run)]
+    lines += [f"unsolved: variant {each.variant}, {each.samples} samples: {each.message}" for each in results.failed[:10]]
     if results.unsolved > 10:
         lines.append(f"unsolved: {results.unsolved} in all, the first {len(results.failed)} in the results")
     replay = f"--seed {results.seed} --replay"
