@@ -13,8 +13,8 @@ import numpy as np
 
 # A turn is long against the clock's resolution and short against what interrupts a process: quick work is done several times.
 TURN = 2e-3
-# Programs of few bodies are compiled in the eighth sweep of 161 samples; longer ones, which take longer to compile, are later: those
-# of fifteen bodies in the hundredth sweep of 64 samples. What is slow is called less [s].
+# Programs of few bodies are compiled in the eighth sweep of 161 samples, longer ones, which take longer to compile, later: those of
+# fifteen bodies in the hundredth sweep of 64 samples. What is slow is called less [s].
 FIRST, PATIENCE = 128, 0.5
 
 Key = TypeVar("Key")
