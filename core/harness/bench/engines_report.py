@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...trajectory import QUANTITIES
-from ..reporting.wording import motion_unit, number
+from ..reporting.wording import against, motion_unit, number
 from ..run import NATIVE
 from . import cost_report as cost
 from . import levels
@@ -63,8 +63,8 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         )
         for entry in entries
     ]
-    truths = [entry.against for entry in entries if entry.against]
-    said = [f"Errors are against: {truths[0].replace('_', ' ')}."] if truths else ["There was nothing to compare with."]
+    truths = [entry.against.split(", ") for entry in entries if entry.against]
+    said = [f"Errors are against: {', '.join(map(against, truths[0]))}." if truths else "There was nothing to compare with."]
     said += [
         f"{loop}: {', '.join(dict.fromkeys(entry.engine for entry in entries if entry.loop == loop))}: the loop runs {words}."
         for loop, words in LOOPS_RUN.items()

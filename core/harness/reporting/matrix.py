@@ -13,7 +13,7 @@ from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
-from .wording import motion_unit, notes, signs, unread
+from .wording import against, motion_unit, notes, signs, unread
 
 NOT_ASKED = "–"
 
@@ -84,7 +84,7 @@ def _reading(results: Results) -> str:
     if not standards:
         return "No errors: nothing was compared with anything"
     units = " · ".join(f"{quantity} [{motion_unit(LENGTH, quantity)}]" for quantity in QUANTITIES)
-    return f"Largest errors against {', '.join(standards).replace('_', ' ')}: {units}"
+    return f"Largest errors against {', '.join(map(against, standards))}: {units}"
 
 
 def _cell(record: Record) -> Text:

@@ -14,7 +14,7 @@ from ...trajectory import QUANTITIES
 from .. import printing
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
-from .wording import motion_unit, notes, signs, unread
+from .wording import against, motion_unit, notes, signs, unread
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
@@ -66,7 +66,7 @@ def print_messages(results: Results, console: Console) -> None:
 
 def truth(record: Record) -> str:
     """What a record was judged by; the word for more than agreement is kept for truths from elsewhere that were met."""
-    return record.truth.replace("_", " ") + (" (validated)" if record.validated else "")
+    return against(record.truth) + (" (validated)" if record.validated else "")
 
 
 def _error(record: Record, quantity: str) -> Text:

@@ -162,7 +162,7 @@ def _output(
     figures[key] = output_figure(output, axis, curves, truth, band)
     said = [f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)]
     said += [] if truth else ["No reference."]
-    said += [_band_caption(*band, against(positions[0].deviation))] if band else []
+    said += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
     plot = Plot(key, f"{label} against {axis.name}, all engines", " ".join([*said, axis.besides]).strip())
     return OutputView(output, label, plot, errors)
 
@@ -207,4 +207,4 @@ def _worst_caption(deviations: Sequence[Judged], axis: Axis) -> str:
     largest = max(deviations, key=lambda each: each.deviation.max_abs)
     d = largest.deviation
     who = f"{engine_name(largest.record)}, sample {d.worst_step} ({axis.at(d.worst_step)})"
-    return f"Worst {number(d.max_abs)}: {who}. Tolerance {number(d.tolerance)}, against {against(d)}."
+    return f"Worst {number(d.max_abs)}: {who}. Tolerance {number(d.tolerance)}, against {against(d.against)}."

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from ...trajectory import PER_TIME, QUANTITIES
 from ..case import PER_TRAVEL, Truth
-from ..record import Deviation, Record
+from ..record import Record
 
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
@@ -90,7 +90,7 @@ def known(value: Any) -> Any:
     return "–" if value is None or value == "" else value
 
 
-def against(deviation: Deviation) -> str:
-    """What an output was compared with."""
+def against(name: str) -> str:
+    """What an output was compared with: a kind of truth in words, or an engine by its name."""
     kinds = {kind.value: words for kind, words in TRUTHS.items()}
-    return kinds.get(deviation.against, deviation.against)
+    return kinds.get(name, name)
