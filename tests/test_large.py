@@ -9,12 +9,15 @@ from kincheck.core import (
     Gear,
     JointAngle,
     JointDisplacement,
+    Mechanism,
     Point,
     Revolute,
     Screw,
     SolveError,
+    Spherical,
     Table,
     Translational,
+    Universal,
     solve,
 )
 from kincheck.core.harness.bench.ring import ring
@@ -96,3 +99,43 @@ def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
     assert found.solved.all(), found.message
     assert ("factor_entries" in found.details) == (cranks > 20)
     assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)
+
+
+@pytest.mark.parametrize(("short", "solved"), [(1e-2, True), (1e-3, True), (1e-7, False), (1e-9, False)])
+def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short, solved):
+    """A crank that its slider drives to just before the stretched rod; 42 wheels on it make it a sparse system.
+
+    Its rates were off by up to 3e-6 of their own, without a word. The crank's angle follows from the slider's place by a triangle.
+    """
+    crank, rod, angle = 0.5, 1.5, 0.3
+    pin = (crank * np.cos(angle), crank * np.sin(angle), 0.0)
+    begin = pin[0] + np.sqrt(rod**2 - pin[1] ** 2)
+    wheels = [f"w{k}" for k in range(42)]
+    mechanism = Mechanism(
+        "stretched",
+        bodies=[Body(name) for name in ("crank", "rod", "slider", *wheels)],
+        joints=[
+            Revolute("turn", "ground", "crank", (0.0, 0.0, 0.0), Z),
+            Universal("pin", "crank", "rod", pin, (Z, (pin[1], begin - pin[0], 0.0))),
+            Spherical("end", "rod", "slider", (begin, 0.0, 0.0)),
+            Translational("guide", "ground", "slider", (begin, 0.0, 0.0), (1.0, 0.0, 0.0)),
+            *(Revolute(f"axle {name}", "ground", name, (0.01 * k, 0.2, 0.0), Z) for k, name in enumerate(wheels)),
+        ],
+        points=[Point("pin", "crank", pin)],
+        drivers=[JointDisplacement("push", "guide")],
+        couplers=[Gear(f"mesh {name}", (f"axle {name}", f"axle w{k - 1}" if k else "turn"), -1.0) for k, name in enumerate(wheels)],
+    )
+    (value,) = values = [(crank + rod - begin) * (1.0 - short)]
+    found = solve(mechanism, "push", values)
+    assert "smallest_pivot" in found.details
+    assert found.solved.tolist() == [solved]
+    if not solved:
+        assert "refused at 1 samples so near a singular pose that residuals leave the pose or its rates uncertain" in found.message
+        return
+    x = begin + value
+    cosine = (crank**2 - rod**2 + x**2) / (2.0 * crank * x)
+    rate = -(x - crank * cosine) / (crank * x * np.sqrt(1.0 - cosine**2))
+    at = crank * np.array([cosine, np.sqrt(1.0 - cosine**2), 0.0])
+    np.testing.assert_allclose(found.points["pin"].position[0], at, rtol=0, atol=1e-12)
+    expected = rate * np.array([-at[1], at[0], 0.0])
+    np.testing.assert_allclose(found.points["pin"].velocity[0], expected, rtol=0, atol=1e-9 * abs(rate))

@@ -123,7 +123,7 @@ class SparseModel:
         Raises:
             FailedError: it is too near to a singular pose for that to be seen.
         """
-        self._evaluate(at.state, drives)
+        self.evaluate(at.state, drives)
         self._factor()
         jacobian = Jacobian.of(self.elements)
         if not (len(self.dropped) and jacobian.well_chosen):
@@ -162,7 +162,7 @@ class SparseModel:
         q = self._turn(state[3 * n : 7 * n], step[3 * n : 6 * n])
         return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])
 
-    def _evaluate(self, state: Array, drives: Array) -> float:
+    def evaluate(self, state: Array, drives: Array) -> float:
         """Evaluate all rows, and the largest residual of those that are solved."""
         self.elements.evaluate(state, drives)
         self.factors.update(self.elements.entries[self.solved])
@@ -172,7 +172,7 @@ class SparseModel:
         """The design position; a rod given longer or shorter than its design distance is taken up here."""
         residual = math.inf
         for _ in range(50):
-            residual = self._evaluate(state, self._rest)
+            residual = self.evaluate(state, self._rest)
             if residual <= CLOSED or not math.isfinite(residual):
                 break
             try:
@@ -190,8 +190,8 @@ class SparseModel:
 
     def moving(self, at: Stand, time: float, drives: Array) -> Stand:
         """What stands, with the rates that the drives give it there, and no step behind it. Raises FailedError."""
-        self._evaluate(at.state, drives)
-        rates, accelerations = self._motion()
+        self.evaluate(at.state, drives)
+        rates, accelerations = self.motion()
         now = replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
         (pivot, orientation), sigmas = self._pivots(), self._sigmas()
         slopes, high = (each if len(each) else np.zeros(len(sigmas)) for each in (at.slopes, at.high))
@@ -216,7 +216,7 @@ class SparseModel:
         except SingularError as error:
             raise FailedError("the equations are singular there") from error
 
-    def _motion(self) -> tuple[Array, Array]:
+    def motion(self) -> tuple[Array, Array]:
         """Rates and accelerations of the unknowns where all was last evaluated: one factorisation for both."""
         self._factor()
         rates = self.factors.solve(self.elements.nu[self.kept])
@@ -254,7 +254,7 @@ class SparseModel:
         """
         with np.errstate(all="ignore"):  # a lost iteration may overflow; it is found by its residual
             taylor, state = self._predicted(here, time)
-            residual = self._evaluate(state, drives)
+            residual = self.evaluate(state, drives)
             rate, done, iterations = math.inf, residual <= SETTLED, 0
             while not done and iterations < MAX_ITERATIONS:
                 if not math.isfinite(residual):
@@ -263,13 +263,13 @@ class SparseModel:
                 if renewed:
                     self._factor()
                 state = self.moved(state, -self.factors.solve(self.elements.phi[self.kept]))
-                last, residual = residual, self._evaluate(state, drives)
+                last, residual = residual, self.evaluate(state, drives)
                 rate, iterations = residual / last, iterations + 1
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
             if not done or not math.isfinite(residual):
                 raise FailedError(self._in_words(["closed"], residual, tol))
             step, gap = (float(distance(state - other, self.scale)) for other in (here.state, taylor))
-            rates, accelerations = self._motion()
+            rates, accelerations = self.motion()
         pivot, orientation = self._pivots()
         leftover = float(np.abs(self.elements.phi[self.dropped]).max(initial=0.0))
         branch = float(self.elements.branch.min(initial=1.0))

@@ -15,12 +15,13 @@ from ...mechanism import Mechanism
 from ...motions import Path, outwards
 from ...primitives.base import Pose, Twist
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
-from ..continuity import LOW
+from ..continuity import AMPLIFIED, EPSILON, LOW, WORSE_BY_PIVOTS
 from ..division import HALVINGS, MOST_PARTS, TOO_MANY
 from ..equations.carried import motion_of_frame, motion_of_point
 from ..equations.formulation import Acceleration
 from .batch import REMEMBERED
 from .model import FailedError, SparseModel, Stand
+from .uncertainty import uncertain
 
 
 def solve_sparse(
@@ -46,7 +47,7 @@ def solve_sparse(
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
-    return _Sweep(model, path, tol, _Wanted(model, points), _Wanted(model, bodies, frames=True)).solve(order)
+    return _Sweep(model, path, tol, _Wanted(model, points), _Wanted(model, bodies, frames=True), order).solve()
 
 
 AT_ONCE = 64
@@ -99,22 +100,24 @@ def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
 
 @dataclass
 class _Sweep:
-    """A path through a model, and what is found along it."""
+    """A path through a model, and what is found along it; refused: by time, how uncertain what is found there is."""
 
     model: SparseModel
     path: Path
     tol: float
     points: _Wanted
     bodies: _Wanted
+    order: int
     messages: list[str] = field(default_factory=list[str])
     smallest_pivot: float = np.inf
     renewed: int = 0
+    refused: dict[float, float] = field(default_factory=dict[float, float])
 
     def __post_init__(self) -> None:
         self.by = self.model
         self.known = [self.model]
 
-    def solve(self, order: int) -> Trajectory:
+    def solve(self) -> Trajectory:
         """The motion at all samples."""
         path, n = self.path, len(self.path.times)
         stands = {name: np.full(n, np.nan) for name in ("closure", "leftover", "iterations")}
@@ -126,13 +129,17 @@ class _Sweep:
                 continue
             followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
             while some := list(islice(followed, AT_ONCE)):
+                some = [(at, k) for at, k in some if at.time not in self.refused]
+                if not some:
+                    continue
                 reached = [k for _, k in some]
                 for name, values in stands.items():
                     values[reached] = [getattr(at, name) for at, _ in some]
                 for into, each in zip(found, wanted, strict=True):
                     if each.names:
                         into[reached] = each.motions([at for at, _ in some])
-        return self._trajectory(found, stands, order)
+        self._tell_refused()
+        return self._trajectory(found, stands)
 
     def _departure(self) -> Stand | None:
         """Where the samples are followed from: the design, or the first sample where it is elsewhere; None if that cannot be."""
@@ -143,6 +150,7 @@ class _Sweep:
                 here = model.moving(here, 0.0, self._drives(way, 0.0))
                 for there in self._follow(here, way, way.times):
                     here = there
+                self.refused.clear()  # nothing is asked of the way
                 if self.messages:
                     self.messages[:] = [f"on the way to the first sample: {self.messages[0]}"]
                     return None
@@ -182,6 +190,7 @@ class _Sweep:
                     before.pop()
                 before.append(here)
                 self.smallest_pivot = min(self.smallest_pivot, here.pivot)
+                self._judge(here, path)
                 yield here
                 k, by = k + 1, self.by
                 before[-1] = here = self._by_better_rows(here, path)
@@ -219,6 +228,21 @@ class _Sweep:
             longer = found
         raise last
 
+    def _judge(self, here: Stand, path: Path) -> None:
+        """Refuse a sample that residuals leave uncertain; that the pivots are small is no reason: in large mechanisms many are."""
+        limit, least = AMPLIFIED * self.tol, min(here.pivot, here.sigmas.min(initial=np.inf))
+        if WORSE_BY_PIVOTS * max(here.closure, EPSILON) > limit * least**2:
+            found = max(uncertain(self.by, here, self._drives(path, here.time))[: self.order + 1])
+            if not found <= limit:
+                self.refused[here.time] = found
+
+    def _tell_refused(self) -> None:
+        if self.refused:
+            worst = max(self.refused, key=self.refused.__getitem__)
+            where = f"by up to {self.refused[worst]:.2g} (at {self.path.where(worst)}), allowed {AMPLIFIED * self.tol:.2g}"
+            why = f"so near a singular pose that residuals leave the pose or its rates uncertain, {where}"
+            self.messages.append(f"refused at {len(self.refused)} samples {why}; keep away from it")
+
     def _by_better_rows(self, here: Stand, path: Path) -> Stand:
         """Where it stands; by other rows, where its own are much nearer to singular than they were and others are not."""
         if not (here.sigmas < LOW * here.high).any():
@@ -239,8 +263,8 @@ class _Sweep:
         reason += f"; smallest pivot there {here.pivot:.3g} (zero at a lock-up or dead centre)"
         self.messages.append(path.ended(here.time, float(times[k]), float(times[k - 1]) if k else None, reason))
 
-    def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array], order: int) -> Trajectory:
-        (points, bodies), unit = found, self.model.frame.unit
+    def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array]) -> Trajectory:
+        (points, bodies), unit, order = found, self.model.frame.unit, self.order
         solved: NDArray[np.bool_] = ~np.isnan(tests["closure"])
         closure, leftover = (largest_found(tests[name][solved]) * unit for name in ("closure", "leftover"))
         # rates of place and of rotation stand side by side
