@@ -23,18 +23,18 @@ def uncertain(model: SparseModel, at: Stand, drives: Array) -> Sequence[float]:
     That is seen where the pose is moved as far as they can move it, in the direction that the rows determine least. By the smallest
     singular value itself all samples of a large ring would be in doubt, which are known well.
     """
-    model.evaluate(at.state, drives)
-    rates, accelerations = model.motion()
-    left, residual = np.ones(len(model.kept)), max(at.closure, EPSILON)
-    for _ in range(STEPS):
-        left = model.factors.solve_transposed(model.factors.solve(left / np.abs(left).max()))
-    moved = model.moved(at.state, model.factors.solve(residual * np.sign(left)))
-    model.evaluate(moved, drives)
+    residual, left = max(at.closure, EPSILON), np.ones(len(model.kept))
     try:
+        model.evaluate(at.state, drives)
+        here = model.motion()
+        for _ in range(STEPS):
+            left = model.factors.solve_transposed(model.factors.solve(left / np.abs(left).max()))
+        moved = model.moved(at.state, model.factors.solve(residual * np.sign(left)))
+        model.evaluate(moved, drives)
         there = model.motion()
-    except FailedError:
+    except FailedError:  # singular to rounding, here or there
         return math.inf, math.inf, math.inf
-    speed = float(np.abs(rates).max(initial=0.0))
-    sizes = speed, max(float(np.abs(accelerations).max(initial=0.0)), speed**2)
-    off = [float(np.abs(a - b).max()) / (size or 1.0) for a, b, size in zip(there, (rates, accelerations), sizes, strict=True)]
+    speed, acceleration = (float(np.abs(each).max(initial=0.0)) for each in here)
+    sizes = speed, max(acceleration, speed**2)
+    off = [float(np.abs(a - b).max()) / (size or 1.0) for a, b, size in zip(there, here, sizes, strict=True)]
     return float(distance(moved - at.state, model.scale)), *off
