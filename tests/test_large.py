@@ -20,6 +20,7 @@ from kincheck.core import (
     Universal,
     solve,
 )
+from kincheck.core.analysis.sparse import sweep
 from kincheck.core.harness.bench.ring import ring
 
 Z = (0.0, 0.0, 1.0)
@@ -101,17 +102,12 @@ def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
     assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)
 
 
-@pytest.mark.parametrize(("short", "solved"), [(1e-2, True), (1e-3, True), (1e-7, False), (1e-9, False)])
-def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short, solved):
-    """A crank that its slider drives to just before the stretched rod; 42 wheels on it make it a sparse system.
-
-    Its rates were off by up to 3e-6 of their own, without a word. The crank's angle follows from the slider's place by a triangle.
-    """
-    crank, rod, angle = 0.5, 1.5, 0.3
+def stretched(crank, rod, angle):
+    """A crank that its slider drives towards the stretched rod, with 42 wheels on it; and where the slider begins."""
     pin = (crank * np.cos(angle), crank * np.sin(angle), 0.0)
     begin = pin[0] + np.sqrt(rod**2 - pin[1] ** 2)
     wheels = [f"w{k}" for k in range(42)]
-    mechanism = Mechanism(
+    whole = Mechanism(
         "stretched",
         bodies=[Body(name) for name in ("crank", "rod", "slider", *wheels)],
         joints=[
@@ -125,6 +121,14 @@ def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short,
         drivers=[JointDisplacement("push", "guide")],
         couplers=[Gear(f"mesh {name}", (f"axle {name}", f"axle w{k - 1}" if k else "turn"), -1.0) for k, name in enumerate(wheels)],
     )
+    return whole, begin
+
+
+@pytest.mark.parametrize(("short", "solved"), [(1e-2, True), (1e-3, True), (1e-7, False), (1e-9, False)])
+def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short, solved):
+    """Rates were off by up to 3e-6 of their own. The crank's angle follows from the slider's place by a triangle."""
+    crank, rod = 0.5, 1.5
+    mechanism, begin = stretched(crank, rod, 0.3)
     (value,) = values = [(crank + rod - begin) * (1.0 - short)]
     found = solve(mechanism, "push", values)
     assert "smallest_pivot" in found.details
@@ -139,3 +143,14 @@ def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short,
     np.testing.assert_allclose(found.points["pin"].position[0], at, rtol=0, atol=1e-12)
     expected = rate * np.array([-at[1], at[0], 0.0])
     np.testing.assert_allclose(found.points["pin"].velocity[0], expected, rtol=0, atol=1e-9 * abs(rate))
+
+
+def test_uncertainty_that_is_no_number_is_refused(monkeypatch):
+    """Wherever it stands: Python's own maximum passes over what is no number."""
+    mechanism, begin = stretched(0.5, 1.5, 0.3)
+    values = [(2.0 - begin) * (1.0 - 1e-7)]
+    for found in ((0.0, np.nan, 0.0), (np.inf, 0.0, 0.0)):
+        monkeypatch.setattr(sweep, "uncertain", lambda *at, found=found: found)
+        assert not solve(mechanism, "push", values).solved.any()
+    monkeypatch.setattr(sweep, "uncertain", lambda *at: (0.0, 0.0, 0.0))
+    assert solve(mechanism, "push", values).solved.all()

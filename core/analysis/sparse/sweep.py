@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
@@ -100,7 +100,7 @@ def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
 
 @dataclass
 class _Sweep:
-    """A path through a model, and what is found along it; refused: by time, how uncertain what is found there is."""
+    """A path through a model, and what is found along it; refused: by sample, how uncertain what is found there is."""
 
     model: SparseModel
     path: Path
@@ -111,7 +111,7 @@ class _Sweep:
     messages: list[str] = field(default_factory=list[str])
     smallest_pivot: float = np.inf
     renewed: int = 0
-    refused: dict[float, float] = field(default_factory=dict[float, float])
+    refused: dict[int, float] = field(default_factory=dict[int, float])
 
     def __post_init__(self) -> None:
         self.by = self.model
@@ -128,10 +128,8 @@ class _Sweep:
             if departure is None or not len(side):
                 continue
             followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
-            while some := list(islice(followed, AT_ONCE)):
-                some = [(at, k) for at, k in some if at.time not in self.refused]
-                if not some:
-                    continue
+            certain = self._certain(followed)
+            while some := list(islice(certain, AT_ONCE)):
                 reached = [k for _, k in some]
                 for name, values in stands.items():
                     values[reached] = [getattr(at, name) for at, _ in some]
@@ -150,7 +148,6 @@ class _Sweep:
                 here = model.moving(here, 0.0, self._drives(way, 0.0))
                 for there in self._follow(here, way, way.times):
                     here = there
-                self.refused.clear()  # nothing is asked of the way
                 if self.messages:
                     self.messages[:] = [f"on the way to the first sample: {self.messages[0]}"]
                     return None
@@ -190,7 +187,6 @@ class _Sweep:
                     before.pop()
                 before.append(here)
                 self.smallest_pivot = min(self.smallest_pivot, here.pivot)
-                self._judge(here, path)
                 yield here
                 k, by = k + 1, self.by
                 before[-1] = here = self._by_better_rows(here, path)
@@ -228,18 +224,27 @@ class _Sweep:
             longer = found
         raise last
 
-    def _judge(self, here: Stand, path: Path) -> None:
-        """Refuse a sample that residuals leave uncertain; that the pivots are small is no reason: in large mechanisms many are."""
-        limit, least = AMPLIFIED * self.tol, min(here.pivot, here.sigmas.min(initial=np.inf))
-        if WORSE_BY_PIVOTS * max(here.closure, EPSILON) > limit * least**2:
-            found = max(uncertain(self.by, here, self._drives(path, here.time))[: self.order + 1])
-            if not found <= limit:
-                self.refused[here.time] = found
+    def _certain(self, followed: Iterable[tuple[Stand, int]]) -> Iterator[tuple[Stand, int]]:
+        """Samples, each as soon as the motion stands there, without those that residuals leave uncertain.
+
+        That pivots are small is no reason to refuse one: in large mechanisms many are.
+        """
+        limit = AMPLIFIED * self.tol
+        for here, k in followed:
+            least = min(here.pivot, here.sigmas.min(initial=np.inf))
+            if WORSE_BY_PIVOTS * max(here.closure, EPSILON) > limit * least**2:
+                found = uncertain(self.by, here, self._drives(self.path, here.time))
+                worst = float(np.max(found[: self.order + 1]))
+                if not worst <= limit:  # or it is no number
+                    self.refused[k] = worst
+                    continue
+            yield here, k
 
     def _tell_refused(self) -> None:
         if self.refused:
             worst = max(self.refused, key=self.refused.__getitem__)
-            where = f"by up to {self.refused[worst]:.2g} (at {self.path.where(worst)}), allowed {AMPLIFIED * self.tol:.2g}"
+            there = self.path.where(float(self.path.times[worst]))
+            where = f"by up to {self.refused[worst]:.2g} (at {there}), allowed {AMPLIFIED * self.tol:.2g}"
             why = f"so near a singular pose that residuals leave the pose or its rates uncertain, {where}"
             self.messages.append(f"refused at {len(self.refused)} samples {why}; keep away from it")
 

@@ -25,13 +25,14 @@ def uncertain(model: SparseModel, at: Stand, drives: Array) -> Sequence[float]:
     """
     residual, left = max(at.closure, EPSILON), np.ones(len(model.kept))
     try:
-        model.evaluate(at.state, drives)
-        here = model.motion()
-        for _ in range(STEPS):
-            left = model.factors.solve_transposed(model.factors.solve(left / np.abs(left).max()))
-        moved = model.moved(at.state, model.factors.solve(residual * np.sign(left)))
-        model.evaluate(moved, drives)
-        there = model.motion()
+        with np.errstate(all="ignore"):  # what overflows is no number
+            model.evaluate(at.state, drives)
+            here = model.motion()
+            for _ in range(STEPS):
+                left = model.factors.solve_transposed(model.factors.solve(left / np.abs(left).max()))
+            moved = model.moved(at.state, model.factors.solve(residual * np.sign(left)))
+            model.evaluate(moved, drives)
+            there = model.motion()
     except FailedError:  # singular to rounding, here or there
         return math.inf, math.inf, math.inf
     speed, acceleration = (float(np.abs(each).max(initial=0.0)) for each in here)
