@@ -17,6 +17,7 @@ from .errors import MechanismError, unknown
 from .given import held, require_finite, triple
 from .joints.base import Joint, Kind, unit
 from .joints.coupler import Coupler
+from .joints.gap import gap
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -149,9 +150,9 @@ class Mechanism:
                 raise MechanismError(
                     f"{who}, and {needed[joint.name]} needs it to move; free one of them", f"joints.{joint.name}.bodies"
                 )
-            if joint.gap > HOLDS:
+            if (off := gap(joint)) > HOLDS:
                 raise MechanismError(
-                    f"{who}, and at the design position it is off by {joint.gap:.3g} m; correct its length, free one of them or "
+                    f"{who}, and at the design position it is off by {off:.3g} m; correct its length, free one of them or "
                     "remove the joint",
                     f"joints.{joint.name}",
                 )

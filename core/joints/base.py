@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Self
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
 from ..errors import MechanismError
 from ..given import held, plain, require_direction, require_finite, triple
-from ..primitives import GROUND_POSE, Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
+from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
 
 
@@ -146,7 +146,8 @@ class Joint(ABC):
         for name, kind, value in self.geometry():
             who, expected = f"{self}: {name}", kind.value
             if kind is Kind.LENGTH:
-                parts = [(value := plain(value),)]
+                value = plain(value)
+                parts = [(value,)]
             elif kind.pair:
                 value = parts = tuple(triple(who, numbers, expected) for numbers in held(who, value, 2, expected))
             else:
@@ -192,7 +193,8 @@ class Joint(ABC):
 
     def reversed(self) -> Self:
         """Return the same joint seen from its second body: i and j exchanged, and so every pair."""
-        return self.changed(i=self.j, j=self.i, **{name: value[::-1] for name, kind, value in self.geometry() if kind.pair})
+        swapped = {name: value[::-1] for name, kind, value in self.geometry() if kind.pair}
+        return self.changed(i=self.j, j=self.i, **swapped)
 
     def scaled(self, factor: float) -> Self:
         """Return the same joint with all lengths multiplied by the factor."""
@@ -212,15 +214,10 @@ class Joint(ABC):
         return ()
 
     @property
-    def gap(self) -> float:
-        """Largest residual at the design position [m or -]: zero, but where lengths contradict points."""
-        here, still = Attachment(ZERO), GROUND_POSE
-        return max(abs(x) for each in self.primitives(here, here) for x in each.phi(still, still))
-
-    @property
     def rows(self) -> int:
         """Number of constraint equations."""
-        return sum(primitive.n for primitive in self.primitives(Attachment(ZERO), Attachment(ZERO)))
+        here = Attachment(ZERO)
+        return sum(primitive.n for primitive in self.primitives(here, here))
 
     @abstractmethod
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[Primitive]:
