@@ -1,10 +1,6 @@
 """The command line: exit statuses, messages, and what goes to which stream."""
 
-import importlib.metadata
 import json
-import subprocess
-import sys
-import time
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,7 +14,6 @@ from kincheck.core.harness.console import how_to_install
 from kincheck.core.harness.reading.results import read_results
 from kincheck.core.harness.reporting.caveats import caveats
 from kincheck.core.harness.reporting.report import headline
-from kincheck.core.version import VERSION
 
 from .fakes import Fake, crank, off, partial, raising
 
@@ -263,29 +258,6 @@ def test_a_required_engine_is_run_even_if_others_were_asked_for(kincheck_main, c
     assert [each["engine"] for each in json.loads(capsys.readouterr().out)["records"]] == ["native", "wrong"]
 
 
-def test_the_version_is_that_of_the_installation(capsys):
-    assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out == f"kincheck {kincheck.core.__version__}\n"
-    assert kincheck.core.__version__ == importlib.metadata.version("kincheck")
-
-
-def test_the_package_is_the_command_too(tmp_path):
-    module = [sys.executable, "-m", "kincheck"]
-    done = subprocess.run([*module, "--version"], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout == f"kincheck {VERSION}\n"
-    wrong = subprocess.run([*module, "run", "no_such_case"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (wrong.returncode, wrong.stderr[:9]) == (2, "kincheck:")
-
-
-def test_a_command_loads_no_other():
-    code = (
-        "import sys; from kincheck.core.harness import cli; cli.main(['check-joint', '--help']);"
-        "print(*sorted(name.rpartition('.')[2] for name in sys.modules if '.harness.commands.' in name))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "check_joint house"
-
-
 def test_how_to_install_comes_from_the_metadata():
     assert how_to_install("pinocchio").startswith("pip install 'pin>=")
     assert how_to_install("mujoco").startswith("pip install 'mujoco>=")
@@ -302,15 +274,3 @@ def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys):
     ]
     assert any(line.startswith("  native     1.2  projection, loop: python") for line in lines)
     assert any(line.startswith("  pinocchio  not installed, or cannot be imported: pip install 'pin>=") for line in lines)
-
-
-def test_the_start_is_quick_and_loads_nothing_that_is_not_needed():
-    code = (
-        "import sys; from kincheck.core.harness import cli; status = cli.main(['--version']);"
-        "print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio', 'exudyn', 'scipy'} & set(sys.modules)))"
-    )
-    begin = time.perf_counter()
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[1] == "[]"
-    # a tenth of it is usual; the rest is for a busy machine
-    assert time.perf_counter() - begin < 3.0

@@ -20,7 +20,7 @@ from kincheck.core.harness.reporting.axis import SAMPLES
 from kincheck.core.harness.reporting.figures import SYMBOLS
 from kincheck.core.harness.reporting.measures import Past
 from kincheck.core.harness.reporting.report import headline, write_report
-from kincheck.core.harness.reporting.wording import number, output_label
+from kincheck.core.harness.reporting.wording import number
 
 from .made_up import CRANK, GRID, distances, judged, record, results, series
 from .test_chain import chain
@@ -294,18 +294,3 @@ def test_an_empty_run_says_so(tmp_path: Path) -> None:
     empty = Results(run={}, records=[])
     assert headline(empty) == "Nothing was compared"
     assert "Nothing was compared" in report(empty, tmp_path).text
-
-
-def test_outputs_are_labelled_in_words() -> None:
-    assert output_label("half_track_change") == "half-track change"
-    assert output_label("half_track_change.per_travel") == "half-track change per travel"
-    assert output_label("kingpin_inclination.per_travel") == "kingpin inclination per travel"
-    assert output_label("tip.x") == "tip.x"
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(None, "–"), (0.0, "0"), (1.25e-16, "1.25e-16"), (1e-9, "1e-9"), (12.345, "12.3"), (1543.2, "1543"), (2e7, "2e7")],
-)
-def test_numbers_are_short_and_a_dash_is_no_zero(value: float | None, text: str) -> None:
-    assert number(value) == text
