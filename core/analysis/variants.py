@@ -22,7 +22,7 @@ from ..trajectory import Array
 from .continuity import doubtful
 from .equations.geometry import placed, places
 from .march import FINER, ROOM, march
-from .model import Model
+from .model import LARGEST, SMALLEST, Model
 from .request import SIGMA, accept_by
 from .route import Route
 from .structure.driven import require_driven
@@ -72,10 +72,11 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     """
     _recycle()
     model = route.model
-    kept, closes = _together(route, geometry, tol)
+    kept, closes, worst = _together(route, geometry, tol)
     closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
-    solved = ~np.isnan(closure)
-    failed = np.flatnonzero(~solved.all(axis=0))
+    solved = np.ones(closure.shape, dtype=np.bool_)
+    failed = np.flatnonzero(np.isnan(worst[SIGMA]))
+    solved[:, failed] = ~np.isnan(closure[:, failed])
     again = failed[closes[failed]]
     if FINER[0] * len(closure) <= ROOM:
         for first in range(0, len(again), SOME):
@@ -94,23 +95,21 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             kept_rows, others = len(model.selection.kept), len(model.selection.dropped)
             rows = [OTHER_ROWS.format(count=kept_rows, all=kept_rows + others)] if others else []
             messages[k] = "; ".join([*found.messages, BY_ITSELF, *rows])
-    for k, message in _held(route, geometry, solved).items():
+    for k, message in _held(route, geometry, solved, failed).items():
         kept[:, :, k], solved[:, k], messages[k] = np.nan, False, message
-    doubted = np.zeros_like(solved)
-    # the worst of all first: to judge each takes a twentieth of the time
-    if doubtful(np.fmin.reduce(sigma, axis=None, initial=1.0), np.fmax.reduce(closure, axis=None, initial=0.0), tol):
-        doubted = solved & doubtful(sigma, closure, tol)
-        kept[:, doubted], solved[doubted] = np.nan, False
-    for k in np.flatnonzero(doubted.any(axis=0)).tolist():
-        near = route.path.where(float(route.path.times[route.order][doubted[:, k].argmax()]))
-        refused = (
-            f"refused at {doubted[:, k].sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}; "
-        )
+    # by the worst of each variant: to judge all samples takes a twentieth of the time
+    for k in np.union1d(failed, np.flatnonzero(doubtful(worst[SIGMA], worst["closure"], tol))).tolist():
+        doubted = solved[:, k] & doubtful(sigma[:, k], closure[:, k], tol)
+        if not doubted.any():
+            continue
+        kept[:, doubted, k], solved[doubted, k] = np.nan, False
+        near = route.path.where(float(route.path.times[route.order][doubted.argmax()]))
+        refused = f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}; "
         messages[k] = "; ".join(filter(None, [messages.get(k, ""), f"{refused}solve this variant by itself, or keep away from it"]))
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
 
 
-def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int, str]:
+def _held(route: Route, geometry: Array, solved: NDArray[np.bool_], failed: NDArray[np.intp]) -> dict[int, str]:
     """Variants that cannot move, and what holds them.
 
     At its design every variant closes. Where rows that are redundant at the nominal design hold it there, those that are solved
@@ -118,12 +117,14 @@ def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int,
 
     Args:
         solved: shape (n, V), by time.
+        failed: variants that were not solved at all samples together.
     """
     model, found = route.model, dict[int, str]()
     if not (model.selection.dropped and route.from_design):
         return found
     away = route.path.times[route.order] != route.start
-    for k in np.flatnonzero(solved.any(axis=0) & ~solved[away].any(axis=0)).tolist():
+    some = failed if away.any() else np.arange(solved.shape[1])
+    for k in some[solved[:, some].any(axis=0) & ~solved[np.ix_(away, some)].any(axis=0)].tolist():
         try:
             require_driven(_variant(model, geometry[:, k]))
         except SolveError as error:
@@ -137,8 +138,14 @@ def _variant(model: Model, numbers: Array) -> Mechanism:
     return placed(model.mechanism, {name: [next(given) for _ in known[name]] for name in model.request.varied})
 
 
-def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tuple[Array, NDArray[np.bool_]]:
-    """Follow variants through all samples, each step in as many parts; the kept rows, by time, and which close at their design."""
+def _together(
+    route: Route, geometry: Array, tol: float, parts: int = 1
+) -> tuple[Array, NDArray[np.bool_], Mapping[str, Array]]:
+    """Follow variants through all samples, each step in as many parts.
+
+    Returns:
+        The kept rows, by time; which variants close at their design; and the worst of each by test, NaN where a sample is missing.
+    """
     model, count = route.model, geometry.shape[1]
     executor = model.executor(count)
     closes = model.stand(executor, geometry)
@@ -148,14 +155,15 @@ def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tupl
     model.start(executor, route.origin)
     start = executor.get(model.ahead)
     whole = executor.table(parts * len(route.path.times))
+    worst = np.repeat(model.plan.best, executor.room, axis=1)
     for k, (side, samples) in enumerate(zip(route.sides, route.for_motions(parts), strict=True)):
         if k:
             executor.put(model.ahead, start)
-        executor.fan(samples, whole, parts * route.below - (side.step < 0), side.step)
+        executor.fan(samples, whole, worst, parts * route.below - (side.step < 0), side.step)
     kept = whole[:, route.ends(parts) if parts > 1 else slice(None), :count]
     if not (arrived & closes).all():
-        kept[:, :, ~(arrived & closes)] = np.nan
-    return kept, closes
+        kept[:, :, ~(arrived & closes)] = worst[:, :count][:, ~(arrived & closes)] = np.nan
+    return kept, closes, dict(zip((*LARGEST, *SMALLEST), worst[:, :count], strict=True))
 
 
 @cache
@@ -173,5 +181,6 @@ def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
     model.start(executor, way.origin)
     found = executor.table(LEAD)
     (side,) = way.sides
-    executor.fan(way.for_motions()[0], found, side.first, side.step)
-    return ~np.isnan(found[model.rows["closure"].start, -1, :count])
+    worst = np.repeat(model.plan.best, executor.room, axis=1)
+    executor.fan(way.for_motions()[0], found, worst, side.first, side.step)
+    return ~np.isnan(worst[0, :count])

@@ -84,6 +84,11 @@ class Plan:
         return [name for name in self.onward if name not in self.after]
 
     @property
+    def best(self) -> Array:
+        """Where the worst of anything begins, shape (largest and smallest, 1)."""
+        return np.array([[0.0]] * len(self.largest) + [[np.inf]] * len(self.smallest))
+
+    @property
     def carried_on(self) -> Sequence[tuple[int, int]]:
         """What is carried where those after it are not predicted by `predict`."""
         return self.continued or self.carried
@@ -225,12 +230,14 @@ class Executor(Protocol):
         """Room for what `fan` puts out, shape (kept, columns, room)."""
         ...
 
-    def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
+    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
         """Follow as many motions as there are lanes through the same samples, each lane alone.
 
         Args:
             samples: `Plan.sampled`, shape (sampled, n).
             out: a table, which takes `Plan.kept`; NaN from where a lane was not accepted.
+            worst: takes the largest of `Plan.largest` and the smallest of `Plan.smallest`, lane by lane, of what stood there and of
+                all samples; NaN where a lane was not accepted. Shape (largest and smallest, room).
             first, step: column of the first sample, and from each to the next: 1 or -1.
         """
         ...

@@ -30,7 +30,7 @@ class NumpyExecutor(NumpyLanes):
         """See `Executor`."""
         return np.empty((len(self.plan.kept), columns, self.room))
 
-    def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
+    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
         """See `Executor`."""
         plan, block = self.plan, self.block
         kept, remembered = list(plan.kept), list(plan.remembered)
@@ -46,6 +46,7 @@ class NumpyExecutor(NumpyLanes):
                 accepted = self._accepted("predict", sample)
             alive &= accepted
             out[:, first + step * k] = np.where(alive, block[kept], np.nan)
+            self._worsen(worst)
             past[k % NODES] = block[remembered]
             if k + 1 < NODES:
                 for name in plan.remaining:
@@ -53,6 +54,12 @@ class NumpyExecutor(NumpyLanes):
                 self.carry()
             else:
                 block[target] = block[source]
+        worst[:, ~alive] = np.nan
+
+    def _worsen(self, worst: Array) -> None:
+        largest, smallest = np.split(worst, [len(self.plan.largest)])
+        np.maximum(largest, self.block[list(self.plan.largest)], out=largest)
+        np.minimum(smallest, self.block[list(self.plan.smallest)], out=smallest)
 
     def _accepted(self, start: str, sample: Array) -> NDArray[np.bool_]:
         self.block[list(self.plan.sampled)] = sample[:, None]
@@ -66,7 +73,6 @@ class NumpyExecutor(NumpyLanes):
     def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
         plan, block = self.plan, self.block
-        largest, smallest = np.split(parts.worst, [len(plan.largest)])
 
         def call(groups: int) -> None:
             for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
@@ -76,8 +82,7 @@ class NumpyExecutor(NumpyLanes):
                 self.attempt()
                 row = parts.base + member * len(plan.kept)
                 parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
-                np.maximum(largest, block[list(plan.largest)], out=largest)
-                np.minimum(smallest, block[list(plan.smallest)], out=smallest)
+                self._worsen(parts.worst)
                 for slot, k in plan.left:
                     parts.ahead[member, k] = block[slot, -1]
 

@@ -155,7 +155,7 @@ class Lanes:
         self.world = aligned(cascade.rows * room).reshape(-1, room)
         self.world[:] = 0.0
         self.worst = aligned(len(WORST) * room).reshape(-1, room)
-        self._best = np.array([[0.0]] * len(LARGEST_OF_PARTS) + [[np.inf]] * len(SMALLEST_OF_PARTS))
+        self._best = cascade.kinds[0].model.plan.best
         self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
         self._ahead = [kind.fixed.copy() for kind in cascade.kinds]
         self._samples = [aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in cascade.kinds]

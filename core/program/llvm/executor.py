@@ -88,11 +88,11 @@ class LlvmExecutor:
         shape = len(self._code.plan.kept), columns, self.room
         return aligned(math.prod(shape)).reshape(shape)
 
-    def fan(self, samples: Array, out: Array, first: int, step: int) -> None:
+    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
         """See `Executor`."""
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
         given = self._address, self._groups, samples.ctypes.data, stride, wanted
-        self._code.call("fan", "fan")(*given, out.ctypes.data, *out.shape[1:], first, step)
+        self._code.call("fan", "fan")(*given, out.ctypes.data, *out.shape[1:], first, step, worst.ctypes.data)
         self._code.count(self._groups * wanted)
 
     def groups(self, lanes: int) -> int:

@@ -28,6 +28,7 @@ group:
   %offset = mul i64 %g, %bytes
   %lane = getelementptr i8, ptr %memory, i64 %offset
   %group_at = mul i64 %g, {width}
+  %worst_here = getelementptr double, ptr %worst, i64 %group_at
   br label %sample
 sample:
   %k = phi i64 [0, %group], [%next, %carry]
@@ -66,6 +67,7 @@ keep:
   %column_at = mul i64 %column, %lanes
   %in_plane = add i64 %column_at, %group_at
   %out_here = getelementptr double, ptr %out, i64 %in_plane
+  {over("worsen", "worst", "ptr %worst_here", "i64 %lanes")}
   {over("keep_alive", "kept", "ptr %out_here", "i64 %plane", f"{mask} %still", "i64 %ahead")}
   %next = add i64 %k, 1
   %enough = icmp uge i64 %next, {NODES}
@@ -86,6 +88,7 @@ carry:
   %more = icmp slt i64 %next, %wanted
   br i1 %more, label %sample, label %end_group
 end_group:
+  {over("lose", "worst", "ptr %worst_here", "i64 %lanes", f"{mask} %still")}
   %next_group = add i64 %g, 1
   %more_groups = icmp slt i64 %next_group, %groups
   br i1 %more_groups, label %group, label %end
@@ -93,14 +96,14 @@ end:
   fence seq_cst
   ret void"""
     inputs = "ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted"
-    head = f"void @fan(ptr %plan, {inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step)"
+    head = f"void @fan(ptr %plan, {inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step, ptr %worst)"
     declared = f"declare void @llvm.prefetch.p0(ptr, i32, i32, i32)\ndeclare i1 @llvm.vector.reduce.or.v{width}i1({mask})\n"
     return f"{declared}{_kept(width)}{function(head, body)}"
 
 
 def _kept(width: int) -> str:
-    """Functions that put out a sample, NaN where a motion has ended, and remember it."""
-    keep, remember = Rows(width), Rows(width, TOGETHER)
+    """Functions that put out a sample, NaN where a motion has ended, remember it, and say so where the worst is found."""
+    keep, lose, remember = Rows(width), Rows(width), Rows(width, TOGETHER)
     # whole cache lines go straight to memory: to have each fetched first, only to be overwritten, takes a third of all time
     whole = width == LINE
     past_caches = ", !nontemporal !{i32 1}" if whole else ""
@@ -109,9 +112,13 @@ def _kept(width: int) -> str:
     keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
     if not whole:  # parts of them are fetched a sample ahead; to put them aside until they are whole takes as long as waiting
         keep.lines.append(f"call void @llvm.prefetch.p0(ptr {keep.number(place, '%ahead')}, i32 1, i32 3, i32 1)")
+    worst = lose.number("%numbers", lose.product("%stride", "%row"))
+    known = lose.choose("%still", lose.let(f"load {lose.vector}, ptr {worst}, align 8"), lose.constant(math.nan))
+    lose.lines.append(f"store {lose.vector} {known}, ptr {worst}, align 8")
     for k in range(TOGETHER):
         remember.at = remember.sum("%row", k)
         to = remember.sum("%past", remember.entry(1, 2))
         remember.write(to, remember.anew(f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"))
     kept = keep.function("keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still", "i64 %ahead")
-    return kept + remember.function("remember", "i64 %past")
+    lost = lose.function("lose", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still")
+    return kept + lost + remember.function("remember", "i64 %past")

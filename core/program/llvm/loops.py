@@ -84,11 +84,6 @@ def parts(width: int) -> str:
     leave = Rows(width)
     last = leave.let(f"load double, ptr {leave.number(leave.slot(leave.entry(0, 2)), width - 1)}, align 8")
     leave.lines.append(f"store double {last}, ptr {leave.number('%ahead', leave.entry(1, 2))}, align 8")
-    worsen = Rows(width)
-    sign, worst_at = worsen.spread(worsen.entry(1, 3, "double")), worsen.number("%worst", worsen.product("%room", "%row"))
-    values = worsen.read(worsen.entry(0, 3)), worsen.let(f"load {worsen.vector}, ptr {worst_at}, align 8")
-    worse = worsen.call("maximum", *(worsen.arithmetic("*", sign, each) for each in values))  # NaN if either is
-    worsen.lines.append(f"store {worsen.vector} {worsen.arithmetic('*', sign, worse)}, ptr {worst_at}, align 8")
     tables = "ptr %members, ptr %own_all, ptr %ahead_all, ptr %samples, i64 %room, ptr %sources_all, ptr %world"
     body = f"""%bytes = mul i64 %plan_stride, {8 * width}
   br label %part
@@ -134,6 +129,5 @@ end:
     rows = [
         source.function("source", "ptr %rows", "ptr %world", "i64 %room"),
         leave.function("leave", "ptr %ahead"),
-        worsen.function("worsen", "ptr %worst", "i64 %room"),
     ]
     return "".join([*rows, function(head, body)])

@@ -24,7 +24,7 @@ _NEEDED = rows, settle
 LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {
     "interpret": ([interpret], {"interpret": 2}),
     "follow": ([*_NEEDED, run, follow], {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3}),
-    "fan": ([*_NEEDED, fan], {"fan": 11}),
+    "fan": ([*_NEEDED, fan], {"fan": 12}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""

@@ -101,7 +101,7 @@ def over(name: str, table: str, *arguments: str) -> str:
 def rows(width: int) -> str:
     """What is done with slots that tables name, and the programs called that they list."""
     vector = f"<{width} x double>"
-    calls, give, take, keep, put = (Rows(width) for _ in range(5))
+    calls, give, take, keep, put, worsen = (Rows(width) for _ in range(6))
     copy, spread = Rows(width, TOGETHER), Rows(width, TOGETHER)
     calls.lines.append(call("row", calls.entry(kind="ptr")))
     for k in range(TOGETHER):
@@ -115,6 +115,10 @@ def rows(width: int) -> str:
     keep.lines.append(f"store {vector} {keep.read(keep.entry())}, ptr {here[2]}, align 8")
     first = put.let(f"load double, ptr {put.slot(put.entry())}, align 8")
     put.lines.append(f"store double {first}, ptr {here[3]}, align 8")
+    sign, worst = worsen.spread(worsen.entry(1, 3, "double")), worsen.number("%numbers", worsen.product("%stride", "%row"))
+    values = worsen.read(worsen.entry(0, 3)), worsen.let(f"load {vector}, ptr {worst}, align 8")
+    worse = worsen.call("maximum", *(worsen.arithmetic("*", sign, each) for each in values))  # NaN if either is
+    worsen.lines.append(f"store {vector} {worsen.arithmetic('*', sign, worse)}, ptr {worst}, align 8")
     numbers = "ptr %numbers", "i64 %stride"
     return "".join(
         [
@@ -125,6 +129,7 @@ def rows(width: int) -> str:
             take.function("take", *numbers),
             keep.function("keep", *numbers),
             put.function("put", *numbers),
+            worsen.function("worsen", *numbers),
         ]
     )
 
