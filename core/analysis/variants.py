@@ -51,7 +51,7 @@ class Variants:
         kept: the kept rows of the model (`Model.rows`), shape (kept, n, V); NaN where a sample was not reached.
         solved: whether each sample of each variant was reached, shape (n, V).
         retried: how many variants were solved again.
-        messages: by variant, why samples are missing.
+        messages: by variant, why samples are missing; of every one that misses some.
     """
 
     kept: Array
@@ -153,12 +153,14 @@ def _together(
     executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
     arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
     model.start(executor, route.origin)
-    start = executor.get(model.ahead)
+    # what lanes are predicted from, with what stands between: one stretch is copied in half the time of single slots
+    ahead = executor.window(range(min(model.ahead), max(model.ahead) + 1))
+    start = ahead.copy()
     whole = executor.table(parts * len(route.path.times))
     worst = np.repeat(model.plan.best, executor.room, axis=1)
     for k, (side, samples) in enumerate(zip(route.sides, route.for_motions(parts), strict=True)):
         if k:
-            executor.put(model.ahead, start)
+            ahead[:] = start
         executor.fan(samples, whole, worst, parts * route.below - (side.step < 0), side.step)
     kept = whole[:, route.ends(parts) if parts > 1 else slice(None), :count]
     if not (arrived & closes).all():

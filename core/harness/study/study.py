@@ -224,10 +224,10 @@ class Ready:
             parts.append(summary(values, first + start))
             kept.append(values[:, :, chosen[part]])
             picked |= {k: values[:, :, k - first - start].copy() for k in self._picked(first, part)}
-            missing = (~solved).sum(axis=0)
-            failures += int(np.count_nonzero(missing))
+            failures += len(messages)
             retried += again
-            unsolved += [Unsolved(first + start + k, int(missing[k]), messages[k]) for k in sorted(messages)][:MOST_MESSAGES]
+            some = sorted(messages)[:MOST_MESSAGES]
+            unsolved += [Unsolved(first + start + k, int((~solved[:, k]).sum()), messages[k]) for k in some]
             if study.variation.mode is Mode.ONE_AT_A_TIME:
                 effects.append(largest(values - self.nominal[:, :, None]))
             if study.whole:
