@@ -124,6 +124,22 @@ def test_a_lane_does_not_see_its_neighbours(path):
         np.testing.assert_array_equal(apart[rows], together[rows][:, :, columns])
 
 
+@pytest.mark.parametrize("compiled", [True, False])
+def test_the_worst_of_each_lane_is_found_on_the_way(compiled):
+    """Over both sides of the start, and of lanes that are lost on one of them, in the middle and at the end of a vector."""
+    mechanism, varied = strut()
+    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), varied=varied, compiled=compiled))
+    path, numbers = Path({"stroke": Ramp(1.0)}, np.linspace(-0.25, 0.25, 41)), drawn(mechanism, varied, 19, 2e-3)
+    numbers[2, [3, 18]] += 0.28  # as below: their way is shorter
+    kept, closes, worst = variants._together(Route(model, path), numbers, TOL)
+    assert closes.all()
+    lost = np.isnan(kept[model.rows["closure"].start]).any(axis=0)
+    assert 0 < lost.sum() < 19
+    closure, sigma = (kept[model.rows[name].start] for name in ("closure", "sigma"))
+    np.testing.assert_array_equal(worst["closure"], np.where(lost, np.nan, closure.max(axis=0)))
+    np.testing.assert_array_equal(worst["sigma"], np.where(lost, np.nan, sigma.min(axis=0)))
+
+
 @pytest.mark.parametrize("times", [np.linspace(-0.25, 0.25, 11), np.array([0.1, -0.2, 0.25, 0.0, -0.25, 0.2, -0.1])])
 def test_what_cannot_be_followed_is_nan_with_the_reason_and_the_others_are_there(times):
     """A ball 0.28 m higher shortens the way of the arm; samples in no order find their places."""

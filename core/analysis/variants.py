@@ -95,7 +95,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             kept_rows, others = len(model.selection.kept), len(model.selection.dropped)
             rows = [OTHER_ROWS.format(count=kept_rows, all=kept_rows + others)] if others else []
             messages[k] = "; ".join([*found.messages, BY_ITSELF, *rows])
-    for k, message in _held(route, geometry, solved, failed).items():
+    for k, message in _held(route, geometry, solved).items():
         kept[:, :, k], solved[:, k], messages[k] = np.nan, False, message
     # by the worst of each variant: to judge all samples takes a twentieth of the time
     for k in np.union1d(failed, np.flatnonzero(doubtful(worst[SIGMA], worst["closure"], tol))).tolist():
@@ -109,7 +109,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
 
 
-def _held(route: Route, geometry: Array, solved: NDArray[np.bool_], failed: NDArray[np.intp]) -> dict[int, str]:
+def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int, str]:
     """Variants that cannot move, and what holds them.
 
     At its design every variant closes. Where rows that are redundant at the nominal design hold it there, those that are solved
@@ -117,14 +117,12 @@ def _held(route: Route, geometry: Array, solved: NDArray[np.bool_], failed: NDAr
 
     Args:
         solved: shape (n, V), by time.
-        failed: variants that were not solved at all samples together.
     """
     model, found = route.model, dict[int, str]()
     if not (model.selection.dropped and route.from_design):
         return found
     away = route.path.times[route.order] != route.start
-    some = failed if away.any() else np.arange(solved.shape[1])
-    for k in some[solved[:, some].any(axis=0) & ~solved[np.ix_(away, some)].any(axis=0)].tolist():
+    for k in np.flatnonzero(solved.any(axis=0) & ~solved[away].any(axis=0)).tolist():
         try:
             require_driven(_variant(model, geometry[:, k]))
         except SolveError as error:
@@ -138,9 +136,7 @@ def _variant(model: Model, numbers: Array) -> Mechanism:
     return placed(model.mechanism, {name: [next(given) for _ in known[name]] for name in model.request.varied})
 
 
-def _together(
-    route: Route, geometry: Array, tol: float, parts: int = 1
-) -> tuple[Array, NDArray[np.bool_], Mapping[str, Array]]:
+def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tuple[Array, NDArray[np.bool_], Mapping[str, Array]]:
     """Follow variants through all samples, each step in as many parts.
 
     Returns:

@@ -19,8 +19,6 @@ DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
 """Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
 LINE = 8
 """Numbers in a cache line."""
-PAGE = 64
-"""Slots of vectors of eight numbers in a page of memory."""
 
 
 @dataclass(frozen=True)
@@ -114,19 +112,6 @@ def shifted(past: int, remembered: Sequence[int], behind: int) -> Sequence[tuple
     count = len(remembered)
     places = [*range(past, past + (behind - 1) * count), *remembered]
     return list(zip(places[count:], places, strict=False))
-
-
-def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Slots that are carried, in an order in which no slot is read soon after one was written that is a page away, or several.
-
-    Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that move by up to half a page go
-    upwards, the others downwards. What stays where it is is left out, and a slot that is read and written is read first.
-    """
-    targets = {target for _, target in pairs}
-    first = [pair for pair in pairs if pair[0] in targets and pair[0] != pair[1]]
-    rest = [pair for pair in pairs if pair not in first and pair[0] != pair[1]]
-    up = [pair for pair in rest if (pair[0] - pair[1]) % PAGE < PAGE // 2]
-    return first + up + [pair for pair in reversed(rest) if pair not in up]
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,6 +224,18 @@ class Executor(Protocol):
             worst: takes the largest of `Plan.largest` and the smallest of `Plan.smallest`, lane by lane, of what stood there and of
                 all samples; NaN where a lane was not accepted. Shape (largest and smallest, room).
             first, step: column of the first sample, and from each to the next: 1 or -1.
+        """
+        ...
+
+    def fold(self, table: Array, totals: Array) -> None:
+        """Take numbers into totals, column by column, in the first group of lanes.
+
+        `Plan.kept` are set to what stood in the totals; then as many groups of numbers as there are slots in `Plan.taken` are read
+        at a time, and the programs in `after` run; at the end `Plan.kept` are put out.
+
+        Args:
+            table: shape (columns, room), contiguous; what is read at a time fits into the room a whole number of times.
+            totals: shape (kept, columns, group), contiguous.
         """
         ...
 

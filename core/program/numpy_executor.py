@@ -66,6 +66,17 @@ class NumpyExecutor(NumpyLanes):
         self.settle(start, self.plan.alone)
         return self.block[self.plan.slots[MARGIN]] > 0.0
 
+    def fold(self, table: Array, totals: Array) -> None:
+        """See `Executor`."""
+        plan, block = self.plan, self.block
+        for column, row in enumerate(table):
+            block[list(plan.kept)] = totals[:, column]
+            for some in row.reshape(-1, len(plan.taken), self.group):
+                block[list(plan.taken)] = some
+                for name in plan.after:
+                    self.run(name)
+            totals[:, column] = block[list(plan.kept)]
+
     def groups(self, lanes: int) -> int:
         """See `Executor`: its programs are bound to all lanes."""
         return 1

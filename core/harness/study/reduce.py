@@ -49,34 +49,6 @@ def nothing(quantities: int, n: int) -> Summary:
     )  # fmt: skip
 
 
-def summary(values: Array, first: int) -> Summary:
-    """Summarise variants.
-
-    Args:
-        values: NaN where there is none, shape (quantities, n, V).
-        first: index of the first variant.
-    """
-    quantities, n, variants = values.shape
-    mean = values.mean(axis=2)
-    if np.isnan(mean).any():  # some are missing
-        there = ~np.isnan(values)
-        count = there.sum(axis=2)
-        low, high = np.where(there, values, np.inf), np.where(there, values, -np.inf)
-        with np.errstate(all="ignore"):
-            mean = np.where(count, np.where(there, values, 0.0).sum(axis=2) / count, np.nan)
-        centered = np.where(there, values - mean[:, :, None], 0.0)
-    else:
-        count, low, high = np.full((quantities, n), variants), values, values
-        centered = values - mean[:, :, None]
-    least, most = low.min(axis=2), high.max(axis=2)
-    extremes = np.full((quantities, 2), -1, dtype=np.int64)
-    for q in np.flatnonzero(count.any(axis=1)).tolist():
-        lowest, highest = low[q, least[q].argmin()], high[q, most[q].argmax()]
-        extremes[q] = first + lowest.argmin(), first + highest.argmax()
-    least[count == 0] = most[count == 0] = np.nan
-    return Summary(count, least, most, mean, np.einsum("qnv,qnv->qn", centered, centered), extremes)
-
-
 def merged(a: Summary, b: Summary) -> Summary:
     """The summary of the variants of both; b's come after a's.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, reduce
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,8 @@ from ...jet import Jet
 from ...motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..case import Case, Quantity
-from .reduce import Summary, merged, summary
+from .reduce import Summary
+from .totals import Totals
 from .variation import Mode, Stream, Variation, generator
 
 # Variants that are solved together: what calls cost that reduce them is lost among as many. `solve_designs`, which reduces nothing,
@@ -213,7 +214,7 @@ class Ready:
         count = min(study.of_a_chunk, study.samples - first)
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
-        parts, picked, kept = list[Summary](), dict[int, Array](), list[Array]()
+        totals, picked, kept = Totals(len(study.rows), len(self.route.path.times)), dict[int, Array](), list[Array]()
         unsolved: list[Unsolved] = []
         effects: list[Array] = []
         stored: list[Array] = []
@@ -221,7 +222,7 @@ class Ready:
         for start in range(0, count, self.lanes):
             part = slice(start, min(start + self.lanes, count))
             values, solved, again, messages = self.values(offsets[:, part])
-            parts.append(summary(values, first + start))
+            totals.take(values, first + start)
             kept.append(values[:, :, chosen[part]])
             picked |= {k: values[:, :, k - first - start].copy() for k in self._picked(first, part)}
             failures += len(messages)
@@ -235,7 +236,7 @@ class Ready:
         return Chunk(
             index,
             count,
-            reduce(merged, parts),
+            totals.summary(),
             np.concatenate(kept, axis=2),
             picked,
             tuple(unsolved[:MOST_MESSAGES]),

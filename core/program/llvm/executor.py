@@ -95,6 +95,12 @@ class LlvmExecutor:
         self._code.call("fan", "fan")(*given, out.ctypes.data, *out.shape[1:], first, step, worst.ctypes.data)
         self._code.count(self._groups * wanted)
 
+    def fold(self, table: Array, totals: Array) -> None:
+        """See `Executor`."""
+        columns, room = table.shape
+        self._code.call("fold", "fold")(self._address, address(table), columns, room, address(totals))
+        self._code.count(columns * self.groups(room))
+
     def groups(self, lanes: int) -> int:
         """See `Executor`."""
         return -(-lanes // self._code.width)

@@ -14,6 +14,7 @@ from ..executor import Plan
 from . import compiled, compiler
 from .code import declarations
 from .fan import fan
+from .fold import fold
 from .follow import follow
 from .interpreter import interpret
 from .loops import parts, run, settle
@@ -25,6 +26,7 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
     "interpret": ([interpret], {"interpret": 2}),
     "follow": ([*_NEEDED, run, follow], {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3}),
     "fan": ([*_NEEDED, fan], {"fan": 12}),
+    "fold": ([rows, fold], {"fold": 6}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
 """What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..executor import DONE, ITERATIONS, MARGIN, Plan, in_order, shifted
+from ..executor import DONE, ITERATIONS, MARGIN, Plan, shifted
 from .code import Lines
 
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
@@ -30,6 +30,8 @@ TABLES: Mapping[str, int] = {
     "worst": 3,  # a slot, 1 or -1 where the smallest is wanted, and where to begin
 }
 """Columns of each. A table takes two numbers of the plan: its address, and how many rows it has."""
+PAGE = 64
+"""Slots of vectors of eight numbers in a page of memory."""
 TOGETHER = 4
 """Pairs of slots that are copied at a time; the last of a table is repeated until it has so many."""
 FIELDS = [*NUMBERS, *PROGRAMS, *(field for name in TABLES for field in (name, f"{name}_count"))]
@@ -184,6 +186,19 @@ class PlanInMemory:
     def entry(self, name: str) -> int:
         """The address of the call of a program."""
         return self.entries.ctypes.data + 16 * self.calls[name]
+
+
+def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Slots that are carried, in an order in which no slot is read soon after one was written that is a page away, or several.
+
+    Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that move by up to half a page go
+    upwards, the others downwards. What stays where it is is left out, and a slot that is read and written is read first.
+    """
+    targets = {target for _, target in pairs}
+    first = [pair for pair in pairs if pair[0] in targets and pair[0] != pair[1]]
+    rest = [pair for pair in pairs if pair not in first and pair[0] != pair[1]]
+    up = [pair for pair in rest if (pair[0] - pair[1]) % PAGE < PAGE // 2]
+    return first + up + [pair for pair in reversed(rest) if pair not in up]
 
 
 def _bits(x: float) -> int:
