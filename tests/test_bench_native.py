@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.core import SolveError
-from kincheck.core.harness.bench import batch, levels, peak, precision, processes, rounds, size
+from kincheck.core.harness.bench import batch, levels, peak, precision, processes, rounds, size, studies
 from kincheck.core.harness.record import Outcome
 
 TOL = 1e-12
@@ -72,6 +72,19 @@ def test_batches(monkeypatch):
     assert (one.variants, five.variants) == (1, 5)
     assert (five.solved, five.retried, five.of_peak) == (1.0, 0, None)
     assert max(one.error, five.error) < 1e-15
+
+
+def test_a_study_takes_turns_on_one_thread_and_on_two(monkeypatch):
+    pytest.importorskip("llvmlite")
+    monkeypatch.setattr(studies, "VARIANTS", 512)
+    monkeypatch.setattr(studies.os, "cpu_count", lambda: 4)
+    one, two = studies.measure_studies(cases.load("mcpherson_strut"), TOL, 3, peak.prepare())
+    assert (one.jobs, two.jobs, one.unsolved, two.unsolved) == (1, 2, 0, 0)
+    assert (one.times.least, one.peak_times.median, one.us_per_sample.rounds) == (1.0, 1.0, 3)
+    assert (two.times.rounds, two.peak_times.rounds) == (3, 3)
+    monkeypatch.setattr(studies.os, "cpu_count", lambda: 1)
+    (alone,) = studies.measure_studies(cases.load("mcpherson_strut"), TOL, 1, None)
+    assert (alone.variants, alone.peak_times) == (512, None)
 
 
 def test_chains_are_solved_until_they_take_too_long(monkeypatch):

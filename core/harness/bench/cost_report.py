@@ -44,6 +44,28 @@ def batches(found: Bench) -> Section:
     return Section(f"{found.batches[0].case}: cost against batch size", [], notes, headings, 1, rows, [batch_diagram(found)])
 
 
+def studies(found: Bench) -> Section:
+    """Cost of a tolerance study by threads."""
+    rows = [
+        (
+            str(each.jobs),
+            *cells(each.us_per_sample),
+            *cells(each.times),
+            "–" if each.peak_times is None else number(each.peak_times.median),
+            str(each.unsolved),
+        )
+        for each in found.studies
+    ]
+    first = found.studies[0]
+    notes = (
+        f"{first.variants} variants drawn, solved and reduced as by `kincheck sweep`, every hardpoint by a thousandth of the "
+        "mechanism's size; µs of the whole machine by sample and variant. Times as fast: as on one thread, by round; the kernel "
+        "that measures a core's peak tells what the machine gives at that time.",
+    )
+    headings = ("threads", "µs", "quartiles", "times as\nfast", "quartiles", "of the\npeak kernel", "unsolved")
+    return Section(f"{first.case}: a tolerance study by threads", [], notes, headings, 1, rows)
+
+
 def sizes(found: Bench, family: str) -> Section:
     """Cost against the size of one family of mechanisms, by engine."""
     sizes = [each for each in found.sizes if each.mechanism == family]

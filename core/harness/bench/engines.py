@@ -26,10 +26,11 @@ from .processes import Process, measure_processes
 from .rounds import Spread, Work, take_turns
 from .scaling import Scaling
 from .size import Size, measure_sizes
+from .studies import StudyRate, measure_studies
 
 NAME = "bench"
-PARTS = ("work", "batch", "size", "processes")
-"""What may be measured: work against precision, cost against batch size and mechanism size, first use and memory."""
+PARTS = ("work", "batch", "study", "size", "processes")
+"""What may be measured: work against precision, cost of batches, of a study, and against mechanism size, first use and memory."""
 
 # Sizes of chain and ring as one sparse system. A round of them takes seconds, which few interruptions are long against.
 LARGE, LARGE_ROUNDS = (100, 1000), 3
@@ -71,6 +72,7 @@ class Bench(msgspec.Struct, frozen=True, kw_only=True):
     levels: list[Entry] = []
     rates: list[Rate] = []
     batches: list[Batch] = []
+    studies: list[StudyRate] = []
     sizes: list[Size] = []
     scalings: list[Scaling] = []
     processes: list[Process] = []
@@ -87,7 +89,7 @@ def measure(
     command: str,
     tell: Callable[[str], object],
 ) -> Bench:
-    """Measure the parts asked for. Batches and processes are of the first case.
+    """Measure the parts asked for. Batches, studies and processes are of the first case.
 
     Args:
         cases: by name as on the command line; at least one.
@@ -114,6 +116,9 @@ def measure(
     if "batch" in parts:
         tell(f"{first.name}: batches of variants")
         add("batches", measure_batches(first, tol, rounds, peak))
+    if "study" in parts:
+        tell(f"{first.name}: a study by threads")
+        add("studies", measure_studies(first, tol, rounds, peak))
     if "size" in parts:
         tell("chains and rings of loops")
         add("sizes", measure_sizes(projections, tol, rounds))

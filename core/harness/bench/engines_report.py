@@ -43,6 +43,7 @@ def report(found: Bench) -> Report:
         sections.append(_levels(found, case))
     sections += [_rates(found)] if found.rates else []
     sections += [cost.batches(found)] if found.batches else []
+    sections += [cost.studies(found)] if found.studies else []
     sections += [cost.sizes(found, family) for family in dict.fromkeys(each.mechanism for each in found.sizes)]
     sections += [cost.scalings(found)] if found.scalings else []
     sections += [cost.processes(found)] if found.processes else []

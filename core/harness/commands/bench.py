@@ -53,9 +53,10 @@ def add(commands: Any) -> None:
     engines.add_argument(
         "--parts",
         nargs="+",
-        choices=("work", "batch", "size", "processes"),
-        default=["work", "batch", "size", "processes"],
-        help="work against precision; cost against batch size, and against mechanism size; first use and memory; default: all",
+        choices=("work", "batch", "study", "size", "processes"),
+        default=["work", "batch", "study", "size", "processes"],
+        help="work against precision; cost against batch size, of a study by threads, and against mechanism size; first use and "
+        "memory; default: all",
     )
     formulation = benchmarks.add_parser(
         "formulation", help="operation counts and round-off of the paper's rows", description=_formulation.__doc__
