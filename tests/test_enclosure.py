@@ -226,7 +226,7 @@ def _setup(mechanism, native, angle):
     driver = native.drivers[0].name
     motion = solve(native, driver, [angle], bodies=[body.name for body in native.moving])
     frame = frames(mechanism)
-    kept = select_rows(mechanism, frame, Cartesian(constraints(mechanism, frame, {}), frame.moving)).kept
+    kept = select_rows(mechanism, frame, Cartesian(constraints(mechanism, frame, {}), frame.moving)).chosen
     with precision(BITS):
         traced = equations(exact_mechanism(mechanism, as_double), (driver,), [p.name for p in mechanism.points], kept)
         drives = [[flint.arb(angle), flint.arb(1), flint.arb(0)]]

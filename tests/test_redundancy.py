@@ -60,9 +60,9 @@ def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
     selection = select_rows(mechanism, frame, formulation)
     assert {formulation.owners[k][0].removeprefix("twin ") for k in selection.dropped} <= {"pin_1", "pin_2"}
     traced = Tracer(mechanism, Request(("turn",), mechanism.points))
-    assert traced.selection.kept == selection.kept
+    assert traced.selection.chosen == selection.chosen
     rows = traced.formulation.rows(traced.at)
-    assert Elimination([rows[k] for k in selection.kept]).core_size == 4
+    assert Elimination([rows[k] for k in selection.chosen]).core_size == 4
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -73,7 +73,7 @@ def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
     mechanism = planar.four_bar(plane, *bars)
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
-    kept = select_rows(mechanism, frame, formulation).kept
+    kept = select_rows(mechanism, frame, formulation).chosen
     turns = np.linspace(-np.pi, np.pi, 37)
     moved = planar.four_bar_motion(plane, *bars)(turns[None])
     for sample in range(37):

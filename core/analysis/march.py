@@ -95,8 +95,8 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
         n = len(route.path.times)
         end = replace(found.ends[0], message=f"on the way to the first sample: {found.messages[0]}")
         return March(np.full((len(found.kept), n), np.nan), found.worst, np.zeros(n, np.bool_), (end,))
-    start = model.moving(arrived(model, found.visited[last]), route.origin)
-    return Marcher(route, start, accept_by(tol, crossing=crossing)).run(visit, low)
+    departure = model.departing(arrived(model, found.visited[last]), route.origin)
+    return Marcher(route, departure, accept_by(tol, crossing=crossing)).run(visit, low)
 
 
 def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
@@ -128,10 +128,10 @@ class Grid:
         sides, track: see `Side` and `Track`.
     """
 
-    def __init__(self, route: Route, start: Array, parts: int) -> None:
+    def __init__(self, route: Route, departure: Array, parts: int) -> None:
         self.parts, self.ends = parts, route.ends(parts)
         self.sides = route.sides if parts == 1 else route.divided(parts)
-        self.track = route.model.executor(route.lanes).track(self.sides, start[route.model.ahead], parts * len(self.ends))
+        self.track = route.model.executor(route.lanes).track(self.sides, departure[route.model.ahead], parts * len(self.ends))
 
     @cached_property
     def kept(self) -> Array:
@@ -142,13 +142,13 @@ class Grid:
 class Marcher:
     """A route bound to lanes of this thread, to be gone along again and again."""
 
-    def __init__(self, route: Route, start: Array, tolerances: Mapping[str, float]) -> None:
+    def __init__(self, route: Route, departure: Array, tolerances: Mapping[str, float]) -> None:
         self.route, self.model, self.slots = route, route.model, route.model.slots
-        self.start, self.crossing = start.copy(), tolerances["crossing"] > 0.0
+        self.departure, self.crossing = departure.copy(), tolerances["crossing"] > 0.0
         for name, value in tolerances.items():
-            self.start[self.slots[name]] = value
+            self.departure[self.slots[name]] = value
         self.every = np.ones(len(route.path.times), dtype=np.bool_)
-        self.grid = Grid(route, self.start, 1)
+        self.grid = Grid(route, self.departure, 1)
         self.track = self.grid.track
         self.counts = [side.count for side in self.grid.sides]
         self._finer: list[Grid] = []
@@ -158,13 +158,13 @@ class Marcher:
         """Grids of parts of the steps; each is made when it is first needed."""
         for k, parts in enumerate(parts for parts in FINER if parts * len(self.every) <= ROOM):
             if k == len(self._finer):
-                self._finer.append(Grid(self.route, self.start, parts))
+                self._finer.append(Grid(self.route, self.departure, parts))
             yield self._finer[k]
 
     def run(self, visit: Collection[int] = (), low: float = 0.0) -> March:
         """See `march`."""
         if self.model.geometry:  # the lanes know their variant
-            self.route.model.executor(self.route.lanes).put(range(len(self.start)), self.start[:, None])
+            self.route.model.executor(self.route.lanes).put(range(len(self.departure)), self.departure[:, None])
         self.kept, self.solved = self.track.begin(), self.every.copy()
         self.visit, self.visited = visit, dict[int, Array]()
         self.low = low if self.model.selection.dropped else 0.0
@@ -239,7 +239,7 @@ class Marcher:
 
     def _anchor(self, number: int) -> Array:
         """All slots of a lane where the motion stands on a side."""
-        found = self.start.copy()
+        found = self.departure.copy()
         found[self.model.ahead] = self.track.anchors[number]
         return found
 
@@ -249,13 +249,13 @@ class Marcher:
 
     def _stops(self, side: Side) -> list[int]:
         """How many samples of a side have passed where one to visit has."""
-        place = np.argsort(self.route.order)
+        place = np.argsort(self.route.by_time)
         passed = {int((place[k] - side.first) * side.step) + 1 for k in self.visit}
         return sorted(count for count in passed if 1 <= count <= side.count)
 
     def _stand(self, number: int, passed: int) -> None:
         side = self.route.sides[number]
-        sample = int(self.route.order[side.first + side.step * (passed - 1)])
+        sample = int(self.route.by_time[side.first + side.step * (passed - 1)])
         if sample in self.visit:
             self.visited[sample] = self._anchor(number)
 
@@ -273,7 +273,7 @@ class Marcher:
         lanes = parts.get(every)
         if part is None:
             return why_refused(self.model, lanes[:, np.flatnonzero(~(lanes[self.slots[MARGIN]] > 0.0))[-1]])
-        return self.model.moving(lanes[:, part[0]], lanes[self.model.sampled, part[0]])
+        return self.model.departing(lanes[:, part[0]], lanes[self.model.sampled, part[0]])
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
         sigma, last = float(anchor[self.slots[FROM + SIGMA]]), float(side.samples[0, at - 1]) if at else None

@@ -190,12 +190,12 @@ class Model:
         drivers = [self.mechanism.driver(name) for name in self.request.drivers]
         return np.concatenate([times[None], drive_numbers(drivers, drive, self.frame.unit)])
 
-    def moving(self, lane: Array, sample: Array) -> Array:
+    def departing(self, lane: Array, sample: Array) -> Array:
         """A lane that goes on from where a solved lane stands, with the rates that a sample of the drives gives it there."""
         executor = self.executor(1)
         every = range(len(self.slots))
         executor.put(every, lane[:, None])
-        self.start(executor, sample)
+        self.depart(executor, sample)
         return executor.get(every)[:, 0]
 
     @cached_property
@@ -203,7 +203,7 @@ class Model:
         """The places of what lanes are predicted from."""
         return [target for _, target in self.plan.carried]
 
-    def start(self, executor: Executor, sample: Array) -> None:
+    def depart(self, executor: Executor, sample: Array) -> None:
         """Make solved lanes those that go on from where they stand, with the rates that a sample of the drives gives them."""
         executor.put(self.sampled, sample[:, None])
         executor.run(self._tangent)

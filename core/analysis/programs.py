@@ -106,7 +106,7 @@ class Tracer:
             self.store(out, name, value)
 
     def _kept(self, values: Sequence[Any]) -> list[Any]:
-        return [values[k] for k in self.selection.kept]
+        return [values[k] for k in self.selection.chosen]
 
     @cached_property
     def _factor(self) -> Elimination:

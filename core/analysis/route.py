@@ -51,7 +51,7 @@ class Route:
         return self.path.start if self.since is None else self.since
 
     @cached_property
-    def order(self) -> NDArray[np.intp]:
+    def by_time(self) -> NDArray[np.intp]:
         """The samples by time."""
         return np.argsort(self.path.times, kind="stable")
 
@@ -60,9 +60,9 @@ class Route:
         """What puts samples that are sorted by time back into the order wanted."""
         n = len(self.path.times)
         for simple in (AS_THEY_ARE, slice(None, None, -1)):
-            if (self.order == np.arange(n)[simple]).all():
+            if (self.by_time == np.arange(n)[simple]).all():
                 return simple
-        return np.argsort(self.order, kind="stable")
+        return np.argsort(self.by_time, kind="stable")
 
     @cached_property
     def origin(self) -> Array:
@@ -72,12 +72,12 @@ class Route:
     @cached_property
     def departure(self) -> Array:
         """All slots of a lane that stands at the design position and moves as the start says."""
-        return self.model.moving(self.model.design if self.design is None else self.design, self.origin)
+        return self.model.departing(self.model.design if self.design is None else self.design, self.origin)
 
     @cached_property
     def below(self) -> int:
         """How many samples are before the start."""
-        return int(np.searchsorted(self.path.times[self.order], self.start, side="left"))
+        return int(np.searchsorted(self.path.times[self.by_time], self.start, side="left"))
 
     @cached_property
     def sides(self) -> tuple[Side, ...]:
@@ -86,7 +86,7 @@ class Route:
 
     def divided(self, parts: int) -> tuple[Side, ...]:
         """The sides with every step in equal parts, the last of which ends at the sample; see `ends`."""
-        times = self.path.times[self.order]
+        times = self.path.times[self.by_time]
         n, below, executor = len(times), self.below, self.model.executor(self.lanes)
         found: list[Side] = []
         for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):

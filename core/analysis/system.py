@@ -62,7 +62,7 @@ class System:
 
     def __init__(self, model: Model) -> None:
         self.model, self._tracer = model, Tracer(model.mechanism, replace(model.request, compiled=False))
-        tracer, kept = self._tracer, self._tracer.selection.kept
+        tracer, kept = self._tracer, self._tracer.selection.chosen
         formulation, at, vector = tracer.formulation, tracer.at, tracer.layout.vector
         self.unknowns = tracer.unknowns
         self.conditions = formulation.conditions

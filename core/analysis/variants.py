@@ -90,9 +90,9 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
             continue
         found = march(replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0]), tol)
-        kept[:, :, k], solved[:, k] = found.kept[:, route.order], found.solved[route.order]
+        kept[:, :, k], solved[:, k] = found.kept[:, route.by_time], found.solved[route.by_time]
         if found.messages:
-            kept_rows, others = len(model.selection.kept), len(model.selection.dropped)
+            kept_rows, others = len(model.selection.chosen), len(model.selection.dropped)
             rows = [OTHER_ROWS.format(count=kept_rows, all=kept_rows + others)] if others else []
             messages[k] = "; ".join([*found.messages, BY_ITSELF, *rows])
     for k, message in _held(route, geometry, solved).items():
@@ -103,7 +103,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         if not doubted.any():
             continue
         kept[:, doubted, k], solved[doubted, k] = np.nan, False
-        near = route.path.where(float(route.path.times[route.order][doubted.argmax()]))
+        near = route.path.where(float(route.path.times[route.by_time][doubted.argmax()]))
         refused = f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}; "
         messages[k] = "; ".join(filter(None, [messages.get(k, ""), f"{refused}solve this variant by itself, or keep away from it"]))
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
@@ -121,7 +121,7 @@ def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int,
     model, found = route.model, dict[int, str]()
     if not (model.selection.dropped and route.from_design):
         return found
-    away = route.path.times[route.order] != route.start
+    away = route.path.times[route.by_time] != route.start
     for k in np.flatnonzero(solved.any(axis=0) & ~solved[away].any(axis=0)).tolist():
         try:
             require_driven(_variant(model, geometry[:, k]))
@@ -148,7 +148,7 @@ def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tupl
     accepted_by = accept_by(tol)
     executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
     arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
-    model.start(executor, route.origin)
+    model.depart(executor, route.origin)
     # what lanes are predicted from, with what stands between: one stretch is copied in half the time of single slots
     ahead = executor.window(range(min(model.ahead), max(model.ahead) + 1))
     start = ahead.copy()
@@ -176,7 +176,7 @@ def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
     """Take lanes from the design to the first sample, where they stand afterwards; which of them arrived there."""
     model, last = route.model, route.path.lead_in()
     way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
-    model.start(executor, way.origin)
+    model.depart(executor, way.origin)
     found = executor.table(LEAD)
     (side,) = way.sides
     worst = np.repeat(model.plan.best, executor.room, axis=1)

@@ -30,7 +30,7 @@ def explain(case: Case) -> list[str]:
         f"{case.name}: {account.moving_coordinates} unknowns for {_names([body.name for body in mechanism.moving])}",
         f"  fixed, in no program: {_names(fixed)}",
         *([f"  joints between fixed bodies, which hold at the design: left out: {_names(grounded)}"] if grounded else []),
-        f"  rows solved {len(models[-1].selection.kept)}, redundant and only checked: {_names(account.redundant_rows)}",
+        f"  rows solved {len(models[-1].selection.chosen)}, redundant and only checked: {_names(account.redundant_rows)}",
         f"  drivers moving: {_names(moving)}; held, constants: {_names(held)}",
         f"  points computed: {_names(case.points)}; not read by an output, not computed: {_names(unread)}",
     ]

@@ -112,7 +112,7 @@ class Closing:
     def __init__(self, mechanism: Mechanism, values: Mapping[str, float], style: str = "mixed") -> None:
         self.values, self.moving = values, tuple(body.name for body in mechanism.moving)
         self.tracer = tracer = Tracer(mechanism, Request(tuple(values), (), self.moving, order=0, style=Style(style)))
-        self.kept = list(tracer.selection.kept)
+        self.kept = list(tracer.selection.chosen)
         phi, rows = tracer.formulation.phi(tracer.at), tracer.formulation.rows(tracer.at)
         slot, vector = tracer.layout.scalar, tracer.layout.vector
         self._phi, self._step = vector("phi", len(phi)), vector("step", tracer.unknowns)

@@ -134,7 +134,7 @@ def conditioning(
         configuration = formulation.configuration(_floats(state_of(formulation, mechanism, frame, pose, change)))
         matrix = jacobian(formulation, configuration)
         matrices.append(matrix)
-        kept = list(chosen(matrix, [model.selection.kept], len(mechanism.drivers), formulation.conditions))
+        kept = list(chosen(matrix, [model.selection.chosen], len(mechanism.drivers), formulation.conditions))
         dropped = [row for row in range(len(matrix)) if row not in kept]
         solved, rest = matrix[kept], matrix[dropped]
         U, sizes, V = np.linalg.svd(solved)

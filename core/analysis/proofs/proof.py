@@ -74,7 +74,7 @@ def prove(
     others: dict[int, Sequence[str]] = {}
     names = row_names(Cartesian.of(mechanism, model.frame))
     with precision(bits):
-        exact, kept = exact_mechanism(mechanism, reading), model.selection.kept
+        exact, kept = exact_mechanism(mechanism, reading), model.selection.chosen
         traced = {kept: equations(exact, tuple(drives), points, kept)}
         unit = traced[kept].frame.unit
         units = [1 if mechanism.driver(name).turns else Fraction(unit) for name in drives]

@@ -62,15 +62,15 @@ class Choice:
             return None
         system, sample = system_of(model), route.sampled(lane[[slots[FROM + TIME]]])
         found = system.equations(system.state(lane[:, None]), sample)
-        matrix = np.empty((len(model.selection.kept) + len(model.selection.dropped), system.unknowns))
-        matrix[[*model.selection.kept]], matrix[[*model.selection.dropped]] = found.jacobian[0], found.redundant[0]
+        matrix = np.empty((len(model.selection.chosen) + len(model.selection.dropped), system.unknowns))
+        matrix[[*model.selection.chosen]], matrix[[*model.selection.dropped]] = found.jacobian[0], found.redundant[0]
         if not np.isfinite(matrix).all():
             return None
         largest = float(lane[slots[FROM + LARGEST_SIGMA]])
-        least = max(BETTER * _sigma(matrix, model.selection.kept), SEEN * largest)
+        least = max(BETTER * _sigma(matrix, model.selection.chosen), SEEN * largest)
         if not _sigma(matrix, range(len(matrix))) > least:
             return None
-        known = {each.selection.kept: each for each in self.models}
+        known = {each.selection.chosen: each for each in self.models}
         rows = chosen(matrix, [*known], len(model.mechanism.drivers), system.conditions)
         sigma = _sigma(matrix, rows)
         if not sigma > least:

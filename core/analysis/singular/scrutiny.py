@@ -74,7 +74,7 @@ class Findings:
 def scrutinise(route: Route, found: March, tol: float) -> Findings:
     """Solve doubtful samples again, in place, and those beyond an end that the motion passes; say what was found."""
     scrutiny = _Scrutiny(Followed(route, found, tol))
-    if len(route.model.selection.kept) > LARGEST:
+    if len(route.model.selection.chosen) > LARGEST:
         return scrutiny.too_large()
     scrutiny.followed.go_on()
     scrutiny.samples()
@@ -95,7 +95,7 @@ class _Scrutiny:
 
     def too_large(self) -> Findings:
         """Say that nothing was examined."""
-        count, unknowns = int(self.followed.doubtful.sum()), len(self.route.model.selection.kept)
+        count, unknowns = int(self.followed.doubtful.sum()), len(self.route.model.selection.chosen)
         if count:
             self.findings.notes.append(
                 f"{count} samples seem to be nearly singular, and were not examined: {unknowns} unknowns are more than {LARGEST}"

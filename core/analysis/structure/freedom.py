@@ -81,7 +81,7 @@ class Selection:
     """The rows that are solved: as many as there are unknowns, drivers among them."""
 
     account: FreedomAccount
-    kept: tuple[int, ...]
+    chosen: tuple[int, ...]
     dropped: tuple[int, ...]
 
 

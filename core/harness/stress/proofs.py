@@ -40,7 +40,7 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
     still = Cartesian.of(mechanism, frame)
     pose = _state(truth, at, [*still.design], frame.unit, frame.origins)
     change = {name: float(drives[0, system.names.index(name)]) for name in path.motions}
-    kept = chosen_at(mechanism, change, pose, select_rows(mechanism, frame, still).kept)
+    kept = chosen_at(mechanism, change, pose, select_rows(mechanism, frame, still).chosen)
     with precision(BITS):
         traced = equations(exact_mechanism(mechanism, as_double), tuple(path.motions), points, kept)
         driven = [
