@@ -19,6 +19,7 @@ the extremes; each with what it begins with. Distances from a number among them 
 AT_A_TIME = 8
 """Numbers of each lane that are taken before the totals are put out."""
 NUMPY_LANES = 128
+"""Of the numpy executor: with those at a time, as many variants as are solved together."""
 
 
 @cache
@@ -47,8 +48,7 @@ class Totals:
     """
 
     def __init__(self, quantities: int, n: int) -> None:
-        # in place, in lanes of this thread
-        self._executor = _bound(None, _executor)
+        self._executor = _bound(None, _executor)  # for this thread: its lanes hold totals while numbers are taken
         self.found = np.empty((quantities, len(BEGIN), n, self._executor.group))
         self.found[:] = np.array([*BEGIN.values()])[:, None, None]
         self.extremes = np.full((quantities, 2), -1, dtype=np.int64)
