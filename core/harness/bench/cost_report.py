@@ -58,7 +58,7 @@ def studies(found: Bench) -> Section:
     ]
     first = found.studies[0]
     notes = (
-        f"{first.variants} variants drawn, solved and reduced as by `kincheck sweep`, every hardpoint by a thousandth of the "
+        f"{first.variants} variants drawn, solved and reduced as kincheck sweep does it, every hardpoint by a thousandth of the "
         "mechanism's size; µs of the whole machine by sample and variant. Times as fast: as on one thread, by round; the kernel "
         "that measures a core's peak tells what the machine gives at that time.",
     )
