@@ -19,7 +19,7 @@ from kincheck.core import (
     solve,
     solve_designs,
 )
-from kincheck.core.analysis import variants
+from kincheck.core.analysis import designs, variants
 from kincheck.core.analysis.equations.geometry import placed, places
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import Request
@@ -204,7 +204,9 @@ def test_a_variant_that_cannot_move_is_not_solved_at_its_design_either(values):
         assert message == str(own.value)
 
 
-def test_designs_are_solved_as_one_by_one():
+@pytest.mark.parametrize("room", [designs.ROOM, 0])  # of their table: many at once, or the least
+def test_designs_are_solved_as_one_by_one(monkeypatch, room):
+    monkeypatch.setattr(designs, "ROOM", room)
     mechanism, _ = strut()
     values = np.linspace(-0.05, 0.05, 7)
     moved = np.array([1.115, 0.665, 0.118]) + np.random.default_rng(3).normal(size=(300, 3)) * 1e-3

@@ -19,8 +19,9 @@ from .route import recent_route
 from .solve import asked
 from .variants import solve_variants
 
-# Variants solved at once. Their lanes stay in the second-level cache; fewer would leave the calls around them to be felt.
-LANES = 256
+# Variants solved at once: their lanes stay in the second-level cache. Fewer where the table of their motions takes more bytes than
+# these, which costs up to a third of the time; of fewer than the least the calls around them would be felt.
+MOST, LEAST, ROOM = 256, 32, 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +91,9 @@ def solve_designs(
     labels = QUANTITIES[: request.order + 1]
     motion: dict[str, dict[str, Any]] = {name: {label: np.empty((count, n, 3)) for label in labels} for name in request.points}
     solved, messages = np.empty((count, n), dtype=np.bool_), dict[int, str]()
-    for first in range(0, count, LANES):
-        here = slice(first, min(first + LANES, count))
+    together = max(LEAST, min(MOST, ROOM // (8 * route.model.kept * max(1, n)) // LEAST * LEAST))
+    for first in range(0, count, together):
+        here = slice(first, min(first + together, count))
         part = solve_variants(route, lanes[:, here], tol)
         solved[here] = part.solved.T
         messages |= {first + k: message for k, message in part.messages.items()}
