@@ -237,6 +237,13 @@ def test_programs_that_another_process_walked_are_compiled_in_the_first_sweep():
     assert not made.interpreted
 
 
+def test_who_measures_has_programs_compiled_at_once_and_nobody_else():
+    with llvm.compiled_at_once():
+        made = compile_model(mcpherson(), Request(("stroke",), ()))._code
+    assert not made.interpreted  # they have run: the design is solved
+    assert compile_model(four_bar(), Request(("turn",), ()))._code.interpreted
+
+
 def test_what_was_compiled_is_found_by_the_next_process():
     plan = compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan
     assert LlvmCode(plan).interpreted

@@ -12,6 +12,7 @@ import msgspec
 
 from ...errors import KincheckError
 from ...program.llvm import compiler
+from ...program.llvm.machine_code import compiled_at_once
 from ..case import Case
 from ..circumstances import THREADS, circumstances
 from ..engine import Engine
@@ -79,6 +80,7 @@ class Bench(msgspec.Struct, frozen=True, kw_only=True):
     formulation: Formulation | None = None
 
 
+@compiled_at_once()
 def measure(
     cases: Mapping[str, Case],
     engines: Sequence[Engine],

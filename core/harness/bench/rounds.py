@@ -13,9 +13,8 @@ import numpy as np
 
 # A turn is long against the clock's resolution and short against what interrupts a process: quick work is done several times.
 TURN = 2e-3
-# Programs of few bodies are compiled in the eighth sweep of 161 samples, longer ones, which take longer to compile, later: those of
-# fifteen bodies in the hundredth sweep of 64 samples. What is slow is called less [s].
-FIRST, PATIENCE = 128, 0.5
+# Of the first calls one is as quick as all that follow, if programs are compiled at once. What is slow is called less [s].
+FIRST, PATIENCE = 16, 0.5
 
 Key = TypeVar("Key")
 Work = Callable[[], object]
@@ -69,7 +68,7 @@ def _calls(work: Work) -> int:
 
 
 def warmed(work: Work, clock: Callable[[], float] | None = None) -> float:
-    """Seconds of a call by a clock, the least of some: in any of the first, programs may be compiled, once for all."""
+    """Seconds of a call by a clock, the least of some: in the first, programs may be compiled, once for all."""
     least, begin, clock = math.inf, perf_counter(), clock or perf_counter
     for _ in range(FIRST):
         before = clock()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache, partial
 from pathlib import Path
 from threading import Lock, Thread
@@ -35,6 +37,17 @@ OFTEN, AGAIN, OPERATIONS = 150, 20, 3000
 Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups of eight, and six sweeps of `kincheck run`
 are interpreted to the end. For those whose tables are in the cache somebody did come back: they are compiled after the second
 number, in the first sweep."""
+_AT_ONCE = ContextVar("at once", default=False)
+
+
+@contextmanager
+def compiled_at_once() -> Generator[None]:
+    """Have programs that are made meanwhile compiled when they have run once: for whoever measures what they cost warm."""
+    before = _AT_ONCE.set(True)
+    try:
+        yield
+    finally:
+        _AT_ONCE.reset(before)
 
 
 class LlvmCode:
@@ -65,7 +78,8 @@ class LlvmCode:
                 table.words.ctypes.data,
             )
         operations = sum(len(each.nodes) for each in plan.programs.values())
-        self._alive, self._left = tables, (AGAIN if again else OFTEN) * max(OPERATIONS, operations) // OPERATIONS
+        often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
+        self._alive, self._left = tables, often * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:
         """A function of a loop, for this plan."""
