@@ -19,6 +19,7 @@ from kincheck.core import (
     Translational,
     Universal,
     solve,
+    solve_designs,
 )
 from kincheck.core.analysis.sparse import sweep
 from kincheck.core.harness.bench.ring import ring
@@ -30,6 +31,17 @@ Z = (0.0, 0.0, 1.0)
 def test_a_large_mechanism_that_is_not_driven_is_told_what_can_move(cranks):
     with pytest.raises(SolveError, match=r"1 degree of freedom .* but 0 drivers; .*crank"):
         solve(replace(ring(cranks), drivers=()), "turn", [0.0])
+
+
+def test_designs_of_many_bodies_tied_together_are_told_that_it_may_be_the_estimate():
+    """By itself it is solved: what is known of sigma is better there."""
+    whole = ring(24)
+    (hinge,) = (joint.point for joint in whole.joints if joint.name == "pivot1")
+    found = solve_designs(whole, "turn", [0.1], {"joints.pivot1.point": [hinge]})
+    assert not found.solved.any()
+    assert (
+        "or so it seems by an estimate that is poor for 47 bodies tied together: solve this variant by itself" in found.messages[0]
+    )
 
 
 def test_a_gear_leaves_a_large_mechanism_a_sparse_system():

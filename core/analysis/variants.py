@@ -23,6 +23,7 @@ from .continuity import doubtful
 from .equations.geometry import placed, places
 from .march import FINER, ROOM, march
 from .model import LARGEST, SMALLEST, Model
+from .prepare import IRREDUCIBLE
 from .request import SIGMA, accept_by
 from .route import Route
 from .structure.driven import require_driven
@@ -41,6 +42,9 @@ OTHER_ROWS = (
     "what is singular may be the {count} rows chosen at the nominal design out of {all}, and not the mechanism: solve this variant "
     "by itself, and rows are chosen anew where these come to depend on each other; those of many at once stay"
 )
+# What is known of sigma here is an estimate, which of many bodies that are tied together is far too small.
+BY_SIGMA = "solve this variant by itself, or keep away from it"
+BY_SPARSE = "or so it seems by an estimate that is poor for {bodies} bodies tied together: solve this variant by itself"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +108,9 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
             continue
         kept[:, doubted, k], solved[doubted, k] = np.nan, False
         near = route.path.where(float(route.path.times[route.by_time][doubted.argmax()]))
-        refused = f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}; "
-        messages[k] = "; ".join(filter(None, [messages.get(k, ""), f"{refused}solve this variant by itself, or keep away from it"]))
+        refused = f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}"
+        remedy = BY_SPARSE.format(bodies=bodies) if (bodies := len(model.frame.moving)) > IRREDUCIBLE else BY_SIGMA
+        messages[k] = "; ".join(filter(None, [messages.get(k, ""), refused, remedy]))
     return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
 
 
