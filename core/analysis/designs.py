@@ -89,8 +89,9 @@ def solve_designs(
     route = recent_route(mechanism, replace(request, varied=tuple(geometry)), path)
     rows, lanes, n = route.model.rows, np.concatenate(numbers), len(path.times)
     labels = QUANTITIES[: request.order + 1]
-    motion: dict[str, dict[str, Any]] = {name: {label: np.empty((count, n, 3)) for label in labels} for name in request.points}
-    solved, messages = np.empty((count, n), dtype=np.bool_), dict[int, str]()
+    # in memory designs stand side by side, as they are solved: to turn what is found takes as long as solving it
+    motion: dict[str, dict[str, Any]] = {name: {label: np.empty((3, n, count)).T for label in labels} for name in request.points}
+    solved, messages = np.empty((n, count), dtype=np.bool_).T, dict[int, str]()
     together = max(LEAST, min(MOST, ROOM // (8 * route.model.kept * max(1, n)) // LEAST * LEAST))
     for first in range(0, count, together):
         here = slice(first, min(first + together, count))
