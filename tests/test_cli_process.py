@@ -3,7 +3,6 @@
 import importlib.metadata
 import subprocess
 import sys
-import time
 
 import kincheck.core
 from kincheck.core.harness import cli
@@ -33,13 +32,12 @@ def test_a_command_loads_no_other():
     assert done.stdout.splitlines()[-1] == "check_joint house"
 
 
-def test_the_start_is_quick_and_loads_nothing_that_is_not_needed():
+def test_the_start_loads_nothing_that_is_not_needed():
     code = (
         "import sys; from kincheck.core.harness import cli; status = cli.main(['--version']);"
-        "print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio', 'exudyn', 'scipy'} & set(sys.modules)))"
+        "print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio', 'exudyn', 'scipy', 'llvmlite', 'flint', 'pyarrow',"
+        "'sqlite3', 'asyncio', 'multiprocessing', 'distributed', 'kincheck.core.analysis', 'kincheck.core.program'}"
+        "& set(sys.modules)))"
     )
-    begin = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[1] == "[]"
-    # a tenth of it is usual; the rest is for a busy machine
-    assert time.perf_counter() - begin < 3.0
