@@ -2,7 +2,7 @@
 
 All variants take the same samples, predicted each from its own poses at the samples before. Those that are not accepted somewhere
 are solved again in parts of steps, and then alone, by the march that divides steps; what that does not reach either is NaN, with
-the reason.
+the reason. Of many bodies tied together each variant is solved by itself.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..motions import Path
-from ..program import Executor
-from ..trajectory import Array
+from ..program import ITERATIONS, Executor
+from ..trajectory import QUANTITIES, Array
 from .continuity import doubtful
 from .equations.geometry import placed, places
 from .march import FINER, ROOM, march
 from .model import LARGEST, SMALLEST, Model
-from .prepare import IRREDUCIBLE
+from .prepare import IRREDUCIBLE, prepare
 from .request import SIGMA, accept_by
 from .route import Route
 from .structure.driven import require_driven
@@ -42,9 +42,6 @@ OTHER_ROWS = (
     "what is singular may be the {count} rows chosen at the nominal design out of {all}, and not the mechanism: solve this variant "
     "by itself, and rows are chosen anew where these come to depend on each other; those of many at once stay"
 )
-# What is known of sigma here is an estimate, which of many bodies that are tied together is far too small.
-BY_SIGMA = "solve this variant by itself, or keep away from it"
-BY_SPARSE = "or so it seems by an estimate that is poor for {bodies} bodies tied together: solve this variant by itself"
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +103,33 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         doubted = solved[:, k] & doubtful(sigma[:, k], closure[:, k], tol)
         if not doubted.any():
             continue
+        if len(model.frame.moving) > IRREDUCIBLE:  # what is known of sigma here is an estimate, which is far too small then
+            kept[:, :, k], solved[:, k], messages[k] = _by_itself(route, geometry[:, k], tol)
+            continue
         kept[:, doubted, k], solved[doubted, k] = np.nan, False
         near = route.path.where(float(route.path.times[route.by_time][doubted.argmax()]))
-        refused = f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}"
-        remedy = BY_SPARSE.format(bodies=bodies) if (bodies := len(model.frame.moving)) > IRREDUCIBLE else BY_SIGMA
-        messages[k] = "; ".join(filter(None, [messages.get(k, ""), refused, remedy]))
-    return Variants(kept[:, route.back], solved[route.back], len(failed), messages)
+        refused = f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}; "
+        messages[k] = "; ".join(filter(None, [messages.get(k, ""), f"{refused}solve this variant by itself, or keep away from it"]))
+    return Variants(
+        kept[:, route.back], solved[route.back], len(failed), {k: message for k, message in messages.items() if message}
+    )
+
+
+def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray[np.bool_], str]:
+    """What is kept of a variant that is solved as any mechanism of its size, by time; which samples, and why others are missing."""
+    model, n = route.model, len(route.path.times)
+    kept = np.full((model.kept, n), np.nan)
+    try:
+        found = prepare(_variant(model, numbers), replace(model.request, varied=()), route.path)(tol)
+    except SolveError as error:
+        return kept, np.zeros(n, dtype=np.bool_), str(error)
+    for name, motion in found.points.items():
+        for label, values in zip(QUANTITIES, (motion.position, motion.velocity, motion.acceleration), strict=True):
+            if values is not None:
+                kept[model.rows[f"{label} {name}"]] = values.T
+    kept[model.rows["closure"]], kept[model.rows[ITERATIONS]] = found.residual / model.frame.unit, found.iterations
+    kept[:, ~found.solved] = np.nan
+    return kept[:, route.by_time], found.solved[route.by_time], found.message
 
 
 def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int, str]:
