@@ -84,11 +84,9 @@ def solve_by_projection(
         corrections: exactly so many Newton steps after the predictor, whatever residual they leave; None: until it meets tol.
         frame: in which the model has the mechanism.
     """
-    walk, path = Walk(model, case, tol, corrections, frame), case.sweep.path
-    start = start_of(case.mechanism, path)
-    facts = details or {}
-    exact = corrections is None
-    return by_ways(start, case.mechanism, path, lambda each: walk.trajectory(facts, each), compare=exact)
+    walk, mechanism, path = Walk(model, case, tol, corrections, frame), case.mechanism, case.sweep.path
+    start, exact = start_of(mechanism, path), corrections is None
+    return by_ways(start, mechanism, path, lambda each: walk.trajectory(details or {}, each), compare=exact)
 
 
 LOST = "Newton does not converge or jumps to another assembly"
@@ -243,7 +241,6 @@ class Walk:
         return found, "" if found else f"the pose at {begin.name} is reached, but its drivers cannot move there (a dead centre)"
 
     def trajectory(self, details: Mapping[str, Any], begin: Start) -> Trajectory:
-        """Return the motion at all samples, followed from a start."""
         path, points = self.case.sweep.path, self.case.points
         times, n = path.times, len(path.times)
         motion = np.full((3, n, len(points), 3), np.nan)
@@ -274,7 +271,6 @@ class Walk:
             "unknowns": self.unknowns,
             "length_unit": unit,
             "origin": [*self.frame.origin],
-            "start": begin.facts,
             **details,
         }
         return Trajectory(moves, solved, iterations, largest_found(unit * residual[solved]), "; ".join(messages), facts)

@@ -7,7 +7,7 @@ between the design and the path is travelled, never ignored.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -119,23 +119,17 @@ def by_ways(
         solve: solves all samples from a start.
         compare: whether the numbers are exact enough for two starts to be compared.
     """
-    found = solve(start)
-    if start.stands and (start.other is None or (found.solved.any() and not start.ambiguous)):
-        return found
+    found, taken, other = solve(start), start, start.other
     notes: list[str] = []
-    other, taken = start.other, start
     if other is not None and not found.solved.any():
         second = solve(other)
-        if not second.solved.any():
-            return found
-        notes.append(f"no sample can be reached by way of {start.name} ({found.message})")
-        found, taken = second, other
+        if second.solved.any():
+            notes.append(f"no sample can be reached by way of {start.name} ({found.message})")
+            found, taken = second, other
     elif other is not None and start.ambiguous and compare:
         notes += _differ(start, other, found, solve(other), size_of(mechanism))
-    notes += assumed(taken, path)
-    if not notes:
-        return found
-    return replace(found, details={**found.details, "notes": [*found.details.get("notes", ()), *notes]})
+    notes = [*found.details.get("notes", ()), *notes, *(assumed(taken, path) if found.solved.any() else ())]
+    return replace(found, details={**found.details, "start": taken.facts, **({"notes": notes} if notes else {})})
 
 
 def assumed(start: Start, path: Path) -> list[str]:
@@ -149,21 +143,16 @@ def assumed(start: Start, path: Path) -> list[str]:
 def _differ(start: Start, other: Start, found: Trajectory, second: Trajectory, size: float) -> list[str]:
     """Say by how much the motions from two starts differ; empty where they are one."""
     both = found.solved & second.solved
-    apart = [x - second.points[name].position for name, x in _positions(found)]
-    turned = [_turned(found.bodies[name].p, second.bodies[name].p) * size for name in found.bodies]
-    apart += [found.bodies[name].r - second.bodies[name].r for name in found.bodies]
-    worst = max((float(np.abs(each[both]).max(initial=0.0)) for each in (*apart, *turned)), default=0.0)
+    apart = [motion.position - second.points[name].position for name, motion in found.points.items()]
+    for name, body in found.bodies.items():
+        apart += [body.r - second.bodies[name].r, size * _turned(body.p, second.bodies[name].p)]
+    worst = max((float(np.abs(each[both]).max(initial=0.0)) for each in apart), default=0.0)
     if worst <= APART * size:
         return []
     return [
         f"AMBIGUOUS: by way of {other.name} the results differ by up to {worst:.6g} m (another assembly, or another number of "
         f"turns); {start.name} is taken; make the design position the pose at time zero, or begin the sweep there"
     ]
-
-
-def _positions(found: Trajectory) -> Iterator[tuple[str, Array]]:
-    for name, motion in found.points.items():
-        yield name, motion.position
 
 
 def _turned(p: Array, q: Array) -> Array:

@@ -246,7 +246,6 @@ class CascadeSweep:
             message="; ".join(messages),
             details={
                 **self._details,
-                "start": self.start.facts,
                 "redundant_residual": largest_found(tests["leftover"][solved]) * unit,
                 "smallest_singular_value": min(-largest_found(-tests[SIGMA][solved]), 1.0),
             }

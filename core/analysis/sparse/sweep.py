@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -49,12 +50,8 @@ def solve_sparse(
     """
     model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
     wanted = _Wanted(model, points), _Wanted(model, bodies, frames=True)
-    start = start_of(model.mechanism, path)
-
-    def by(start: Start) -> Trajectory:
-        return _Sweep(model, path, start, tol, *wanted, order).solve()
-
-    return by_ways(start, model.mechanism, path, by, compare=np.isfinite(tol))
+    sweep, start = partial(_Sweep, model, path, tol, *wanted, order), start_of(model.mechanism, path)
+    return by_ways(start, model.mechanism, path, lambda each: sweep(each).solve(), compare=np.isfinite(tol))
 
 
 AT_ONCE = 64
@@ -111,11 +108,11 @@ class _Sweep:
 
     model: SparseModel
     path: Path
-    start: Start
     tol: float
     points: _Wanted
     bodies: _Wanted
     order: int
+    start: Start
     messages: list[str] = field(default_factory=list[str])
     smallest_pivot: float = np.inf
     renewed: int = 0
@@ -291,7 +288,6 @@ class _Sweep:
             message="; ".join(self.messages),
             details={
                 **self.model.details,
-                "start": self.start.facts,
                 "redundant_residual": leftover,
                 "smallest_pivot": self.smallest_pivot,
                 **({"rows_chosen_anew": self.renewed} if self.renewed else {}),
