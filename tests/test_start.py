@@ -20,6 +20,8 @@ from kincheck.core.analysis.start import start_of
 from kincheck.core.harness.case import Case, Output, Sweep, Truth
 from kincheck.core.harness.model_writer import way_to
 from kincheck.core.harness.proving import prove_case
+from kincheck.core.harness.study.sweep import sweep_designs
+from kincheck.core.harness.study.vary import read_variation
 from kincheck.core.motions import Absolute, Path, Ramp, Sine, Table
 
 from .mechanisms import slider_crank
@@ -262,6 +264,26 @@ def test_many_designs_start_alike():
             one = replace(mechanism, points=[Point("tip", "b", tuple(tip)), mechanism.points[1]])
             alone = solve(one, "u", values, motions=motions)
             assert found.points["tip"].position[k] == pytest.approx(alone.points["tip"].position, abs=1e-12)
+
+
+def test_what_is_assumed_of_many_designs_is_said():
+    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+    tips = {"points.tip.position": np.array([(1.0, 0.1, 0.0)])}
+    near, far = (designs(mechanism, "u", TIMES, tips, motions={"v": Sine(0.5, 0.3, phase)}).notes for phase in (six(math.pi), 1.0))
+    assert [*near] == []
+    assert "the design position is not on the path: all drivers go straight" in "; ".join(far)
+
+
+@pytest.mark.parametrize(("phase", "said"), [(six(math.pi), False), (1.0, True)])
+def test_what_is_assumed_of_a_study_is_said(phase, said, tmp_path):
+    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+    file = tmp_path / "vary.toml"
+    file.write_text(
+        'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[units]\nlength = "m"\n[hardpoints.tip]\nat = "points.tip.position"\nsigma = 0.001\n'
+    )
+    case = case_of(mechanism, {"u": Sine(0.5, 0.3, phase), "v": Ramp(0.1)})
+    found = sweep_designs(case, read_variation(file, case), samples=8)
+    assert any("go straight" in note for note in found.run["cases"]["case"]["notes"]) == said
 
 
 def test_a_simulator_starts_there_too():

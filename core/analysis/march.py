@@ -85,7 +85,7 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
         low: leave off at a step that fails where the smallest singular value is below this part of the largest that it has had,
             if there are more rows than are solved: others may be better.
     """
-    stands = led(route, tol)
+    stands = route if route.stands else led(route, tol)
     if isinstance(stands, Route):
         return marcher(stands, tol, crossing=crossing).run(visit, low)
     n = len(route.path.times)

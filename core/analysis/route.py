@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +54,16 @@ class Route:
     def stands(self) -> bool:
         """Whether the lane it starts from stands on the path: at the design position, or on the way."""
         return self.since is not None or self.begin.lead is None
+
+    @cached_property
+    def single(self) -> bool:
+        """Whether the design position is its start, and nothing else can be."""
+        return self.stands and self.begin.other is None
+
+    @cached_property
+    def details(self) -> Mapping[str, Any]:
+        """What the record of every solution says of the model and of the start."""
+        return {**self.model.details, "start": self.begin.facts}
 
     @cached_property
     def start(self) -> float:

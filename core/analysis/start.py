@@ -7,8 +7,9 @@ between the design and the path is travelled, never ignored.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,8 +50,8 @@ class Start:
     other: Start | None = None
     ambiguous: bool = False
 
-    @property
-    def facts(self) -> dict[str, Any]:
+    @cached_property
+    def facts(self) -> Mapping[str, Any]:
         """Return the time, and how far the drivers go straight to there [SI], for the record."""
         way = dict[str, float]()
         if self.lead:

@@ -26,7 +26,7 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 
 def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
-    if route.stands and route.begin.other is None:
+    if route.single:
         return _follow(route, tol)
     compare = math.isfinite(tol)  # else nothing is asked of the samples
     return by_ways(route.begin, route.model.mechanism, route.path, lambda start: _follow(route.by(start), tol), compare=compare)
@@ -55,10 +55,9 @@ def _follow(route: Route, tol: float) -> Trajectory:
         residual=closure * unit,
         message=message,
         details={
-            **model.details,
+            **route.details,
             "redundant_residual": leftover * unit,
             "smallest_singular_value": min(sigma, 1.0),
-            "start": route.begin.facts,
             **findings,
         },
         bodies=Motions(BodyMotion, table, model.of_bodies),

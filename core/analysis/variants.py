@@ -26,6 +26,7 @@ from .model import LARGEST, SMALLEST, Model
 from .prepare import IRREDUCIBLE, prepare
 from .request import SIGMA, accept_by
 from .route import Route
+from .start import SAME_TIME
 from .structure.driven import require_driven
 
 # Steps of the straight way from the design to a start away from it: a sixteenth of it is a step like those of a sweep, and a lane
@@ -144,7 +145,8 @@ def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int,
     model, found = route.model, dict[int, str]()
     if not model.selection.dropped:
         return found
-    away = route.path.times[route.by_time] != route.start
+    times = route.path.times[route.by_time]
+    away = np.abs(times - route.start) > SAME_TIME * np.abs(times).max(initial=0.0)
     for k in np.flatnonzero(solved.any(axis=0) & ~solved[away].any(axis=0)).tolist():
         try:
             require_driven(_variant(model, geometry[:, k]))
