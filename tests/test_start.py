@@ -278,9 +278,8 @@ def test_what_is_assumed_of_many_designs_is_said():
 def test_what_is_assumed_of_a_study_is_said(phase, said, tmp_path):
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     file = tmp_path / "vary.toml"
-    file.write_text(
-        'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[units]\nlength = "m"\n[hardpoints.tip]\nat = "points.tip.position"\nsigma = 0.001\n'
-    )
+    what = '[units]\nlength = "m"\n[hardpoints.tip]\nat = "points.tip.position"\nsigma = 0.001\n'
+    file.write_text(f'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n{what}')
     case = case_of(mechanism, {"u": Sine(0.5, 0.3, phase), "v": Ramp(0.1)})
     found = sweep_designs(case, read_variation(file, case), samples=8)
     assert any("go straight" in note for note in found.run["cases"]["case"]["notes"]) == said
