@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..core import joints
+from ..core.analysis.start import start_of as where_from
 from ..core.harness.case import Case
 from ..core.joints.base import unit
 from ..core.trajectory import Array, Trajectory
@@ -81,7 +82,7 @@ class Solver:
         times = case.sweep.path.times
         if len(times) > 1 and np.ptp(np.diff(times)) > EQUIDISTANT * np.abs(np.diff(times)).max():
             return "samples are not equidistant in time, and Exudyn's steps are; give the sweep by start, stop and steps"
-        if case.mechanism.couplers and not case.sweep.path.from_design:
+        if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
             return "turns of coupled joints are counted from the design, where this motion does not begin"
         return None
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..core.analysis.continuity import LONGEST_TURN, ROUNDING, continuous
+from ..core.analysis.start import Start, by_ways, start_of
 from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
@@ -83,7 +84,9 @@ def solve_by_projection(
         corrections: exactly so many Newton steps after the predictor, whatever residual they leave; None: until it meets tol.
         frame: in which the model has the mechanism.
     """
-    return Walk(model, case, tol, corrections, frame).trajectory(details or {})
+    walk, mechanism, path = Walk(model, case, tol, corrections, frame), case.mechanism, case.sweep.path
+    start, exact = start_of(mechanism, path), corrections is None
+    return by_ways(start, mechanism, path, lambda each: walk.trajectory(details or {}, each), compare=exact)
 
 
 LOST = "Newton does not converge or jumps to another assembly"
@@ -214,11 +217,10 @@ class Walk:
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
         return bool(watched & continuous(dt * at.v + new.corrected, new.v, at.v, dt, self.size))
 
-    def start(self, path: Path) -> tuple[_Sample | None, str]:
-        """The pose the samples are reached from: the design, or the first sample where the design is not on the path."""
+    def start(self, path: Path, begin: Start) -> tuple[_Sample | None, str]:
+        """Return the pose the samples are reached from, and why there is none."""
         self.model.reset()
-        lead_in = path if path.from_design else path.lead_in()
-        design = self.solve(lead_in, 0.0)
+        design = self.solve(begin.lead, 0.0) if begin.lead else self.solve(path, begin.time)
         if design is None:
             if self.lost is STUCK:
                 return None, f"at the design position the {STUCK}"
@@ -226,25 +228,25 @@ class Walk:
                 None,
                 f"no assembly at the design position: {'the model does not close there' if self.lost is LOST else self.lost}",
             )
-        if path.from_design:
+        if begin.lead is None:
             return design, ""
-        first, reached = self.advance(lead_in, design, 1.0, 1.0)
+        first, reached = self.advance(begin.lead, design, 1.0, 1.0)
         if not reached:
             return (
                 None,
-                f"the drivers reach only {first.t:.3g} of the way from the design to the first sample: {self.lost}; start nearer",
+                f"the drivers reach only {first.t:.3g} of the way from the design to {begin.name}: {self.lost}; start nearer",
             )
         self.model.restore(first.saved)
-        found = self.solve(path, float(path.times[0]))
-        return found, "" if found else "the first sample's pose is reached, but its drivers cannot move there (a dead centre)"
+        found = self.solve(path, begin.time)
+        return found, "" if found else f"the pose at {begin.name} is reached, but its drivers cannot move there (a dead centre)"
 
-    def trajectory(self, details: Mapping[str, Any]) -> Trajectory:
+    def trajectory(self, details: Mapping[str, Any], begin: Start) -> Trajectory:
         path, points = self.case.sweep.path, self.case.points
         times, n = path.times, len(path.times)
         motion = np.full((3, n, len(points), 3), np.nan)
         iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)
         solved, messages = np.zeros(n, dtype=np.bool_), list[str]()
-        origin, message = self.start(path)
+        origin, message = self.start(path, begin)
         if origin is None:
             messages.append(message)
         else:

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.analysis.start import assumed
+from ..core.analysis.start import start_of as where_from
 from ..core.errors import KincheckError, SolveError
 from ..core.harness.case import Case
 from ..core.motions import outwards
@@ -45,6 +47,7 @@ class Start:
         residual: of the projection model there [m or -].
         size: of the mechanism [m].
         independent: whether the rows of the model are.
+        facts: how the model came there, for the record.
     """
 
     sample: int
@@ -55,6 +58,7 @@ class Start:
     residual: float
     size: float
     independent: bool
+    facts: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,15 +111,23 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
         SolveError: the design does not close, or the samples next to it, on either side, cannot be reached.
     """
     walk, path = Walk(model, case, START), case.sweep.path
-    origin, message = walk.start(path)
+    begin = where_from(case.mechanism, path)
+    origin, message = walk.start(path, begin)
+    notes: list[str] = []
+    if origin is None and begin.other is not None:
+        notes.append(f"no sample can be reached by way of {begin.name} ({message})")
+        begin = begin.other
+        origin, _ = walk.start(path, begin)
     if origin is None:
         raise SolveError(f"case {case.name!r}: {message}")
+    notes += assumed(begin, path)
+    facts = {"start": begin.facts, **({"notes": notes} if notes else {})}
     nearest = [int(side[0]) for side in outwards(path.times, origin.t) if len(side)]
     for k in sorted(nearest, key=lambda k: abs(float(path.times[k]) - origin.t)):
         aim = float(path.times[k])
         at, reached = walk.advance(path, origin, aim, abs(aim - origin.t))
         if reached:
-            return Start(k, at.saved, at.v, at.a, np.array(at.rows), at.residual, walk.size, walk.rows == walk.rank)
+            return Start(k, at.saved, at.v, at.a, np.array(at.rows), at.residual, walk.size, walk.rows == walk.rank, facts)
     raise SolveError(f"case {case.name!r}: no sample next to the design can be reached; let the sweep come nearer to it")
 
 
@@ -146,7 +158,7 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
         name: PointMotion(motion[0, :, k], motion[1, :, k] if known[1] else None, motion[2, :, k] if known[2] else None)
         for k, name in enumerate(case.points)
     }
-    return Trajectory(points, solved, steps, largest_found(np.array(residuals)), "; ".join(messages), details)
+    return Trajectory(points, solved, steps, largest_found(np.array(residuals)), "; ".join(messages), {**details, **start.facts})
 
 
 def legs(case: Case, start: int) -> list[Leg]:

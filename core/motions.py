@@ -20,6 +20,9 @@ from .errors import MechanismError
 from .given import finite, held
 from .trajectory import Array
 
+ROUNDED_TIME = 1e-12
+"""A time may lie outside a motion's span by this part of its numbers: the rounding of a time, and nothing that anybody writes."""
+
 
 class Measure(Enum):
     """What a field of a motion is measured in; tells a reader which unit applies."""
@@ -201,29 +204,29 @@ class Path:
             "shorten the sweep or drive another coordinate"
         )
 
-    @property
-    def from_design(self) -> bool:
-        """Whether the mechanism is at its design position at time zero, and so can be followed from there both ways.
-
-        Where there are no samples there is nothing to be led to.
-        """
-        return not len(self.times) or all(float(motion.at(np.zeros(1))[0][0]) == 0.0 for motion in self.motions.values())
-
-    @property
-    def start(self) -> float:
-        """The time it is followed from: that of the design position, or where that is not on it, of the first sample."""
-        return 0.0 if self.from_design else float(self.times[0])
-
     def drive(self, names: Sequence[str], t: Array) -> Array:
         """Value, velocity and acceleration of the named drivers at times t, shape (3, names, *t.shape)."""
         still = (np.zeros_like(t),) * 3
         return np.stack([np.stack(self.motions[name].at(t) if name in self.motions else still) for name in names], axis=1)
 
-    def lead_in(self) -> Path:
-        """The straight way of all drivers from the design at time zero to the first sample, at time one."""
-        first = self.times[:1]
-        ramps = {name: Ramp(float(motion.at(first)[0][0])) for name, motion in self.motions.items()}
-        return Path(ramps, np.ones(1))
+    def values(self, t: Array) -> Array:
+        """Return the moving drivers' values from the design at times t, shape (drivers, n)."""
+        return np.array([motion.at(t)[0] for motion in self.motions.values()]).reshape(-1, len(t))
+
+    def covers(self, t: float) -> bool:
+        """Return whether all motions are given for time t, up to its rounding."""
+        return all(_within(motion.span, t) for motion in self.motions.values())
+
+    def lead_in(self, to: float) -> Path:
+        """Return the straight way of all drivers from the design, at time zero, to where they are at a time, at time one."""
+        values = self.values(np.array([to]))[:, 0].tolist()
+        return Path({name: Ramp(value) for name, value in zip(self.motions, values, strict=True)}, np.ones(1))
+
+
+def _within(span: tuple[float, float], t: float) -> bool:
+    low, high = span
+    rounding = ROUNDED_TIME * max(abs(t), *(abs(each) for each in span if math.isfinite(each)), 0.0)
+    return low - rounding <= t <= high + rounding
 
 
 def outwards(times: Array, start: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

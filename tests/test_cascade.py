@@ -12,6 +12,7 @@ from kincheck.core.analysis.division import HALVINGS, part_of_step
 from kincheck.core.analysis.model import compile_model
 from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request, accept_by
 from kincheck.core.analysis.route import Route
+from kincheck.core.analysis.start import start_of
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.harness.reading.casefile import load_case
 from kincheck.core.motions import Path, Ramp, Sine
@@ -65,7 +66,7 @@ def test_any_samples(times):
 def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
     """The drivers go there in a second of their own; the path's own time may be any."""
     mechanism, path = chain(3), Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5))
-    assert not path.from_design
+    assert not start_of(chain(3), path).stands
     assert_alike(*both(mechanism, path, ("end",)))
 
 

@@ -15,6 +15,7 @@ from ..motions import Motion
 from ..trajectory import QUANTITIES, Array, PointMotion
 from .arguments import no_such, real
 from .equations.geometry import places
+from .prepare import start_notes
 from .route import recent_route
 from .solve import asked
 from .variants import solve_variants
@@ -32,11 +33,13 @@ class Designs:
         points: motion by point name, each array of shape (V, n, 3); NaN where a sample was not reached.
         solved: whether each sample of each design was reached, shape (V, n).
         messages: by design, why samples are missing.
+        notes: what is assumed of where all are followed from, as of the nominal design.
     """
 
     points: Mapping[str, PointMotion]
     solved: NDArray[np.bool_]
     messages: Mapping[int, str]
+    notes: Sequence[str] = ()
 
 
 def solve_designs(
@@ -102,7 +105,7 @@ def solve_designs(
             for label, values_of in each.items():
                 values_of[here] = part.kept[rows[f"{label} {name}"]].T
     found = {name: PointMotion(each["position"], each.get("velocity"), each.get("acceleration")) for name, each in motion.items()}
-    return Designs(found, solved, messages)
+    return Designs(found, solved, messages, start_notes(mechanism, request, path, tol))
 
 
 def _numbers(place: str, given: Array, size: int) -> Array:

@@ -61,7 +61,7 @@ class End:
 
     Attributes:
         message: where, and why.
-        route: on which: the one asked for, or the way to its first sample.
+        route: on which: the one asked for, or the straight way to its start.
         lane: all slots of the last pose that was reached.
         wanted: time of the sample that was not.
         early: see `march`: no part of the step was tried.
@@ -85,18 +85,26 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
         low: leave off at a step that fails where the smallest singular value is below this part of the largest that it has had,
             if there are more rows than are solved: others may be better.
     """
-    model = route.model
-    if route.from_design:
-        return marcher(route, tol, crossing=crossing).run(visit, low)
-    way = Route(model, route.path.lead_in(), route.design)
-    last = len(way.path.times) - 1
-    found = marcher(way, tol, crossing=crossing).run({last})
-    if not found.solved.all():
-        n = len(route.path.times)
-        end = replace(found.ends[0], message=f"on the way to the first sample: {found.messages[0]}")
-        return March(np.full((len(found.kept), n), np.nan), found.worst, np.zeros(n, np.bool_), (end,))
-    departure = model.departing(arrived(model, found.visited[last]), route.origin)
-    return Marcher(route, departure, accept_by(tol, crossing=crossing)).run(visit, low)
+    stands = route if route.stands else led(route, tol)
+    if isinstance(stands, Route):
+        return marcher(stands, tol, crossing=crossing).run(visit, low)
+    n = len(route.path.times)
+    kept = np.full((route.model.kept, n), np.nan)
+    return March(kept, route.model.plan.best[:, 0].tolist(), np.zeros(n, np.bool_), (stands,))
+
+
+def led(route: Route, tol: float) -> Route | End:
+    """Return the route from a lane that stands on its path, or where the straight way to there ends; kept with the route."""
+    return route if route.stands else route.bound(("led", tol), lambda: _led(route, tol))
+
+
+def _led(route: Route, tol: float) -> Route | End:
+    model, begin = route.model, route.begin
+    way = Route(model, begin.lead or route.path.lead_in(begin.time), route.design)
+    found = marcher(way, tol, crossing=False).run({0})
+    if found.ends:
+        return replace(found.ends[0], message=f"on the way to {begin.name}: {found.messages[0]}")
+    return Route(model, route.path, arrived(model, found.visited[0]), begin.time)
 
 
 def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:

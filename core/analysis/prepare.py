@@ -12,6 +12,7 @@ more of what could be solved.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache, partial
 from threading import local
 
@@ -22,6 +23,7 @@ from ..trajectory import Trajectory
 from .equations.constraints import Style, frames
 from .request import Request
 from .route import recent_route
+from .start import start_of
 from .sweep import follow
 from .tracing import ours
 
@@ -47,6 +49,14 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
         if make:
             return make(path)
     return partial(follow, recent_route(mechanism, request, path))
+
+
+def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
+    """Say what is assumed of the start of many designs, by the nominal one; empty where the design decides it."""
+    start = start_of(mechanism, path)
+    if start.stands and not start.ambiguous:
+        return []
+    return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]
 
 
 def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] | None:

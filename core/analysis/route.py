@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from ..trajectory import Array
 from .interpolation import weights_of_groups, weights_of_samples
 from .model import RECENT, Model, recent_model
 from .request import Request
+from .start import Start, start_of
 from .thread_cache import ThreadCache
 from .tracing import ours
 
@@ -33,22 +36,43 @@ class Route:
     Attributes:
         design: all slots of a lane at the design position of a variant; the model's own unless given.
         since: the time at which that lane stands on the path, where that is not at the design position but on the way.
+        given: where the samples are followed from, where that is not `start_of` the path.
     """
 
     model: Model
     path: Path
     design: Array | None = None
     since: float | None = None
+    given: Start | None = None
 
     @cached_property
-    def from_design(self) -> bool:
-        """Whether the lane it starts from stands on the path: at the design position at time zero, or on the way."""
-        return self.since is not None or self.path.from_design
+    def begin(self) -> Start:
+        """Where the samples are followed from, if its lane does not stand on the way."""
+        return self.given or start_of(self.model.mechanism, self.path)
+
+    @cached_property
+    def stands(self) -> bool:
+        """Whether the lane it starts from stands on the path: at the design position, or on the way."""
+        return self.since is not None or self.begin.lead is None
+
+    @cached_property
+    def single(self) -> bool:
+        """Whether the design position is its start, and nothing else can be."""
+        return self.stands and self.begin.other is None
+
+    @cached_property
+    def details(self) -> Mapping[str, Any]:
+        """What the record of every solution says of the model and of the start."""
+        return {**self.model.details, "start": self.begin.facts}
 
     @cached_property
     def start(self) -> float:
-        """The time it starts at: where its lane stands, or else the first sample."""
-        return self.path.start if self.since is None else self.since
+        """The time it starts at."""
+        return self.begin.time if self.since is None else self.since
+
+    def by(self, start: Start) -> Route:
+        """Return the route from another start; kept with this one."""
+        return self if start is self.begin else self.bound(start, lambda: replace(self, given=start))
 
     @cached_property
     def by_time(self) -> NDArray[np.intp]:

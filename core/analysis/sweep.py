@@ -16,6 +16,7 @@ from .march import march
 from .model import Model
 from .request import SIGMA
 from .route import Route
+from .start import by_ways
 
 
 def sweep(model: Model, path: Path, tol: float) -> Trajectory:
@@ -25,6 +26,13 @@ def sweep(model: Model, path: Path, tol: float) -> Trajectory:
 
 def follow(route: Route, tol: float) -> Trajectory:
     """Run a compiled model along a route; see `solve`."""
+    if route.single:
+        return _follow(route, tol)
+    compare = math.isfinite(tol)  # else nothing is asked of the samples
+    return by_ways(route.begin, route.model.mechanism, route.path, lambda start: _follow(route.by(start), tol), compare=compare)
+
+
+def _follow(route: Route, tol: float) -> Trajectory:
     model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
     closure, leftover, sigma = found.worst
     largest = math.inf if model.selection.dropped else None
@@ -47,7 +55,7 @@ def follow(route: Route, tol: float) -> Trajectory:
         residual=closure * unit,
         message=message,
         details={
-            **model.details,
+            **route.details,
             "redundant_residual": leftover * unit,
             "smallest_singular_value": min(sigma, 1.0),
             **findings,

@@ -26,10 +26,11 @@ from .model import LARGEST, SMALLEST, Model
 from .prepare import IRREDUCIBLE, prepare
 from .request import SIGMA, accept_by
 from .route import Route
+from .start import SAME_TIME
 from .structure.driven import require_driven
 
-# Steps of the way to a first sample away from the design: a sixteenth of it is a step like those of a sweep, and a lane for which
-# it is too long is solved again alone.
+# Steps of the straight way from the design to a start away from it: a sixteenth of it is a step like those of a sweep, and a lane
+# for which it is too long is solved again alone.
 LEAD = 16
 # So many variants are solved again together in parts of steps, of which there are as many more: their table stays small.
 SOME = 32
@@ -90,7 +91,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         if not closes[k]:
             messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
             continue
-        found = march(replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0]), tol)
+        found = march(replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0], given=route.begin), tol)
         kept[:, :, k], solved[:, k] = found.kept[:, route.by_time], found.solved[route.by_time]
         if found.messages:
             kept_rows, others = len(model.selection.chosen), len(model.selection.dropped)
@@ -142,9 +143,10 @@ def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int,
         solved: shape (n, V), by time.
     """
     model, found = route.model, dict[int, str]()
-    if not (model.selection.dropped and route.from_design):
+    if not model.selection.dropped:
         return found
-    away = route.path.times[route.by_time] != route.start
+    times = route.path.times[route.by_time]
+    away = np.abs(times - route.start) > SAME_TIME * np.abs(times).max(initial=0.0)
     for k in np.flatnonzero(solved.any(axis=0) & ~solved[away].any(axis=0)).tolist():
         try:
             require_driven(_variant(model, geometry[:, k]))
@@ -170,7 +172,7 @@ def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tupl
     closes = model.stand(executor, geometry)
     accepted_by = accept_by(tol)
     executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
-    arrived = np.ones(count, dtype=np.bool_) if route.from_design else _lead(executor, route, count)
+    arrived = np.ones(count, dtype=np.bool_) if route.stands else _lead(executor, route, count)
     model.depart(executor, route.origin)
     # what lanes are predicted from, with what stands between: one stretch is copied in half the time of single slots
     ahead = executor.window(range(min(model.ahead), max(model.ahead) + 1))
@@ -196,8 +198,8 @@ def _recycle() -> None:
 
 
 def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
-    """Take lanes from the design to the first sample, where they stand afterwards; which of them arrived there."""
-    model, last = route.model, route.path.lead_in()
+    """Take lanes straight from the design to the start, where they stand afterwards; which of them arrived there."""
+    model, last = route.model, route.path.lead_in(route.start)
     way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
     model.depart(executor, way.origin)
     found = executor.table(LEAD)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.prepare import prepare
 from ..analysis.request import Request
+from ..analysis.start import start_of
 from ..errors import SolveError
 from ..mechanism import Mechanism
 from ..trajectory import Array, BodyMotion
@@ -64,21 +65,30 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
     """
     if not math.isfinite(stop):
         raise SolveError(f"case {case.name!r}: the start {stop} is not finite; give a value of {case.sweep.driver!r}")
-    bodies = tuple(body.name for body in case.mechanism.moving)
-    request = Request(tuple(case.sweep.path.motions), (), bodies, order=0)
-    for samples in (1,) if stop == case.sweep.design else SAMPLES:
-        values: Array = np.linspace(stop, case.sweep.design, samples)[::-1]  # its first is exact, also where it is the only one
-        found = prepare(case.mechanism, request, replace(case.sweep, values=values).path)(TOL)
-        if not found.solved.all():
-            raise SolveError(
-                f"case {case.name!r}: there is no way from the design to {case.sweep.driver} = {stop:.9g}: {found.message}"
-            )
-        if max(map(_turn, found.bodies.values())) <= LARGEST_TURN:
-            return found.bodies
+    bodies, path = tuple(body.name for body in case.mechanism.moving), case.sweep.path
+    request, begin = Request(tuple(path.motions), (), bodies, order=0), start_of(case.mechanism, path)
+    first = case.sweep.design + case.sweep.rate * begin.time
+    for samples in (1,) if stop == first and begin.lead is None else SAMPLES:
+        values: Array = np.linspace(stop, first, samples)[::-1]  # its first is exact, also where it is the only one
+        ways = [replace(case.sweep, values=values).path]
+        if begin.lead:
+            ways.insert(0, replace(begin.lead, times=np.linspace(0.0, 1.0, samples)))
+        found = [prepare(case.mechanism, request, way)(TOL) for way in ways]
+        if not all(each.solved.all() for each in found):
+            why = "; ".join(filter(None, [each.message for each in found]))
+            raise SolveError(f"case {case.name!r}: there is no way from the design to {case.sweep.driver} = {stop:.9g}: {why}")
+        whole = {name: _joined([each.bodies[name] for each in found]) for name in bodies}
+        if max(map(_turn, whole.values())) <= LARGEST_TURN:
+            return whole
     raise SolveError(
         f"case {case.name!r}: on the way to {case.sweep.driver} = {stop:.9g} a body turns by more than 60 degrees between two of "
         f"{SAMPLES[-1]} samples; give a start closer to the design"
     )
+
+
+def _joined(parts: Sequence[BodyMotion]) -> BodyMotion:
+    """Return motions one after the other."""
+    return BodyMotion(np.concatenate([each.r for each in parts]), np.concatenate([each.p for each in parts]), None, None)
 
 
 def _turn(motion: BodyMotion) -> float:

@@ -17,6 +17,7 @@ from ..division import MOST_PARTS, TOO_MANY, part_of_step
 from ..model import CLOSED
 from ..request import SIGMA, accept_by
 from ..singular.singularity import CONTINUED, listed
+from ..start import Start, by_ways, start_of
 from ..structure.freedom import counted
 from .bridge import cross
 from .cascade import WORST, Cascade, Lanes
@@ -55,8 +56,9 @@ class Halt:
 class CascadeSweep:
     """A path through a cascade; solved as often as wanted."""
 
-    def __init__(self, cascade: Cascade, path: Path) -> None:
+    def __init__(self, cascade: Cascade, path: Path, start: Start | None = None) -> None:
         self.cascade, self.path = cascade, path
+        self.start = start or start_of(cascade.mechanism, path)
         self._lanes = Lanes(cascade, LANES)
         self._outputs, self._still = self._places()
 
@@ -85,6 +87,13 @@ class CascadeSweep:
 
     def solve(self, tol: float) -> Trajectory:
         """The motion at all samples; see `solve.solve`."""
+
+        def by(start: Start) -> Trajectory:
+            return (self if start is self.start else CascadeSweep(self.cascade, self.path, start))._solve(tol)
+
+        return by_ways(self.start, self.cascade.mechanism, self.path, by, compare=np.isfinite(tol))
+
+    def _solve(self, tol: float) -> Trajectory:
         path, lanes = self.path, self._lanes
         n = len(path.times)
         rows = [row for each in self._outputs.values() for row in each]
@@ -101,7 +110,7 @@ class CascadeSweep:
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
-            message = self._follow(path.times[order], given, path.start, path, keep, tol)
+            message = self._follow(path.times[order], given, self.start.time, path, keep, tol)
             messages += [message] if message else []
         found, at = dict[str, Array](), 0
         for name, each in self._outputs.items():
@@ -113,7 +122,7 @@ class CascadeSweep:
     def _sides(self) -> list[tuple[Indices, list[Array]]]:
         """Of each side of the start the samples outwards, and what is given there."""
         times = self.path.times
-        return [(side, self._lanes.sampled(times[side], self.path)) for side in outwards(times, self.path.start)]
+        return [(side, self._lanes.sampled(times[side], self.path)) for side in outwards(times, self.start.time)]
 
     @cached_property
     def _details(self) -> dict[str, Any]:
@@ -139,16 +148,15 @@ class CascadeSweep:
     @cached_property
     def _departure(self) -> tuple[list[Array], str, Sequence[str]]:
         """Where the sweep starts: what is predicted from, why it cannot be reached if it cannot, and notes of the way."""
-        lanes, path, message = self._lanes, self.path, ""
+        lanes, path, begin, message = self._lanes, self.path, self.start, ""
         lanes.accept_by(accept_by(CLOSED))
         self._notes = list[str]()
-        if not path.from_design:
-            way = path.lead_in()
+        if way := begin.lead:
             times = np.array([0.0, 1.0])
             message = self._follow(times, lanes.sampled(times, way), 0.0, way, _nothing, CLOSED)
-            message = f"on the way to the first sample: {message}" if message else ""
-            lanes.stand_at(path.start)
-        lanes.attempt(np.array([path.start]), path)  # the rates of the path where the mechanism stands
+            message = f"on the way to {begin.name}: {message}" if message else ""
+        lanes.stand_at(begin.time)
+        lanes.attempt(np.array([begin.time]), path)  # the rates of the path where the mechanism stands
         lanes.carry(0)
         return lanes.anchor, message, tuple(self._notes)
 

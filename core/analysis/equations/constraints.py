@@ -64,7 +64,7 @@ class Frames:
 def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
     """The length unit, unless it is given, and the internal origins: at the joint by which the spanning tree reaches a body."""
     if length_unit is None:
-        length_unit = unit_near(_size(mechanism))
+        length_unit = unit_near(size_of(mechanism))
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
     touching: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
@@ -91,8 +91,8 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
     return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
 
 
-def _size(mechanism: Mechanism) -> float:
-    """The extent of the joints' points [m]; where they have none, as around a single pivot, of these and all others.
+def size_of(mechanism: Mechanism) -> float:
+    """Return the extent of the joints' points [m]; where they have none, as around a single pivot, of these and all others.
 
     A metre in its place would be the unit of a mechanism of micrometres: its residuals are too small to be seen, and its
     singular values too.

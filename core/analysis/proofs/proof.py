@@ -20,6 +20,7 @@ from ..equations.poses import displaced, state_of
 from ..model import compile_model
 from ..request import Request
 from ..singular.choice import chosen_at
+from ..start import start_of
 from ..sweep import sweep
 from .enclosure import Enclosure, UnprovedError, enclose
 from .exact import Reading, equations, exact_mechanism
@@ -68,7 +69,7 @@ def prove(
     flint()
     model = compile_model(mechanism, Request(tuple(path.motions), tuple(points), tuple(body.name for body in mechanism.moving)))
     native = sweep(model, path, tol)
-    poses = _states(mechanism, native, path.times)
+    poses = _states(mechanism, native, path.times, start_of(mechanism, path).time)
     samples: list[Enclosure | UnprovedError] = []
     seconds: list[float] = []
     others: dict[int, Sequence[str]] = {}
@@ -102,14 +103,14 @@ def _ball(x: Fraction) -> Ball:
     return flint().arb(flint().fmpq(x.numerator, x.denominator))
 
 
-def _states(mechanism: Mechanism, native: Trajectory, times: Array) -> Array:
+def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float = 0.0) -> Array:
     """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies, shape (n, size)."""
     frame = frames(mechanism)
     poses = displaced(mechanism, frame, {name: (motion.r, motion.p) for name, motion in native.bodies.items()})
     state = state_of(Cartesian.of(mechanism, frame), mechanism, frame, poses, {})
     for turn in (vector[0] for name, vector in state.items() if name.startswith("x ") and name.endswith(".rotation")):
-        # turns are counted from the design outwards; a sweep so coarse that they are miscounted fails to be proved
-        for side in outwards(times, 0.0):
+        # turns are counted from the start outwards; a sweep so coarse that they are miscounted fails to be proved
+        for side in outwards(times, start):
             outward = side[native.solved[side]]
             turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
     return np.stack([x for vector in state.values() for x in vector], axis=1)

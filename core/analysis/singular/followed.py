@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...motions import Path
 from ...trajectory import Array
 from ..continuity import LOW, doubtful, in_question
-from ..march import End, March, arrived, march
+from ..march import End, March, arrived, led, march
 from ..request import FROM, LARGEST_SIGMA, SIGMA, TIME
 from ..route import Route
 from .bridge import bridge, onward
@@ -68,7 +68,7 @@ class Followed:
 
     Attributes:
         found: the samples; those beyond ends are put in as they are reached.
-        parts: the first is the route asked for.
+        parts: the first is the route asked for, from where it stands on its path.
         part_of: the part of each sample, shape (n,).
         choice: of rows.
         ends: those that remain.
@@ -78,7 +78,8 @@ class Followed:
     def __init__(self, route: Route, found: March, tol: float) -> None:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
         self.choice = Choice(route.model)
-        self.parts = [Part(route, np.arange(len(self.times)))]
+        stands = led(route, tol)
+        self.parts = [Part(stands if isinstance(stands, Route) else route, np.arange(len(self.times)))]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []
         self.passages: list[Passage] = []
@@ -146,7 +147,7 @@ class Followed:
             missing = self._missing(number, side, end.wanted)
             ends = self._follow(Route(standing.model, self._path(missing), standing.lane, here), missing)
             return [each for each in ends if side * (each.wanted - here) >= 0.0]
-        if end.early and number is not None:  # the way to the first sample is gone to its end
+        if end.early and number is not None:  # the way to the start is gone to its end
             return self._further(end, number, side)
         if len(self.passages) == MOST:
             return None
@@ -188,13 +189,13 @@ class Followed:
         return Path(path.motions, self.times[samples], path.design)
 
     def _arrive(self, way: Route) -> list[End]:
-        """Go on to the first sample, and from there."""
+        """Go on to the start of the samples, and from there."""
         last = len(way.path.times) - 1
         found = march(way, self.tol, {last})
         if not found.solved.all():
             return list(found.ends)
         lane = arrived(way.model, found.visited[last])
-        return self._follow(Route(way.model, self.route.path, lane, float(self.times[0])), np.arange(len(self.times)))
+        return self._follow(Route(way.model, self.route.path, lane, self.route.start), np.arange(len(self.times)))
 
     def _follow(self, route: Route, samples: NDArray[np.intp]) -> list[End]:
         """Put what a route reaches of samples in their place, where there was nothing or it was much nearer to singular."""
@@ -223,14 +224,14 @@ class Followed:
         mine = (self.part_of == number) & self.found.solved & ~self.doubtful
         good = np.flatnonzero(mine & (away >= 0.0) & (away < side * (time - route.start)))
         if not len(good):
-            return route.departure if route.from_design else None
+            return route.departure if route.stands else None
         nearest = int(good[away[good].argmax()])
         if nearest not in self._stood:
             self._stood |= self.visit({nearest})
         return self._stood.get(nearest)
 
     def _number(self, route: Route) -> int | None:
-        """Of the part that is followed on a route; None on the way to the first sample."""
+        """Return the number of the part that is followed on a route; None on the way to the start."""
         return next((k for k, part in enumerate(self.parts) if part.route is route), None)
 
 

@@ -248,7 +248,7 @@ class _Scrutiny:
             low, high = (where(float(side)) for side in (places[places <= time].max(), places[places >= time].min()))
             beside = f"between {low} and {high}, "
         else:
-            beside = "on the way to the first sample, "
+            beside = f"on the way to {self.route.begin.name}, "
         self.findings.notes.append(f"crosses a singular pose {beside}near {where(time)}: {singularity.words}; {CONTINUED}")
 
     # Ends

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -19,6 +20,7 @@ from ..continuity import AMPLIFIED, EPSILON, LOW, WORSE_BY_PIVOTS
 from ..division import HALVINGS, MOST_PARTS, TOO_MANY
 from ..equations.carried import motion_of_frame, motion_of_point
 from ..equations.formulation import Acceleration
+from ..start import Start, by_ways, start_of
 from .batch import REMEMBERED
 from .model import FailedError, SparseModel, Stand
 from .uncertainty import uncertain
@@ -47,7 +49,9 @@ def solve_sparse(
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
     """
     model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
-    return _Sweep(model, path, tol, _Wanted(model, points), _Wanted(model, bodies, frames=True), order).solve()
+    wanted = _Wanted(model, points), _Wanted(model, bodies, frames=True)
+    sweep, start = partial(_Sweep, model, path, tol, *wanted, order), start_of(model.mechanism, path)
+    return by_ways(start, model.mechanism, path, lambda each: sweep(each).solve(), compare=np.isfinite(tol))
 
 
 AT_ONCE = 64
@@ -108,6 +112,7 @@ class _Sweep:
     points: _Wanted
     bodies: _Wanted
     order: int
+    start: Start
     messages: list[str] = field(default_factory=list[str])
     smallest_pivot: float = np.inf
     renewed: int = 0
@@ -124,7 +129,7 @@ class _Sweep:
         wanted = (self.points, self.bodies)
         found = [np.full((n, size, len(each.names)), np.nan) for each, size in zip(wanted, (9, 19), strict=True)]
         departure = self._departure()
-        for side in outwards(path.times, path.start):
+        for side in outwards(path.times, self.start.time):
             if departure is None or not len(side):
                 continue
             followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
@@ -140,16 +145,15 @@ class _Sweep:
         return self._trajectory(found, stands)
 
     def _departure(self) -> Stand | None:
-        """Where the samples are followed from: the design, or the first sample where it is elsewhere; None if that cannot be."""
-        model, path, here, start = self.model, self.path, self.model.design, self.path.start
+        """Return where the samples are followed from; None if that cannot be reached."""
+        model, path, here, start = self.model, self.path, self.model.design, self.start.time
         try:
-            if not path.from_design:
-                way = path.lead_in()
+            if way := self.start.lead:
                 here = model.moving(here, 0.0, self._drives(way, 0.0))
                 for there in self._follow(here, way, way.times):
                     here = there
                 if self.messages:
-                    self.messages[:] = [f"on the way to the first sample: {self.messages[0]}"]
+                    self.messages[:] = [f"on the way to {self.start.name}: {self.messages[0]}"]
                     return None
             return model.moving(here, start, self._drives(path, start))
         except FailedError as error:

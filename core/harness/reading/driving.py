@@ -12,7 +12,7 @@ import numpy as np
 from ...drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ...errors import remedy
 from ...mechanism import Mechanism
-from ...motions import Absolute, Measure, Motion
+from ...motions import ROUNDED_TIME, Absolute, Measure, Motion
 from ...trajectory import Array
 from ..case import TIME, Sweep
 from .document import class_of, explained, fault, join, shown, typed
@@ -20,8 +20,6 @@ from .reference import Convert
 from .schema import CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
 
 DRIVERS: Mapping[str, type[Driver]] = {cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)}
-# A sample may lie outside a table by the rounding of its time, some 1e-16 of it, and not by what anybody would write.
-ROUNDED_TIME = 1e-12
 
 
 def read_drivers(file: Path, tables: Mapping[str, Any]) -> list[Driver]:

@@ -32,8 +32,9 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
                          driver: its samples from start to stop; it moves at the rate, whose sign says which way, and has its design
                          value at time zero
                          no driver, or "time": start and stop are times [s], there is no rate, and the motions move everything
-                         both are solved from the design position outwards, or from the first sample, to which all drivers go
-                         straight where their motions do not pass through the design at time zero
+                         both are followed from the design position, both ways: from time zero, or from a sample, where the
+                         values are those of the design to six digits; where none are, all drivers go straight from the design
+                         to their values at time zero if the sweep has it, else at the first sample, and the result says so
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list --outputs` prints them with their
                          keys, signs, and what they need there; each comes with its derivative by wheel travel, NAME.per_travel

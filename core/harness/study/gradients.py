@@ -53,9 +53,10 @@ def gradients(ready: Ready) -> Gradients:
     """The gradients of a study."""
     study, path = ready.study, ready.study.case.sweep.path
     n, count = len(path.times), len(study.variation.coordinates)
-    from_design = path.from_design
+    start = ready.route.begin
+    from_design = start.stands
     if from_design:  # one sample more, at the design itself
-        ready = ready.along(Path(path.motions, np.append(path.times, 0.0), path.design))
+        ready = ready.along(Path(path.motions, np.append(path.times, start.time), path.design))
     steps = np.array([STEP * (size(study.case) if each.unit == "m" else 1.0) for each in study.variation.coordinates])
     found = np.empty((count, len(study.rows), n + from_design))
     apart = np.empty_like(found)

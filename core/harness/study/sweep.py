@@ -13,6 +13,7 @@ from itertools import islice
 from time import perf_counter, process_time
 from typing import Any, Protocol
 
+from ...analysis.prepare import start_notes
 from ...errors import KincheckError
 from ...trajectory import Array
 from ..attempt import Solver
@@ -125,8 +126,10 @@ def sweep_designs(
     checked = (
         checking.check(study, check.engine, check.solver, found.picked, check.tol, check.progress) if check is not None else []
     )  # fmt: skip
+    run = circumstances([case], started=started, tol=tol, command=command)
+    run["cases"][case.name]["notes"] += start_notes(case.mechanism, ready.model.request, case.sweep.path, tol)
     return results.SweepResults(
-        run=circumstances([case], started=started, tol=tol, command=command),
+        run=run,
         case=case.name,
         mode=str(variation.mode),
         seed=seed,
