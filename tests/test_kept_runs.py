@@ -50,7 +50,7 @@ def test_a_disk_that_fails_in_the_middle_is_a_message_and_the_results_are_delive
         assert 0 < len(store.records(row.id)) < 4
 
 
-def test_a_place_that_cannot_be_written_is_a_message_before_the_work(path):
+def test_a_history_that_cannot_be_opened_costs_no_result(path):
     process = kincheck("run", "--engine", "native", "--history", path.parent)
     out, err = process.communicate()
     assert (process.returncode, out) == (2, "")

@@ -13,6 +13,7 @@ Everything else is SQL on `store.connection`: the tables are described in `schem
 from __future__ import annotations
 
 import hashlib
+import shlex
 import sqlite3
 import zlib
 from collections.abc import Generator, Mapping, Sequence
@@ -24,7 +25,8 @@ from typing import Any, Literal, Self, TypeAlias
 
 import msgspec
 
-from ...errors import KincheckError
+from ...errors import KincheckError, shortened
+from ..attempt import bounded
 from ..circumstances import missing, versions
 from ..record import Record, Results
 from .owner import alive, owner
@@ -37,12 +39,23 @@ Plan: TypeAlias = Sequence[tuple[str, str, str]]
 # For another run to let go of the file [s]: it holds it for a millisecond a record. Longer, and something is wrong with it.
 BUSY = 30.0
 
+# Runs that cannot be read, told one by one: where there are more, the whole file is at fault.
+MOST_TOLD = 5
+
 # Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB as JSON).
 QUICK = 1
 
 
 class HistoryError(KincheckError):
     """A history file cannot be read or written; the message names it and says what to do."""
+
+
+class DamagedRunError(HistoryError):
+    """One run of a history cannot be read; the others may be."""
+
+    def __init__(self, run: int, message: str) -> None:
+        super().__init__(message)
+        self.run = run
 
 
 @dataclass(frozen=True)
@@ -67,6 +80,8 @@ class Store:
 
     def __init__(self, path: Path, *, writable: bool = True) -> None:
         self.path = path
+        self.passed_over: dict[int, str] = {}
+        """Runs that cannot be read, and why; what reads several passes them over."""
         with self.explained("opened"):
             self.connection = self._writable() if writable else self._readable()
 
@@ -153,10 +168,41 @@ class Store:
                     self._attach(run, kind, getattr(results, kind))
             self.connection.execute("UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run))
 
+    def remove(self, run: int) -> None:
+        """Remove a run and all that belongs to it alone."""
+        with self._transaction():
+            for table, column in (("attachments", "run_id"), ("records", "run_id"), ("runs", "id")):
+                removed = self.connection.execute(f"DELETE FROM {table} WHERE {column} = ?", (run,)).rowcount
+            self.connection.execute("DELETE FROM documents WHERE digest NOT IN (SELECT digest FROM attachments)")
+        if not removed:
+            raise HistoryError(f"history {self.path}: there is no run {run}")
+
     def runs(self) -> list[RunRow]:
-        """All runs, the latest first."""
+        """All runs that can be read, the latest first."""
         with self.explained("read"):
-            return [self.run(number) for (number,) in self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()]
+            numbers = self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()
+        rows: list[RunRow] = []
+        for (number,) in numbers:
+            with self.sparing():
+                rows.append(self.run(number))
+        return [row for row in rows if row.id not in self.passed_over]
+
+    @contextmanager
+    def sparing(self) -> Generator[None]:
+        """Pass over a run that cannot be read."""
+        try:
+            yield
+        except DamagedRunError as error:
+            self.passed_over.setdefault(error.run, str(error))
+
+    @property
+    def damage(self) -> list[str]:
+        """What was passed over: a line for each run, up to MOST_TOLD of them."""
+        runs = sorted(self.passed_over, reverse=True)
+        lines = [f"{self.passed_over[run]}; the other runs are used" for run in runs[:MOST_TOLD]]
+        if left := runs[MOST_TOLD:]:
+            lines.append(f"history {self.path}: {len(left)} more runs cannot be read: {shortened([str(run) for run in left], 20)}")
+        return lines
 
     def run(self, run: int) -> RunRow:
         """The run of that number.
@@ -164,7 +210,7 @@ class Store:
         Raises:
             HistoryError: there is none.
         """
-        with self.explained("read"):
+        with self.explained("read", run):
             query = "SELECT id, started, finished, status, command, plan, circumstances, owner FROM runs WHERE id = ?"
             row = self.connection.execute(query, (run,)).fetchone()
             if row is not None:
@@ -182,7 +228,7 @@ class Store:
     def records(self, run: int) -> list[Record]:
         """The records of a run, in the order of its plan."""
         place = {pair: k for k, pair in enumerate(self.run(run).plan)}
-        with self.explained("read"):
+        with self.explained("read", run):
             rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
             records = [msgspec.json.decode(zlib.decompress(blob), type=Record) for (blob,) in rows]
         return sorted(records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place)))
@@ -191,13 +237,13 @@ class Store:
         """A run as the command wrote it; of one without an end, what there is, and in `run["missing"]` what is not."""
         row, records = self.run(run), self.records(run)
         attached: dict[str, dict[str, Any]] = {}
-        with self.explained("read"):
+        with self.explained("read", run):
             query = "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest) WHERE run_id = ?"
             for kind, case, content in self.connection.execute(query, (run,)):
                 attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
-        facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
-        whole: dict[str, Any] = {"run": facts, "records": [], **attached}
-        return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
+            facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
+            whole: dict[str, Any] = {"run": facts, "records": [], **attached}
+            return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
 
     def _attach(self, run: int, kind: str, documents: Mapping[str, Any]) -> None:
         for case, document in documents.items():
@@ -264,13 +310,29 @@ class Store:
                 raise
 
     @contextmanager
-    def explained(self, what: str) -> Generator[None]:
-        """What goes wrong meanwhile is a HistoryError that names the file; `what` was to be done with it, a participle."""
+    def explained(self, what: str, run: int | None = None) -> Generator[None]:
+        """What goes wrong meanwhile is a HistoryError that names the file, and the run if it is one run that is damaged.
+
+        Args:
+            what: was to be done with the file, a participle.
+            run: what is read belongs to it alone.
+        """
         try:
             yield
-        except (sqlite3.Error, OSError, ValueError, zlib.error, msgspec.MsgspecError) as error:
+        except (sqlite3.Error, OSError, ValueError, TypeError, zlib.error, msgspec.MsgspecError) as error:
+            if run is not None and _damaged(error):
+                raise DamagedRunError(
+                    run,
+                    f"history {self.path}: run {run} cannot be {what} ({bounded(error)}); it may be damaged: restore a copy of the "
+                    f"file, or remove the run: kincheck history --history {shlex.quote(str(self.path))} --remove {run}",
+                ) from error
             advice = "" if isinstance(error, ValueError) and not isinstance(error, msgspec.MsgspecError) else _advice(str(error))
-            raise HistoryError(f"history {self.path}: cannot be {what}: {error}{advice}") from error
+            raise HistoryError(f"history {self.path}: cannot be {what}: {bounded(error)}{advice}") from error
+
+
+def _damaged(error: Exception) -> bool:
+    """Whether what is stored is at fault, and not the way to it."""
+    return not isinstance(error, OSError | sqlite3.OperationalError) or "decode" in str(error) or "malformed" in str(error)
 
 
 def _advice(message: str) -> str:
