@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, SolveError
 from ..console import complain, lacking, progress, unsolved
+from ..interrupts import hold, status_of, words_of
 from ..visible import visible
 from . import foreign, isolation, kept
 from .house import House, Status
@@ -193,7 +194,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     return _Plan(cases, engines, baseline, {visible(name): visible(message, also="\n") for name, message in unread.items()})
 
 
-def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str], Keeping | None, Status | None]:
+def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str], Keeping | None, int | None]:
     """Return the results, the problems, the place in the history, and the status if something stopped the run before its end."""
     from .. import run as running
     from ..workers.distributed import ClusterError
@@ -219,13 +220,16 @@ def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str
     started, unread = datetime.now(UTC), [*plan.unread]
     try:
         how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver, "made": made, "unread": unread, **about}
-        return running.run(plan.cases, plan.engines, progress=keep, **how), problems, keeping, None
+        results = running.run(plan.cases, plan.engines, progress=keep, **how)
+        hold()  # also where the signal comes between the last record and here, all of them are kept below
+        return results, problems, keeping, None
     except (KeyboardInterrupt, ClusterError) as reason:
         pairs = running.planned(plan.cases, plan.engines, unread)
         records.sort(key=lambda each: pairs.index((each.case, each.engine, each.mode)))
-        problems.append(f"{str(reason) or 'interrupted'}: {len(records)} of {len(pairs)} records were made and are kept")
+        why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
+        problems.append(f"{why}: {len(records)} of {len(pairs)} records were made and are kept")
         results = running.results(plan.cases, records, started=started, plan=pairs, **about)
-        return results, problems, keeping, Status.INTERRUPTED if isinstance(reason, KeyboardInterrupt) else Status.FAILED
+        return results, problems, keeping, status_of(reason) if isinstance(reason, KeyboardInterrupt) else Status.FAILED
 
 
 def _explained(cases: Sequence[Case]) -> Iterator[str]:
