@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from threading import current_thread, main_thread
 from types import FrameType
 from typing import Any
@@ -41,6 +41,18 @@ class Interrupts:
         """From now on results are written: note the first interrupt."""
         self._holding = True
 
+    @contextmanager
+    def deferred(self) -> Generator[None]:
+        """Raise an interrupt that comes meanwhile only in the end."""
+        holding, self._holding = self._holding, True
+        try:
+            yield
+        finally:
+            self._holding = holding
+        if not holding and self.held is not None:
+            held, self.held, self._holding = self.held, None, True
+            raise held
+
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Take a signal."""
         interrupt = Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
@@ -57,6 +69,11 @@ _current = Interrupts()
 def hold() -> None:
     """From now on the command writes its results: the first interrupt is noted, and acted on when they are written."""
     _current.hold()
+
+
+def deferred() -> AbstractContextManager[None]:
+    """What is done meanwhile is done whole: an interrupt is raised only in the end."""
+    return _current.deferred()
 
 
 @contextmanager

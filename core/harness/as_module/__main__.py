@@ -32,6 +32,7 @@ def main() -> int:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done; while Python ends, it would end by the signal
     return status
 
 
