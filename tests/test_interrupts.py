@@ -58,7 +58,7 @@ def test_during_imports(count, number, status, said):
 @pytest.mark.parametrize("command", [["list"], ["run", "rssr", "--engine", "native"], ["trace", "four_bar"], ["doctor"]])
 def test_an_interrupt_of_any_command_is_one_line(command):
     """Texts that imports compile, which make Python end by the signal if it is left to itself."""
-    for count in (5, 60):
+    for count in (5, 40):
         status, _, err = stopped_at("exec", count, signal.SIGINT, *command)
         assert (status, lines(err)) == (130, ["kincheck: interrupted"])
 

@@ -13,11 +13,10 @@ Everything else is SQL on `store.connection`: the tables are described in `schem
 from __future__ import annotations
 
 import hashlib
-import shlex
 import sqlite3
 import zlib
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,10 +24,10 @@ from typing import Any, Literal, Self, TypeAlias
 
 import msgspec
 
-from ...errors import KincheckError, shortened
-from ..attempt import bounded
 from ..circumstances import missing, versions
 from ..record import Record, Results
+from . import faults
+from .faults import DamagedRunError, HistoryError, explained, told
 from .owner import alive, owner
 from .schema import MIGRATIONS, check, migrate, write_ahead
 
@@ -36,26 +35,8 @@ Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
 """The file says that a run is running until it ends; where its process is gone it was killed."""
 Plan: TypeAlias = Sequence[tuple[str, str, str]]
 
-# For another run to let go of the file [s]: it holds it for a millisecond a record. Longer, and something is wrong with it.
-BUSY = 30.0
-
-# Runs that cannot be read, told one by one: where there are more, the whole file is at fault.
-MOST_TOLD = 5
-
 # Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB as JSON).
 QUICK = 1
-
-
-class HistoryError(KincheckError):
-    """A history file cannot be read or written; the message names it and says what to do."""
-
-
-class DamagedRunError(HistoryError):
-    """One run of a history cannot be read; the others may be."""
-
-    def __init__(self, run: int, message: str) -> None:
-        super().__init__(message)
-        self.run = run
 
 
 @dataclass(frozen=True)
@@ -72,16 +53,11 @@ class RunRow:
 
 
 class Store:
-    """A history file.
-
-    Raises:
-        HistoryError: from every method, where the file cannot be read or written.
-    """
+    """A history file. From every method comes a HistoryError where it cannot be read or written."""
 
     def __init__(self, path: Path, *, writable: bool = True) -> None:
         self.path = path
-        self.passed_over: dict[int, str] = {}
-        """Runs that cannot be read, and why; what reads several passes them over."""
+        self.passed_over: dict[int, str] = {}  # runs that cannot be read, and why
         with self.explained("opened"):
             self.connection = self._writable() if writable else self._readable()
 
@@ -179,9 +155,9 @@ class Store:
 
     def runs(self) -> list[RunRow]:
         """All runs that can be read, the latest first."""
+        rows: list[RunRow] = []
         with self.explained("read"):
             numbers = self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()
-        rows: list[RunRow] = []
         for (number,) in numbers:
             with self.sparing():
                 rows.append(self.run(number))
@@ -197,12 +173,8 @@ class Store:
 
     @property
     def damage(self) -> list[str]:
-        """What was passed over: a line for each run, up to MOST_TOLD of them."""
-        runs = sorted(self.passed_over, reverse=True)
-        lines = [f"{self.passed_over[run]}; the other runs are used" for run in runs[:MOST_TOLD]]
-        if left := runs[MOST_TOLD:]:
-            lines.append(f"history {self.path}: {len(left)} more runs cannot be read: {shortened([str(run) for run in left], 20)}")
-        return lines
+        """Runs that were passed over, a line each."""
+        return told(self.path, self.passed_over)
 
     def run(self, run: int) -> RunRow:
         """The run of that number.
@@ -253,10 +225,10 @@ class Store:
             self.connection.execute("INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest))
 
     def _writable(self) -> sqlite3.Connection:
-        connection = sqlite3.connect(self.path, timeout=BUSY, isolation_level=None)
+        connection = sqlite3.connect(self.path, timeout=faults.BUSY, isolation_level=None)
         try:
             check(connection)  # before anything is changed in a file that may not be ours
-            write_ahead(connection, BUSY)
+            write_ahead(connection, faults.BUSY)
             connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power cut too
             connection.execute("PRAGMA foreign_keys = ON")
             migrate(connection)
@@ -270,7 +242,9 @@ class Store:
             raise HistoryError(f"history {self.path}: there is no such file; `kincheck run --history FILE` makes one")
         # a file in a place where nothing can be written has no journal beside it: then nobody else is writing it either
         for how in ("mode=ro", "mode=ro&immutable=1"):
-            connection = sqlite3.connect(f"{self.path.absolute().as_uri()}?{how}", uri=True, timeout=BUSY, isolation_level=None)
+            connection = sqlite3.connect(
+                f"{self.path.absolute().as_uri()}?{how}", uri=True, timeout=faults.BUSY, isolation_level=None
+            )
             try:
                 version = check(connection)
             except sqlite3.OperationalError:
@@ -309,42 +283,9 @@ class Store:
                     self.connection.execute("ROLLBACK")
                 raise
 
-    @contextmanager
-    def explained(self, what: str, run: int | None = None) -> Generator[None]:
-        """What goes wrong meanwhile is a HistoryError that names the file, and the run if it is one run that is damaged.
-
-        Args:
-            what: was to be done with the file, a participle.
-            run: what is read belongs to it alone.
-        """
-        try:
-            yield
-        except (sqlite3.Error, OSError, ValueError, TypeError, zlib.error, msgspec.MsgspecError) as error:
-            if run is not None and _damaged(error):
-                raise DamagedRunError(
-                    run,
-                    f"history {self.path}: run {run} cannot be {what} ({bounded(error)}); it may be damaged: restore a copy of the "
-                    f"file, or remove the run: kincheck history --history {shlex.quote(str(self.path))} --remove {run}",
-                ) from error
-            advice = "" if isinstance(error, ValueError) and not isinstance(error, msgspec.MsgspecError) else _advice(str(error))
-            raise HistoryError(f"history {self.path}: cannot be {what}: {bounded(error)}{advice}") from error
-
-
-def _damaged(error: Exception) -> bool:
-    """Whether what is stored is at fault, and not the way to it."""
-    return not isinstance(error, OSError | sqlite3.OperationalError) or "decode" in str(error) or "malformed" in str(error)
-
-
-def _advice(message: str) -> str:
-    known = {
-        "full": "make room",
-        "disk I/O": "look at the disk: it may be full, or over a limit on the size of files",
-        "readonly": "give a file that can be written",
-        "unable to open": "give a file in a folder that exists and can be written",
-        "locked": f"another process holds it for longer than {BUSY:g} s; end that one",
-        "not a database": "give another file",
-    }
-    return "; " + next((advice for part, advice in known.items() if part in message), "it may be damaged: restore a copy of it")
+    def explained(self, what: str, run: int | None = None) -> AbstractContextManager[None]:
+        """What goes wrong meanwhile is a HistoryError: see `faults`."""
+        return explained(self.path, what, run)
 
 
 def _json(value: Any) -> str:

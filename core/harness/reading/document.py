@@ -20,7 +20,6 @@ from typing import Annotated, Any, TypeAlias, TypeVar, cast, get_args, get_origi
 import msgspec
 
 from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar
-from ..interrupts import deferred
 from ..visible import visible
 
 # Numbers are squared and multiplied on the way: within these bounds that neither overflows nor underflows.
@@ -249,8 +248,6 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
 @cache
 def _fields(struct: type[msgspec.Struct]) -> Mapping[str, msgspec.structs.FieldInfo]:
     """By key; looked up once, not for each of ten thousand bodies."""
-    with deferred():  # msgspec looks at a class once, and an interrupt meanwhile would crash the process
-        msgspec.json.Decoder(struct)
     return {field.encode_name: field for field in msgspec.structs.fields(struct)}
 
 
