@@ -10,9 +10,9 @@ LEAN = 0.3
 """Of the cranks at design [rad]; at a right angle from upright the chain is singular."""
 
 
-def chain(loops):
+def chain(loops, lean=LEAN):
     """Cranks at (k, 0) that lean alike, tied by couplers of length one; only the first is driven."""
-    s, c, n = np.sin(LEAN), np.cos(LEAN), range(loops)
+    s, c, n = np.sin(lean), np.cos(lean), range(loops)
     cranks = [Revolute(f"pivot{k}", "ground", f"crank{k}", (k, 0.0, 0.0), (0.0, 0.0, 1.0)) for k in range(loops + 1)]
     balls = [Spherical(f"ball{k}", f"crank{k}", f"coupler{k}", (k + s, c, 0.0)) for k in n]
     crosses = [

@@ -218,7 +218,7 @@ def test_a_file_that_fails_in_the_end_does_not_keep_back_the_others(kincheck_mai
 
 def test_an_interrupt_keeps_what_was_made(kincheck_main, capsys):
     stopped = Fake("stopped", answer=raising(KeyboardInterrupt()))
-    assert kincheck_main("run", "--json", "-", engines=[RIGHT, stopped]) == 2
+    assert kincheck_main("run", "--json", "-", engines=[RIGHT, stopped]) == 130
     captured = capsys.readouterr()
     assert [each["engine"] for each in json.loads(captured.out)["records"]] == ["native"]
     assert "interrupted: 1 of 4 records" in captured.err

@@ -50,12 +50,13 @@ def test_a_disk_that_fails_in_the_middle_is_a_message_and_the_results_are_delive
         assert 0 < len(store.records(row.id)) < 4
 
 
-def test_a_place_that_cannot_be_written_is_a_message_before_the_work(path):
-    process = kincheck("run", "--engine", "native", "--history", path.parent)
+def test_a_history_that_cannot_be_opened_costs_no_result(path):
+    process = kincheck("run", "--engine", "native", "--jobs", 0, "--history", path.parent, "--json", "-")
     out, err = process.communicate()
-    assert (process.returncode, out) == (2, "")
+    assert process.returncode == 2
     expected = "cannot be opened: unable to open database file; give a file in a folder that exists and can be written"
-    assert err == f"kincheck: history {path.parent}: {expected}\n"
+    assert err.splitlines()[-1] == f"kincheck: history {path.parent}: {expected}; the run is not in the history"
+    assert len(msgspec.json.decode(out)["records"]) == 4
 
 
 def test_resume_needs_a_history_and_the_environment_can_name_it(path):

@@ -214,7 +214,7 @@ def test_errors_of_zero_leave_any_tolerance_loose(path):
 
 def test_an_interrupt_is_no_traceback(capsys, monkeypatch):
     monkeypatch.setattr("kincheck.core.harness.commands.list._list", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
-    assert cli.main(["list"]) == 2
+    assert cli.main(["list"]) == 130
     assert capsys.readouterr().err == "kincheck: interrupted\n"
 
 

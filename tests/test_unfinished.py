@@ -123,7 +123,7 @@ def test_the_command_says_what_it_did_not_come_to(tmp_path, monkeypatch):
 
     monkeypatch.setattr("kincheck.core.harness.commands.isolation.solver", lambda *_: (stopped, {}))
     file = tmp_path / "results.json"
-    assert cli.main(["run", "rssr", "bennett", "--engine", "native", "--json", str(file)]) == 2
+    assert cli.main(["run", "rssr", "bennett", "--engine", "native", "--json", str(file)]) == 130
     assert read_results(file).missing == [("bennett", "native", "projection")]
 
 

@@ -15,7 +15,7 @@ from ..algebra import Scalar
 from ..primitives.base import Twist
 from ..program import NumpyExecutor, Plan, program
 from ..trajectory import Array
-from .equations.formulation import EULER_PARAMETERS
+from .equations.formulation import Configuration
 from .model import Model
 from .programs import Tracer
 from .request import FROM, RATE, RATE_T, TIME
@@ -132,22 +132,22 @@ class System:
         slots |= {name: [self._plan.slots[name]] for name in ("closure", "leftover", "branch")}
         return {name: executor.get(each) for name, each in slots.items()}
 
-    def apart(self, a: Array, b: Array) -> float:
-        """The largest difference between two states as poses: Euler parameters p and -p are the same."""
-        found, first = 0.0, 0
-        for slots in self._names.values():
-            x, y = (each[first : first + len(slots)] for each in (a, b))
-            first += len(slots)
-            same = float(np.abs(x - y).max())
-            found = max(found, min(same, float(np.abs(x + y).max())) if len(slots) == EULER_PARAMETERS else same)
-        return found
+    def poses(self, state: Array) -> Array:
+        """Return the poses of all bodies in one state, shape (numbers, 1): displacements [units] and Euler parameters, (bodies, 7).
+
+        Two states mean the same pose also where an angle among their numbers differs by whole turns.
+        """
+        found = self._configuration(state[:, 0]).poses.values()
+        return np.array([[*pose.u, *pose.q] for pose in found], dtype=np.float64)
 
     def twists(self, state: Array, rate: Array) -> Mapping[str, Twist]:
         """How the bodies move in one state, shape (numbers,), at rates of the unknowns, shape (n,)."""
-        formulation = self._tracer.formulation
+        return self._tracer.formulation.twists(self._configuration(state), rate.tolist())
+
+    def _configuration(self, state: Array) -> Configuration:
         numbers = iter(state.tolist())
         named = {name: [next(numbers) for _ in slots] for name, slots in self._names.items()}
-        return formulation.twists(formulation.configuration(named), rate.tolist())
+        return self._tracer.formulation.configuration(named)
 
     def _executor(self, lanes: int) -> NumpyExecutor:
         if lanes not in self._executors:  # kept: binding costs more than running

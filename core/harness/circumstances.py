@@ -57,7 +57,7 @@ def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, comma
             "numpy": np.__version__,
             "engines": {},
             "platform": platform.platform(),
-            "processor": _processor(),
+            "processor": processor(),
             "host": readable(platform.node()),
             "started": started.isoformat(timespec="seconds"),
             "tol": tol,
@@ -187,8 +187,8 @@ def truth_of(case: Case) -> Truth:
     return case.truth if case.reference else Truth.CONSENSUS_ONLY
 
 
-def _processor() -> str:
-    """The processor's name; platform.processor() gives none on Linux."""
+def processor() -> str:
+    """Return the processor's name; platform.processor() gives none on Linux."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as lines:
             return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))

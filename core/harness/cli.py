@@ -11,13 +11,15 @@ import sys
 import traceback
 from collections.abc import Sequence
 from io import TextIOWrapper
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from ..errors import KincheckError
 from ..version import VERSION
 from .commands import COMMANDS
-from .commands.house import House, Status
-from .console import complain
+from .interrupts import Terminated, listening, status_of, words_of
+
+if TYPE_CHECKING:
+    from .commands.house import House
 
 FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 """What a standard output that takes no more says: files that an option names have messages of their own."""
@@ -25,8 +27,26 @@ FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
-    argv = sys.argv[1:] if argv is None else list(argv)
+    interrupt: KeyboardInterrupt | None = None
+    try:
+        with listening() as interrupts:
+            status = _done(sys.argv[1:] if argv is None else list(argv))
+            interrupt = interrupts.held
+    except KeyboardInterrupt as raised:
+        interrupt, status = raised, 0
+    if interrupt is None:
+        return status
+    if status not in (ended := (status_of(KeyboardInterrupt()), status_of(Terminated()))):  # else the command has said it
+        print(f"kincheck: {words_of(interrupt)}", file=sys.stderr)
+    return status if status in ended else status_of(interrupt)
+
+
+def _done(argv: list[str]) -> int:
+    """Return the status of the command that the arguments give."""
     _be_able_to_print()
+    from .commands.house import Status
+    from .console import complain
+
     try:
         options = _parser(argv).parse_args(argv, argparse.Namespace(command=shlex.join(["kincheck", *argv])))
     except SystemExit as end:  # argparse has said why
@@ -40,8 +60,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _printed(int(options.do(options, house())))
     except KincheckError as error:
         complain(str(error).splitlines())
-    except KeyboardInterrupt:
-        complain(["interrupted"])
     except SystemExit as end:  # an engine's, or a module's that was named: ours come from the parser alone
         where = traceback.extract_tb(end.__traceback__)[-1]
         complain([f"{where.filename}, line {where.lineno}, ended the program with status {end.code!r}; mend it, or leave it out"])
@@ -86,6 +104,7 @@ def _print_no_more() -> None:
 def house() -> House:
     """The engines, cases and writers there are."""
     from ... import adapters, cases
+    from .commands.house import House
 
     writers = adapters.WRITERS, adapters.writer
     return House(tuple(adapters.ENGINES), adapters.engine, cases.names, cases.load, *writers, tuple(adapters.SIMULATIONS))

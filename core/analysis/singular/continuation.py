@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,13 +19,11 @@ from ..request import Request
 from ..structure.driven import require_driven
 from ..system import System
 from .arclength import NODE, ArclengthWalk, Beside, Spot
+from .beginning import Beginning
 from .singularity import Singularity, examine
 
 # A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be cheap, near enough to be drawn.
 LONGEST = 0.05
-# A curve closes where it passes its beginning again, going the same way: the cosine of the two directions is above this there, and
-# below it where the curve crosses itself. In the first steps, so many of the longest, it has not left its beginning yet.
-SAME_WAY, BEGINNING = 0.9, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +60,7 @@ class Curve:
         sigma: smallest singular value of the rows, drivers included: how near a singular pose is [-], shape (n,).
         points: position by name [m], shape (n, 3).
         events: limit points and branch points, in order.
-        closed: whether it came back to the design position.
+        closed: whether it came back to the design position, which then is the last pose too.
         message: empty, or why it ends before its length.
     """
 
@@ -78,11 +76,20 @@ class Curve:
 
 @dataclass
 class _Trail:
-    """Spots of a walk, and events between them."""
+    """Spots of a walk, and events between them.
+
+    Attributes:
+        length: of a closed curve; infinite until it is known to be one.
+    """
 
     spots: list[Spot]
     events: list[Event] = field(default_factory=list[Event])
-    closed: bool = False
+    length: float = np.inf
+
+    @property
+    def closed(self) -> bool:
+        """Whether the walk came back to its first spot."""
+        return self.length < np.inf
 
 
 def trace(
@@ -158,7 +165,7 @@ def limit_ahead(system: System, path: Path, state: Array, time: float, direction
     except np.linalg.LinAlgError:
         return None
     for before, after in pairwise(_from(spot, walk.along(spot, NEARBY, LONGEST, ATTEMPTS))):
-        if before.dt * after.dt < 0.0:
+        if _turns_back(before, after):
             return _event(walk, walk.limit(before, after))
     return None
 
@@ -176,32 +183,63 @@ def _from(first: Spot, others: Iterator[Spot]) -> Iterator[Spot]:
 
 
 def _walked(walk: ArclengthWalk, first: Spot, length: float, longest: float) -> _Trail:
-    trail = _Trail([first])
+    trail, beginning = _Trail([first]), Beginning(walk, first, longest)
     for spot in walk.along(first, length, longest):
-        trail.spots.append(spot)
-        _note(walk, trail)
-        if spot.arc > BEGINNING * longest and _back(walk.system, first, spot, longest):
-            trail.closed = True
+        closing = beginning.passed(trail.spots[-1], spot)
+        trail.spots.append(closing or spot)
+        _note_limit(walk, trail)
+        if closing is not None:
+            trail.length = closing.arc
             break
+    _note_branches(walk, trail)
     trail.events.sort(key=lambda event: event.arc)
     return trail
 
 
-def _note(walk: ArclengthWalk, trail: _Trail) -> None:
-    """Add what lies between the last spots."""
+def _turns_back(before: Spot, after: Spot) -> bool:
+    """Whether the driver's value is stationary between two spots; at a spot itself, before it or after it, and not twice."""
+    return (before.dt < 0.0) != (after.dt < 0.0)
+
+
+def _note_limit(walk: ArclengthWalk, trail: _Trail) -> None:
+    """Add the limit point between the last spots, if there is one."""
     before, after = trail.spots[-2:]
-    if before.dt * after.dt < 0.0:
+    if _turns_back(before, after):
         trail.events.append(_event(walk, walk.limit(before, after)))
-    if len(trail.spots) < 3:
-        return
-    # sigma is least at the middle one, or the determinant changes its sign beside it: both are seen at a simple branch point
-    one, two, three = trail.spots[-3:]
-    if two.sigma < min(one.sigma, three.sigma) or (two.sign != three.sign and two.sigma > three.sigma):
-        found = walk.branching(one, three)
-        if found is not None and all(abs(found.arc - other.arc) > NODE for other in trail.events):  # it may be seen from both sides
-            event = _event(walk, found)
+
+
+def _note_branches(walk: ArclengthWalk, trail: _Trail) -> None:
+    """Add the branch points: sigma is least at a spot, or the determinant changes its sign beside it."""
+    spots = _with_neighbours(walk, trail)
+    for one, two, three in zip(spots, spots[1:], spots[2:], strict=False):
+        if two.sigma < min(one.sigma, three.sigma) or (two.sign != three.sign and two.sigma > three.sigma):
+            found = walk.branching(one, three)
+            if found is None or not trail.spots[0].arc <= (arc := found.arc % trail.length) <= trail.spots[-1].arc:
+                continue
+            if any(_apart(arc, other.arc, trail.length) <= NODE for other in trail.events):
+                continue  # it is seen from both sides
+            turned = trail.spots[-1].time - trail.spots[0].time if found.arc > trail.spots[-1].arc else 0.0
+            event = _event(walk, replace(found, arc=arc, time=found.time - turned))
             if not event.singularity.regular:
                 trail.events.append(event)
+
+
+def _with_neighbours(walk: ArclengthWalk, trail: _Trail) -> list[Spot]:
+    """Return the spots, and one before the first and after the last: a branch point is seen by the spots on both sides of it."""
+    first, last = trail.spots[0], trail.spots[-1]
+    if trail.closed:
+        after = trail.spots[1]
+        again = replace(after, arc=after.arc + trail.length, time=after.time + last.time - first.time)
+        return [*trail.spots, again]
+    h = trail.spots[1].arc - first.arc if len(trail.spots) > 1 else NODE
+    beside = walk.advance(first, -h), walk.advance(last, h)
+    return [*([beside[0]] if beside[0] else []), *trail.spots, *([beside[1]] if beside[1] else [])]
+
+
+def _apart(a: float, b: float, length: float) -> float:
+    """Return how far two places are apart on a curve, of that length if it is closed."""
+    way = abs(a - b)
+    return min(way, length - way)
 
 
 def _event(walk: ArclengthWalk, found: Beside) -> Event:
@@ -219,8 +257,3 @@ def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
     zero = np.zeros((len(spots), walk.system.unknowns))
     found = walk.system.outputs(state, sample, zero, zero)
     return {name: found[f"position {name}"].T for name in walk.system.model.request.points}
-
-
-def _back(system: System, first: Spot, spot: Spot, longest: float) -> bool:
-    """Whether the next step would pass where the curve began: there, and going the same way."""
-    return system.apart(first.state, spot.state) < longest and float(first.dq @ spot.dq) > SAME_WAY

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, unknown
+from ..console import complain
 from .house import House, Status, whole
 from .run import HISTORY
 
@@ -29,6 +30,9 @@ def add(commands: Any) -> None:
     history.add_argument("--case", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these cases only")
     history.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these engines only")
     history.add_argument("--last", type=whole(0), default=LAST, metavar="N", help="the latest N runs; default %(default)s; 0: all")
+    history.add_argument(
+        "--remove", type=whole(1), nargs="+", default=[], metavar="RUN", help="remove these runs, one that is damaged for instance"
+    )
     history.add_argument("--plot", type=Path, metavar="FILE.html", help="draw errors and times over the runs, as a page")
     history.add_argument("--export", type=Path, metavar="FILE", help="write all runs as one table: FILE.parquet or FILE.csv")
 
@@ -54,7 +58,10 @@ def _history(options: argparse.Namespace, house: House) -> int:
         raise KincheckError(f"history: which file? give --history FILE, or set {HISTORY}")
     if problems := unwritable([("--plot", options.plot), ("--export", options.export)], options.history):
         raise KincheckError("\n".join(problems))
-    with Store(Path(options.history), writable=False) as store:
+    with Store(Path(options.history), writable=bool(options.remove)) as store:
+        for run in options.remove:
+            store.remove(run)
+            print(f"run {run} is removed")
         chosen: dict[str, Any] = {"cases": options.case, "engines": options.engine}
         _check_names(store, **chosen)
         history = read(store, last=options.last or None, **chosen)
@@ -72,12 +79,14 @@ def _history(options: argparse.Namespace, house: House) -> int:
 
             count = export(store, options.export, **chosen)
             print(f"{options.export}: {count} rows")
-    return Status.WITHIN
+        complain(store.damage)
+        return Status.FAILED if store.damage else Status.WITHIN
 
 
 def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> None:
-    for what, column, names in (("case", "case_name", cases), ("engine", "engine", engines)):
-        known = [name for (name,) in store.connection.execute(f"SELECT DISTINCT {column} FROM records ORDER BY {column}")]
+    plans = [pair for row in store.runs() for pair in row.plan]
+    for what, place, names in (("case", 0, cases), ("engine", 1, engines)):
+        known = sorted({pair[place] for pair in plans})
         for name in names:
             if name not in known:
                 raise KincheckError(f"history {store.path}: {unknown(what, name, known)}")
@@ -85,32 +94,37 @@ def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> 
 
 def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
     from ..printing import columns, page
-    from ..record import Outcome
 
     table = columns(">run", "started", "status", "outcomes", "engines", "commit", "host", "command")
     for row in rows:
-        found = store.connection.execute(
-            "SELECT outcome, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
-        ).fetchall()
-        counts = Counter(outcome for outcome, _, _ in found)
-        told = ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome])
-        missing = len(row.plan) - len(found)
-        versions = {engine: version for _, engine, version in found if version}
-        git: dict[str, Any] = row.circumstances.get("git") or {}
-        commit = str(git.get("commit") or "–")[:10] + ("+" if git.get("changed") else "")
-        table.add_row(
-            str(row.id),
-            row.started[:16].replace("T", " "),
-            row.status,
-            told + (f", {missing} missing" if missing else ""),
-            ", ".join(f"{engine} {version}" for engine, version in versions.items()),
-            commit,
-            str(row.circumstances.get("host", "–")),
-            row.command,
-        )
+        with store.sparing(), store.explained("read", row.id):
+            table.add_row(*_cells(store, row))
     page(None).print(table)
     if not rows:
         print("no runs yet")
+
+
+def _cells(store: Store, row: RunRow) -> list[str]:
+    from ..record import Outcome
+
+    found = store.connection.execute(
+        "SELECT outcome, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
+    ).fetchall()
+    counts = Counter(outcome for outcome, _, _ in found)
+    told = ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome])
+    missing = len(row.plan) - len(found)
+    versions = {engine: version for _, engine, version in found if version}
+    git: dict[str, Any] = row.circumstances.get("git") or {}
+    return [
+        str(row.id),
+        row.started[:16].replace("T", " "),
+        row.status,
+        told + (f", {missing} missing" if missing else ""),
+        ", ".join(f"{engine} {version}" for engine, version in versions.items()),
+        str(git.get("commit") or "–")[:10] + ("+" if git.get("changed") else ""),
+        str(row.circumstances.get("host", "–")),
+        row.command,
+    ]
 
 
 def _print_trends(history: History) -> None:

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 
 class Status(IntEnum):
-    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work, or part of it."""
+    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work, or part of it.
+
+    A command that is interrupted ends as shells have it: see `interrupts`.
+    """
 
     WITHIN = 0
     DEVIATES = 1

@@ -70,6 +70,7 @@ def _report(options: argparse.Namespace, house: House) -> int:
         found = regressions(subject, against, reason, store)
         print(to_markdown(found), end="", file=sys.stderr if options.json == "-" else sys.stdout)
         _write(options, subject, found, store, problems)
+        problems += store.damage if store is not None else []
     complain(problems)
     if problems:
         return Status.FAILED

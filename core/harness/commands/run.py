@@ -10,13 +10,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, SolveError
 from ..console import complain, lacking, progress, unsolved
+from ..interrupts import hold, status_of, words_of
 from ..visible import visible
-from . import foreign, isolation
+from . import foreign, isolation, kept
 from .house import House, Status
 
 if TYPE_CHECKING:
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
     from ..history.keeping import Keeping
     from ..record import Record, Results
     from ..reporting.deliver import Destinations
-    from ..reporting.measures import Past
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized coordinates, and a thousandth of
 # the 1e-9 m that outputs are held to, so that a residual amplified a hundredfold by the mechanism still cannot be seen.
@@ -132,21 +133,24 @@ def _run(options: argparse.Namespace, house: House) -> int:
 
         precision = efforts_in(options.bench)
     with delivery.json_only() if to.json == "-" else nullcontext():
-        results, problems, keeping = _solved(options, plan)
+        results, problems, keeping, stopped = _solved(options, plan)
     if to.out or to.json or keeping:
         from ..scene import with_scenes
 
         results = with_scenes(results, plan.cases)
     history: Any = None
     if keeping:
-        keeping.end(results, interrupted=bool(problems))
-        problems += keeping.problems
-        history = _trends(keeping) if to.out and not keeping.problems else None
+        keeping.end(results, interrupted=stopped is not None)
+        problems += keeping.problems + keeping.store.damage
+    if options.history is not None:  # read last, for the page alone: what is damaged there costs no result
+        history = partial(kept.past, keeping, problems) if keeping else lambda: None
     delivery.deliver(results, problems, to, matrix=options.joints, precision=precision, history=history)
     if options.explain:
         print(*_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
     problems += lacking(results, options.require) + unsolved(results)
     complain(problems)
+    if stopped is not None:
+        return stopped
     if problems or plan.unread:
         return Status.FAILED
     return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
@@ -190,15 +194,15 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     return _Plan(cases, engines, baseline, {visible(name): visible(message, also="\n") for name, message in unread.items()})
 
 
-def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str], Keeping | None]:
-    """The results, those made before an interrupt too, what interrupted them if something did, and their place in the history."""
+def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str], Keeping | None, int | None]:
+    """Return the results, the problems, the place in the history, and the status if something stopped the run before its end."""
     from .. import run as running
     from ..workers.distributed import ClusterError
 
     solver, settings = isolation.solver(options, plan.engines)
     if plan.unread:
         settings["unread"] = plan.unread
-    keeping = _keeping(options, plan, settings)
+    keeping, problems = kept.keeping(options, plan.cases, plan.engines, [*plan.unread], settings)
     made = [*keeping.made] if keeping else []
     records: list[Record] = [*made]
     tell = progress(records)
@@ -216,12 +220,16 @@ def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str
     started, unread = datetime.now(UTC), [*plan.unread]
     try:
         how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver, "made": made, "unread": unread, **about}
-        return running.run(plan.cases, plan.engines, progress=keep, **how), [], keeping
+        results = running.run(plan.cases, plan.engines, progress=keep, **how)
+        hold()  # also where the signal comes between the last record and here, all of them are kept below
+        return results, problems, keeping, None
     except (KeyboardInterrupt, ClusterError) as reason:
         pairs = running.planned(plan.cases, plan.engines, unread)
         records.sort(key=lambda each: pairs.index((each.case, each.engine, each.mode)))
-        problem = f"{str(reason) or 'interrupted'}: {len(records)} of {len(pairs)} records were made and are kept"
-        return running.results(plan.cases, records, started=started, plan=pairs, **about), [problem], keeping
+        why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
+        problems.append(f"{why}: {len(records)} of {len(pairs)} records were made and are kept")
+        results = running.results(plan.cases, records, started=started, plan=pairs, **about)
+        return results, problems, keeping, status_of(reason) if isinstance(reason, KeyboardInterrupt) else Status.FAILED
 
 
 def _explained(cases: Sequence[Case]) -> Iterator[str]:
@@ -234,34 +242,6 @@ def _explained(cases: Sequence[Case]) -> Iterator[str]:
         except SolveError as error:  # of this case alone: its records are there, and say it too
             yield f"{case.name}: nothing is computed: {error}"
         yield from (f"  note: {note}" for note in case.notes)
-
-
-def _keeping(options: argparse.Namespace, plan: _Plan, settings: dict[str, Any]) -> Keeping | None:
-    """The run in its history, where there is one."""
-    if options.history is None:
-        return None
-    from ..history.keeping import keep
-
-    about: dict[str, Any] = {"tol": options.tol, "command": options.command, "settings": settings}
-    keeping = keep(Path(options.history), plan.cases, plan.engines, unread=[*plan.unread], resume=options.resume, **about)
-    if options.resume:
-        print(
-            f"kincheck: run {keeping.run} goes on, {len(keeping.made)} records are there"
-            if keeping.resumed
-            else f"kincheck: no run of the same kind without an end: run {keeping.run} is new",
-            file=sys.stderr,
-        )
-    return keeping
-
-
-def _trends(keeping: Keeping) -> dict[str, list[Past]]:
-    """The runs up to this one, for its report."""
-    from ..history.series import NIGHTS, read
-    from ..history.store import Store
-    from ..history.trends import trends
-
-    with Store(keeping.store.path, writable=False) as store:
-        return trends(read(store, before=keeping.run + 1, last=NIGHTS))
 
 
 def _return_cases(options: argparse.Namespace, house: House) -> None:

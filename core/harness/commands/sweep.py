@@ -12,7 +12,9 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, unknown
+from ...version import VERSION
 from ..console import complain
+from ..interrupts import hold, status_of, words_of
 from . import foreign, isolation
 from .house import House, Status, whole
 from .run import TOL, positive
@@ -21,12 +23,16 @@ if TYPE_CHECKING:
     from ..attempt import Solver
     from ..case import Case
     from ..engine import Engine
+    from ..study.part import Part
     from ..study.results import SweepResults
     from ..study.study import Study
     from ..study.sweep import Progress
 
 # Seconds between lines of progress where they do not overwrite each other.
 EVERY = 10.0
+
+PART = "sweep.part"
+"""File of the finished part of a sweep, in the folder of its results until it has come to its end."""
 
 FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 
@@ -62,13 +68,19 @@ def add(commands: Any) -> None:
     sweep.add_argument("--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet")
     sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
     sweep.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    sweep.add_argument(
+        "--resume",
+        action="store_true",
+        help=f"go on from the finished part of the same sweep, which is {PART} in the folder of --out",
+    )
     foreign.add_options(sweep)
 
 
 def _sweep(options: argparse.Namespace, house: House) -> int:
     """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its outputs over them.
 
-    Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the work could not be done.
+    Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the work could not be done. A sweep
+    that is interrupted writes what it has, and ends with 130.
     """
     from ..reporting.deliver import Destinations
     from ..study.study import Study
@@ -84,6 +96,8 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
         problems.append("--replay: a variant is known by seed and index; leave out --samples")
     if options.replay and (options.store or options.scheduler):
         problems.append("--replay solves here, and stores nothing; leave out --store and --scheduler")
+    if options.resume and (options.out is None or options.replay):
+        problems.append("--resume goes on from a folder of results: give --out DIR, and leave out --replay")
     engine, share = _check(options, house, problems)
     case = _only(house.find_case(options.case, foreign.supplied(options)), options.output, problems)
     foreign.tell_left_out([case])
@@ -95,8 +109,23 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     study = Study(case, variation, samples, options.seed, options.order, options.tol)
     if options.replay:
         return _replay(options, house, study, engine)
-    results = _solve(options, study, engine, share)
-    _deliver(options, results)
+    with ExitStack() as stack:
+        part = None if options.out is None else stack.enter_context(_part(options))
+        stops: list[KeyboardInterrupt | KincheckError] = []
+        results = _solve(options, study, engine, share, part, stops)
+        hold()
+        problems += _deliver(options, results) + (part.problems if part is not None else [])
+    for reason in stops:
+        why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
+        goes_on = "--resume goes on from there" if part is not None else "with --out DIR it can be taken up with --resume"
+        problems.append(f"{why}: {results.samples} of {results.asked} variants are solved; {goes_on}")
+    complain(problems)
+    if stops and isinstance(stops[0], KeyboardInterrupt):
+        return status_of(stops[0])
+    if problems:
+        return Status.FAILED
+    if part is not None:
+        part.remove()
     return Status.DEVIATES if results.unsolved or results.deviating else Status.WITHIN
 
 
@@ -135,7 +164,27 @@ def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
     return here if engine.name == NATIVE else in_workers(options.jobs or default_jobs(), Limits())
 
 
-def _solve(options: argparse.Namespace, study: Study, engine: Engine | None, share: float) -> SweepResults:
+def _part(options: argparse.Namespace) -> Part:
+    """The file of the finished part, with what its numbers depend on besides the study."""
+    import numpy as np
+
+    from ...program.llvm.compiler import available
+    from ..circumstances import processor
+    from ..joint_check.loading import sources
+    from ..study.part import Part
+
+    facts = {"kincheck": VERSION, "numpy": np.__version__, "llvm": available(), "processor": processor()}
+    return Part(options.out / PART, facts | {"joints": sources(options.joint_type)}, resume=options.resume)
+
+
+def _solve(
+    options: argparse.Namespace,
+    study: Study,
+    engine: Engine | None,
+    share: float,
+    part: Part | None,
+    stops: list[KeyboardInterrupt | KincheckError],
+) -> SweepResults:
     from ..study.running import on_cluster
     from ..study.sweep import Check, sweep_designs
     from ..study.tables import ParquetStore
@@ -148,23 +197,22 @@ def _solve(options: argparse.Namespace, study: Study, engine: Engine | None, sha
     with ExitStack() as stack:
         stack.callback(tell.end)
         store = None if options.store is None else stack.enter_context(ParquetStore(options.store, study))
-        try:
-            return sweep_designs(
-                study.case,
-                study.variation,
-                samples=options.samples,
-                seed=options.seed,
-                order=options.order,
-                tol=options.tol,
-                jobs=options.jobs or default_jobs(),
-                source=None if options.scheduler is None else on_cluster(options.scheduler),
-                check=check,
-                store=store,
-                progress=tell.solved,
-                command=options.command,
-            )
-        except KeyboardInterrupt:
-            raise KincheckError(f"interrupted after {tell.done} variants; --samples {tell.done} sweeps those alone") from None
+        return sweep_designs(
+            study.case,
+            study.variation,
+            samples=options.samples,
+            seed=options.seed,
+            order=options.order,
+            tol=options.tol,
+            jobs=options.jobs or default_jobs(),
+            source=None if options.scheduler is None else on_cluster(options.scheduler),
+            check=check,
+            store=store,
+            progress=tell.solved,
+            command=options.command,
+            part=part,
+            stopped=stops.append,
+        )
 
 
 def _replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
@@ -187,8 +235,8 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
     return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
 
 
-def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
-    """Print the table and write what was asked for."""
+def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
+    """Print the table and write what was asked for; why some of it could not be written."""
     from ..record import to_json
     from ..study.page import page
     from ..study.tables import envelope_csv, gradient_csv, print_sweep
@@ -203,8 +251,7 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> None:
     print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
     if options.json == "-":
         to_standard_output(encoded)
-    if problems:
-        raise KincheckError("\n".join(problems))
+    return problems
 
 
 class Teller:
@@ -213,12 +260,10 @@ class Teller:
     def __init__(self) -> None:
         self.terminal = sys.stderr.isatty()
         self.told = perf_counter()
-        self.done = 0
 
     def solved(self, progress: Progress) -> None:
         """Told after every chunk."""
-        self.done = progress.done
-        rate = progress.done / progress.seconds
+        rate = progress.solved / progress.seconds
         left = (progress.total - progress.done) / rate
         part = f"[{progress.done}/{progress.total}] {100 * progress.done / progress.total:.0f} %"
         line = f"{part}, {rate:.3g} variants/s, {left:.0f} s left"

@@ -11,6 +11,7 @@ from typing import Any
 from ...errors import KincheckError
 from ..visible import cell
 from ..writing import write
+from .series import readable
 from .store import Store
 
 INTEGERS = ("run", "solved", "samples", "worst_step")
@@ -48,15 +49,25 @@ def _rows(store: Store, cases: Sequence[str], engines: Sequence[str]) -> Iterato
     """The names of the columns, then the rows, so many at a time."""
     chosen = [(column, names) for column, names in (("case", cases), ("engine", engines)) if names]
     where = " AND ".join(f'"{column}" IN ({", ".join("?" * len(names))})' for column, names in chosen) or "true"
+    now = {row.id: row.status for row in readable(store)}
     with store.explained("read"):
+        _leave_out(store)
         values = [name for _, wanted in chosen for name in wanted]
         cursor = store.connection.execute(f"SELECT * FROM measured WHERE {where}", values)
         names = tuple(name for name, *_ in cursor.description)
         yield [names]
         run, status = (names.index(name) for name in ("run", "status"))
-        now = {row.id: row.status for row in store.runs()}
         while rows := cursor.fetchmany(ROWS):
             yield [(*row[:status], now[row[run]], *row[status + 1 :]) for row in rows]
+
+
+def _leave_out(store: Store) -> None:
+    """Have the view without the runs that cannot be read: their texts would end the query."""
+    if store.passed_over:
+        (view,) = store.connection.execute("SELECT sql FROM sqlite_master WHERE name = 'measured'").fetchone()
+        listed = ", ".join(str(run) for run in store.passed_over)
+        spared = view.replace("CREATE VIEW", "CREATE TEMP VIEW", 1).replace("FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1)
+        store.connection.execute(spared)
 
 
 def _csv(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:

@@ -66,6 +66,7 @@ def keep(
     settings: Mapping[str, Any],
     resume: bool,
     unread: Sequence[str] = (),
+    joints: Mapping[str, str] | None = None,
 ) -> Keeping:
     """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits, versions, machine and files.
 
@@ -73,6 +74,7 @@ def keep(
         settings: further circumstances.
         resume: take up one that has no end; where there is none, a new one begins.
         unread: names of cases that were asked for and make no sense.
+        joints: digests of the modules of joint types, by name: other code makes another run.
 
     Raises:
         HistoryError: the file cannot be read or written.
@@ -82,16 +84,19 @@ def keep(
     plan = planned(cases, engines, unread)
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
     git: Mapping[str, Any] = facts["git"] or {}
-    code = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed", "edits")]
+    state = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed", "edits")]
+    code = [*state, *(joints or {}).items()]
     found = versions(engines, min(settings.get("timeout", PATIENCE), PATIENCE))
     versioned = [(each.name, each.mode, version) for each, version in zip(engines, found, strict=True)]
     machine = [*(facts[name] for name in ("host", "processor")), *versioned]
     identity = digest(cases, plan, tol, limits, code, machine)
     store = Store(path)
     try:
-        earlier = store.resume_run(identity) if resume else None
-        if earlier is not None:
-            return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
+        if resume:
+            with store.sparing():
+                earlier = store.resume_run(identity)
+                if earlier is not None:
+                    return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
         run = store.begin_run(identity, plan, facts, references(cases))
     except BaseException:
         store.close()

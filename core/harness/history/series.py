@@ -71,11 +71,25 @@ def read(
         rows = [row for row in rows if any(_wanted(pair, cases, engines) for pair in row.plan)]
     runs = {row.id: row for row in reversed(rows[:last])}
     pairs: dict[Pair, list[Entry]] = {}
-    for run in runs:
-        for pair, entry in _entries(store, run):
-            if _wanted(pair, cases, engines):
-                pairs.setdefault(pair, []).append(entry)
-    return History(runs, pairs)
+    for run in [*runs]:
+        with store.sparing():
+            for pair, entry in _entries(store, run):
+                if _wanted(pair, cases, engines):
+                    pairs.setdefault(pair, []).append(entry)
+    return History({run: row for run, row in runs.items() if run not in store.passed_over}, pairs)
+
+
+def readable(store: Store) -> list[RunRow]:
+    """The runs whose facts and records' columns can all be read, the latest first; the others are passed over.
+
+    Raises:
+        HistoryError: the file cannot be read.
+    """
+    rows = store.runs()
+    for row in rows:
+        with store.sparing():
+            _entries(store, row.id)
+    return [row for row in rows if row.id not in store.passed_over]
 
 
 def _wanted(pair: Pair, cases: Sequence[str], engines: Sequence[str]) -> bool:
@@ -83,9 +97,9 @@ def _wanted(pair: Pair, cases: Sequence[str], engines: Sequence[str]) -> bool:
 
 
 def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
-    columns = "case_name, engine, mode, outcome, version, errors, warm_seconds, waited_seconds, us_per_step"
+    columns = "case_name, engine, mode, outcome, version, errors, warm_seconds, waited_seconds, us_per_step, message, truth"
     found: list[tuple[Pair, Entry]] = []
-    with store.explained("read"):
+    with store.explained("read", run):  # also the texts that are not used here: nothing of a damaged run is
         # rowid: the order in which they were made
         for row in store.connection.execute(f"SELECT {columns} FROM records WHERE run_id = ? ORDER BY rowid", (run,)):
             errors = msgspec.json.decode(row[5], type=dict[str, Deviations])
@@ -114,7 +128,7 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
     with store.explained("read"):
         good: dict[int, int] = dict(store.connection.execute(query).fetchall())
     # a finished run lacks the pairs of cases that could not be read: its status was 2
-    whole = [row for row in store.runs() if row.status == "finished" and good.get(row.id) == len(row.plan)]
+    whole = [row for row in readable(store) if row.status == "finished" and good.get(row.id) == len(row.plan)]
     return [row for row in whole if before is None or row.id < before]
 
 

@@ -16,7 +16,7 @@ import hashlib
 import sqlite3
 import zlib
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,9 +24,10 @@ from typing import Any, Literal, Self, TypeAlias
 
 import msgspec
 
-from ...errors import KincheckError
 from ..circumstances import missing, versions
 from ..record import Record, Results
+from . import faults
+from .faults import DamagedRunError, HistoryError, explained, told
 from .owner import alive, owner
 from .schema import MIGRATIONS, check, migrate, write_ahead
 
@@ -34,15 +35,8 @@ Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
 """The file says that a run is running until it ends; where its process is gone it was killed."""
 Plan: TypeAlias = Sequence[tuple[str, str, str]]
 
-# For another run to let go of the file [s]: it holds it for a millisecond a record. Longer, and something is wrong with it.
-BUSY = 30.0
-
 # Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB as JSON).
 QUICK = 1
-
-
-class HistoryError(KincheckError):
-    """A history file cannot be read or written; the message names it and says what to do."""
 
 
 @dataclass(frozen=True)
@@ -59,14 +53,11 @@ class RunRow:
 
 
 class Store:
-    """A history file.
-
-    Raises:
-        HistoryError: from every method, where the file cannot be read or written.
-    """
+    """A history file. From every method comes a HistoryError where it cannot be read or written."""
 
     def __init__(self, path: Path, *, writable: bool = True) -> None:
         self.path = path
+        self.passed_over: dict[int, str] = {}  # runs that cannot be read, and why
         with self.explained("opened"):
             self.connection = self._writable() if writable else self._readable()
 
@@ -153,10 +144,37 @@ class Store:
                     self._attach(run, kind, getattr(results, kind))
             self.connection.execute("UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run))
 
+    def remove(self, run: int) -> None:
+        """Remove a run and all that belongs to it alone."""
+        with self._transaction():
+            for table, column in (("attachments", "run_id"), ("records", "run_id"), ("runs", "id")):
+                removed = self.connection.execute(f"DELETE FROM {table} WHERE {column} = ?", (run,)).rowcount
+            self.connection.execute("DELETE FROM documents WHERE digest NOT IN (SELECT digest FROM attachments)")
+        if not removed:
+            raise HistoryError(f"history {self.path}: there is no run {run}")
+
     def runs(self) -> list[RunRow]:
-        """All runs, the latest first."""
+        """All runs that can be read, the latest first."""
+        rows: list[RunRow] = []
         with self.explained("read"):
-            return [self.run(number) for (number,) in self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()]
+            numbers = self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()
+        for (number,) in numbers:
+            with self.sparing():
+                rows.append(self.run(number))
+        return [row for row in rows if row.id not in self.passed_over]
+
+    @contextmanager
+    def sparing(self) -> Generator[None]:
+        """Pass over a run that cannot be read."""
+        try:
+            yield
+        except DamagedRunError as error:
+            self.passed_over.setdefault(error.run, str(error))
+
+    @property
+    def damage(self) -> list[str]:
+        """Runs that were passed over, a line each."""
+        return told(self.path, self.passed_over)
 
     def run(self, run: int) -> RunRow:
         """The run of that number.
@@ -164,7 +182,7 @@ class Store:
         Raises:
             HistoryError: there is none.
         """
-        with self.explained("read"):
+        with self.explained("read", run):
             query = "SELECT id, started, finished, status, command, plan, circumstances, owner FROM runs WHERE id = ?"
             row = self.connection.execute(query, (run,)).fetchone()
             if row is not None:
@@ -182,7 +200,7 @@ class Store:
     def records(self, run: int) -> list[Record]:
         """The records of a run, in the order of its plan."""
         place = {pair: k for k, pair in enumerate(self.run(run).plan)}
-        with self.explained("read"):
+        with self.explained("read", run):
             rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
             records = [msgspec.json.decode(zlib.decompress(blob), type=Record) for (blob,) in rows]
         return sorted(records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place)))
@@ -191,13 +209,13 @@ class Store:
         """A run as the command wrote it; of one without an end, what there is, and in `run["missing"]` what is not."""
         row, records = self.run(run), self.records(run)
         attached: dict[str, dict[str, Any]] = {}
-        with self.explained("read"):
+        with self.explained("read", run):
             query = "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest) WHERE run_id = ?"
             for kind, case, content in self.connection.execute(query, (run,)):
                 attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
-        facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
-        whole: dict[str, Any] = {"run": facts, "records": [], **attached}
-        return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
+            facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
+            whole: dict[str, Any] = {"run": facts, "records": [], **attached}
+            return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
 
     def _attach(self, run: int, kind: str, documents: Mapping[str, Any]) -> None:
         for case, document in documents.items():
@@ -207,10 +225,10 @@ class Store:
             self.connection.execute("INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest))
 
     def _writable(self) -> sqlite3.Connection:
-        connection = sqlite3.connect(self.path, timeout=BUSY, isolation_level=None)
+        connection = sqlite3.connect(self.path, timeout=faults.BUSY, isolation_level=None)
         try:
             check(connection)  # before anything is changed in a file that may not be ours
-            write_ahead(connection, BUSY)
+            write_ahead(connection, faults.BUSY)
             connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power cut too
             connection.execute("PRAGMA foreign_keys = ON")
             migrate(connection)
@@ -224,7 +242,9 @@ class Store:
             raise HistoryError(f"history {self.path}: there is no such file; `kincheck run --history FILE` makes one")
         # a file in a place where nothing can be written has no journal beside it: then nobody else is writing it either
         for how in ("mode=ro", "mode=ro&immutable=1"):
-            connection = sqlite3.connect(f"{self.path.absolute().as_uri()}?{how}", uri=True, timeout=BUSY, isolation_level=None)
+            connection = sqlite3.connect(
+                f"{self.path.absolute().as_uri()}?{how}", uri=True, timeout=faults.BUSY, isolation_level=None
+            )
             try:
                 version = check(connection)
             except sqlite3.OperationalError:
@@ -263,26 +283,9 @@ class Store:
                     self.connection.execute("ROLLBACK")
                 raise
 
-    @contextmanager
-    def explained(self, what: str) -> Generator[None]:
-        """What goes wrong meanwhile is a HistoryError that names the file; `what` was to be done with it, a participle."""
-        try:
-            yield
-        except (sqlite3.Error, OSError, ValueError, zlib.error, msgspec.MsgspecError) as error:
-            advice = "" if isinstance(error, ValueError) and not isinstance(error, msgspec.MsgspecError) else _advice(str(error))
-            raise HistoryError(f"history {self.path}: cannot be {what}: {error}{advice}") from error
-
-
-def _advice(message: str) -> str:
-    known = {
-        "full": "make room",
-        "disk I/O": "look at the disk: it may be full, or over a limit on the size of files",
-        "readonly": "give a file that can be written",
-        "unable to open": "give a file in a folder that exists and can be written",
-        "locked": f"another process holds it for longer than {BUSY:g} s; end that one",
-        "not a database": "give another file",
-    }
-    return "; " + next((advice for part, advice in known.items() if part in message), "it may be damaged: restore a copy of it")
+    def explained(self, what: str, run: int | None = None) -> AbstractContextManager[None]:
+        """What goes wrong meanwhile is a HistoryError: see `faults`."""
+        return explained(self.path, what, run)
 
 
 def _json(value: Any) -> str:

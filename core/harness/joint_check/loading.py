@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import sys
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -14,6 +16,9 @@ from ..attempt import said
 
 # Files whose lines say nothing of an import that fails, also those that are none; and how many lines of others are read.
 _NOT_THEIRS, MOST_PLACES = (str(Path(__file__).parents[2]), importlib.__file__, "<"), 3
+
+INSTALLED = "site-packages"
+"""Folder of installed modules: one of them in the user's folder is not the user's."""
 
 
 def _raised(error: Exception) -> str:
@@ -75,3 +80,29 @@ def load_joint(where: str) -> type[Joint]:
     if named in Coupler.registry:
         raise KincheckError(f"{where}: the type {named!r} is that of joints that couple two others; give it another")
     return found
+
+
+def sources(names: Iterable[str]) -> dict[str, str]:
+    """Return SHA-256 of the source of every module that joint types at MODULE:CLASS come from, by its name.
+
+    These are the modules themselves and those that are loaded from their folders or below, not installed ones and not kincheck's. A
+    module that is imported only later, and files that a module reads, are not among them.
+    """
+    named = [sys.modules.get(name.partition(":")[0]) for name in names]
+    folders = {file.parent for module in named if module is not None and (file := _file(module)) is not None}
+    found: dict[str, str] = {}
+    for name, module in sorted(sys.modules.items()):
+        file = _file(module)
+        if file is None or name.split(".")[0] == "kincheck":
+            continue
+        beside = any(file.is_relative_to(each) and INSTALLED not in file.relative_to(each).parts for each in folders)
+        if beside or module in named:
+            found[name] = hashlib.sha256(file.read_bytes()).hexdigest()
+    return found
+
+
+def _file(module: object) -> Path | None:
+    """Return the file that a module was loaded from; None where there is none to be read."""
+    name = getattr(module, "__file__", None)
+    file = Path(name).resolve() if isinstance(name, str) else None
+    return file if file is not None and file.is_file() else None

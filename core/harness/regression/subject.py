@@ -86,7 +86,9 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
         else:
             row = _most(_of_branch(store, branch, subject), lambda row: len(_pairs(subject) & {*row.plan}))
         if row is not None:
-            return _kept(store, row, name.replace("-", " ")), ""
+            with store.sparing():
+                return _kept(store, row, name.replace("-", " ")), ""
+            return find_against(name, subject, store)  # the next best
         if name == LAST_GREEN:
             return None, "no earlier run in which nothing went wrong with any of its pairs"
         known = sorted({str(git["branch"]) for row in store.runs() if (git := row.circumstances.get("git")) and git.get("branch")})

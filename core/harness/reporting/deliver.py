@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from ..record import Results, to_json
 from ..writing import Content, Named, to_standard_output, unwritable, write_all
@@ -17,6 +17,8 @@ from ..writing import Content, Named, to_standard_output, unwritable, write_all
 if TYPE_CHECKING:  # what draws is imported where a report is asked for
     from .measures import Effort, Past
 
+    Trends: TypeAlias = Mapping[str, Sequence[Past]] | None
+    """What the engines made of each case in the runs up to this one; None where that is not known."""
 
 REPORT = ("results.json", "report.html")
 """The files of a folder of results."""
@@ -88,14 +90,14 @@ def deliver(
     *,
     matrix: bool = False,
     precision: Mapping[str, Sequence[Effort]] | None = None,
-    history: Mapping[str, Sequence[Past]] | None = None,
+    history: Callable[[], Trends] | None = None,
 ) -> None:
     """Print the table and write what was asked for; a file that cannot be written does not keep back the others.
 
     Args:
         matrix: print a line for each case, and a column for each engine, rather than a line for each pair.
         precision: error against time at several efforts, by case, for the report.
-        history: what the engines made of each case in the runs up to this one, likewise.
+        history: reads the trends for the report, after all else is written; None where no history is kept.
     """
     from .matrix import print_matrix, to_markdown
     from .table import print_table
@@ -111,12 +113,21 @@ def deliver(
     if to.json not in (None, "-"):
         contents.append((Path(to.json), encoded))
     if to.out is not None:
-        from .report import write_report
-
         contents.append((to.out / "results.json", encoded))
-        contents.append((to.out / "report.html", lambda path: write_report(results, path, history=history, precision=precision)))
+        contents.append((to.out / "report.html", lambda path: _write_page(results, path, precision, history)))
     problems += write_all(contents)
     # last: who reads it may have gone
     (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
     if to.json == "-":
         to_standard_output(encoded)
+
+
+def _write_page(
+    results: Results, path: Path, precision: Mapping[str, Sequence[Effort]] | None, history: Callable[[], Trends] | None
+) -> None:
+    """Write the report, without trends where the history has a fault, which it then says."""
+    from .report import WITHOUT_TRENDS, write_report
+
+    past = None if history is None else history()
+    limits = [WITHOUT_TRENDS] if history is not None and past is None else []
+    write_report(results, path, history=past, precision=precision, limits=limits)

@@ -26,6 +26,9 @@ from .wording import TRUTHS, against, engine_name, known, number, output_label, 
 NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
 
+WITHOUT_TRENDS = "No trends", "The history cannot be read, so that this page says nothing of earlier runs."
+"""Limit of a report whose history has a fault."""
+
 _HERE = Path(__file__).parent
 
 
@@ -36,6 +39,7 @@ def write_report(
     history: Mapping[str, Sequence[Past]] | None = None,
     precision: Mapping[str, Sequence[Effort]] | None = None,
     changes: Markup | None = None,
+    limits: Sequence[tuple[str, str]] = (),
 ) -> None:
     """Write the report as one HTML file with all scripts, styles and data inside.
 
@@ -46,11 +50,12 @@ def write_report(
         history: what the engines made of each case in earlier runs and this one, oldest first, by case name.
         precision: error against time at several efforts, by case name.
         changes: a section to come first: what changed since another run.
+        limits: further limits of the report, each a title and a sentence.
 
     Raises:
         OSError: the file cannot be written.
     """
-    path.write_text(render(Material(results, history or {}, precision or {}), changes), encoding="utf-8")
+    path.write_text(render(Material(results, history or {}, precision or {}, limits), changes), encoding="utf-8")
 
 
 def render(given: Material, changes: Markup | None = None) -> str:
@@ -86,7 +91,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
             styles=styles,
             cases=cases,
             references=given.results.references,
-            caveats=caveats(given.results),
+            caveats=[*given.limits, *caveats(given.results)],
             never=never,
             truths=TRUTHS,
             motions=QUANTITIES,

@@ -99,11 +99,12 @@ class CaseView:
 
 @dataclass(frozen=True)
 class Material:
-    """What a report is made from: a run, and what is known from elsewhere, by case."""
+    """What a report is made from: a run, what is known from elsewhere, by case, and further limits, each a title and a sentence."""
 
     results: Results
     history: Mapping[str, Sequence[Past]]
     precision: Mapping[str, Sequence[Effort]]
+    limits: Sequence[tuple[str, str]] = ()
 
 
 def case_view(given: Material, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]) -> CaseView:

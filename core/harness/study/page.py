@@ -91,7 +91,8 @@ def page(results: SweepResults) -> str:
 
 def headline(results: SweepResults) -> str:
     """The study in one sentence."""
-    said = f"{results.samples} variants of {results.case}"
+    said = f"{results.partial or results.samples} variants of {results.case}"
+    said += ", partial: the sweep was stopped" if results.partial else ""
     said += f", {results.unsolved} without a solution somewhere" if results.unsolved else ", all solved"
     if results.checked:
         off = len(results.deviating)

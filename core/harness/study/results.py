@@ -108,6 +108,7 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         run: its circumstances, as of a run: versions, machine, settings, and what the case is.
         samples: how many variants were solved.
+        asked: how many there were to be: more than were solved where the sweep was stopped before its end.
         quantiles_of: how many variants the quantiles are of.
         driver: values at the samples by name, as in a run's records.
         unsolved: variants without a solution somewhere; `failed` lists the first of them.
@@ -122,6 +123,7 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
     mode: str
     seed: int
     samples: int
+    asked: int
     coordinates: list[VariedCoordinate]
     driver: dict[str, list[float]]
     outputs: dict[str, Envelope]
@@ -135,6 +137,11 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
     check_engine: str | None = None
     checked: list[Checked] = []
     measured: dict[str, Any] = {}
+
+    @property
+    def partial(self) -> str:
+        """How many variants of how many there are, of a sweep that was stopped before its end; else empty."""
+        return f"{self.samples} of {self.asked}" if self.samples < self.asked else ""
 
     @property
     def deviating(self) -> list[Checked]:

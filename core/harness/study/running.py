@@ -20,8 +20,8 @@ from ..workers.frames import pack
 from .study import Chunk, Ready, Study
 
 Chunks: TypeAlias = Generator[Chunk]
-Source: TypeAlias = Callable[[Study], Chunks]
-"""Solves the chunks of a study somewhere: gives each once, in order."""
+Source: TypeAlias = Callable[[Study, int], Chunks]
+"""Solves the chunks of a study somewhere, from the one of that index on: gives each once, in order."""
 
 # Chunks that are under way for each thread: one is solved, one waits, and results come back in order.
 AHEAD = 3
@@ -30,14 +30,14 @@ AHEAD = 3
 def on_threads(ready: Ready, jobs: int) -> Source:
     """The source in this process: the programs run without Python's lock."""
 
-    def solve(study: Study) -> Chunks:
+    def solve(study: Study, first: int = 0) -> Chunks:
         if jobs == 1:
-            yield from map(ready.chunk, range(study.chunks))
+            yield from map(ready.chunk, range(first, study.chunks))
             return
         waiting = deque[Any]()
         with ThreadPoolExecutor(jobs) as pool:
             try:
-                for index in range(study.chunks):
+                for index in range(first, study.chunks):
                     waiting.append(pool.submit(ready.chunk, index))
                     if len(waiting) >= AHEAD * jobs:
                         yield waiting.popleft().result()
@@ -57,13 +57,13 @@ def on_cluster(address: str) -> Source:
             was lost, or a worker cannot solve.
     """
 
-    def solve(study: Study) -> Chunks:
+    def solve(study: Study, first: int = 0) -> Chunks:
         distributed = loaded()
         packed = pack(study)
         name = f"kincheck-sweep-{uuid4().hex}"  # the scheduler takes equal names for one and the same task
         with connected(distributed, address) as client, _explained(distributed, address):
             waiting = deque[Any]()
-            for index in range(study.chunks):
+            for index in range(first, study.chunks):
                 task: Any = client.submit(solve_there, packed, index, VERSION, key=f"{name}-{index}", pure=False)
                 waiting.append(task)
                 # asked each time: workers may come and go

@@ -20,8 +20,11 @@ from ..attempt import Solver
 from ..case import Case
 from ..circumstances import circumstances
 from ..engine import Engine
+from ..interrupts import deferred, hold
+from ..workers.distributed import ClusterError
 from . import checking, results
 from .gradients import gradients
+from .part import Part
 from .reduce import merged, nothing, quantiles
 from .running import Source, on_threads
 from .study import Chunk, Ready, Study, Unsolved
@@ -39,12 +42,13 @@ MOST_VARIANTS = 10**10
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """How far a sweep is: variants solved of all, without a solution among them, and seconds since the first was begun."""
+    """How far a sweep is: variants solved of all, without a solution among them, seconds, and variants solved in these."""
 
     done: int
     total: int
     unsolved: int
     seconds: float
+    solved: int
 
 
 class Store(Protocol):
@@ -80,6 +84,8 @@ def sweep_designs(
     store: Store | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
     command: str = "",
+    part: Part | None = None,
+    stopped: Callable[[KeyboardInterrupt | ClusterError], None] | None = None,
 ) -> results.SweepResults:
     """Solve all variants of a case and reduce its outputs over them; never are all variants held at once.
 
@@ -96,6 +102,9 @@ def sweep_designs(
         store: takes the values of all variants.
         progress: told after every chunk.
         command: the command line, kept with the results.
+        part: keeps the chunks that are solved, and has those of an earlier sweep that was stopped.
+        stopped: told what stops the sweep before its end: the results are then of the variants solved so far. Without it, and where
+            there are none yet, that is raised.
 
     Raises:
         KincheckError: the number of variants is missing or not for this mode, the nominal design cannot be solved, the engine of
@@ -110,22 +119,40 @@ def sweep_designs(
     study = replace(study, subset=min(1.0, _kept(study) / study.samples))
     ready = Ready(study)
     found = _Gathered(study)
-    begin, cpu = perf_counter(), process_time()
-    with closing((source or on_threads(ready, jobs))(study)) as chunks:
-        for chunk in chunks:
-            found.add(chunk)
-            if store is not None:
-                store.write(chunk)
-            progress(Progress(found.done, study.samples, found.failures, perf_counter() - begin))
-    measured = _measured(study, jobs if source is None else None, perf_counter() - begin, process_time() - cpu)
+    for chunk in part.finished(study) if part is not None else ():
+        found.add(chunk)
+        if store is not None:
+            store.write(chunk)
+    begin, cpu, earlier = perf_counter(), process_time(), found.done
+    checked: list[checking.Checked] = []
+    try:
+        with closing((source or on_threads(ready, jobs))(study, found.chunks)) as chunks:
+            for chunk in chunks:
+                with deferred():  # a chunk counts everywhere or nowhere
+                    found.add(chunk)
+                    if store is not None:
+                        store.write(chunk)
+                    if part is not None:
+                        part.add(chunk)
+                progress(Progress(found.done, study.samples, found.failures, perf_counter() - begin, found.done - earlier))
+        measured = _measured(
+            study, found.done - earlier, jobs if source is None else None, perf_counter() - begin, process_time() - cpu
+        )
+        if check is not None:
+            checked = checking.check(study, check.engine, check.solver, found.picked, check.tol, check.progress)
+        hold()
+    except (KeyboardInterrupt, ClusterError) as reason:
+        if stopped is None or not found.done:
+            raise
+        stopped(reason)
+        measured = _measured(
+            study, found.done - earlier, jobs if source is None else None, perf_counter() - begin, process_time() - cpu
+        )
     slopes = gradients(ready)
-    exact = study.subset >= 1.0 and variation.mode is not Mode.MONTE_CARLO
-    by_row = [[part[k] for part in found.kept] for k in range(len(study.rows))]
+    exact = study.subset >= 1.0 and variation.mode is not Mode.MONTE_CARLO and found.done == study.samples
+    by_row = [[each[k] for each in found.kept] for k in range(len(study.rows))]
     with ThreadPoolExecutor(jobs) as pool:  # sorting is done without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
-    checked = (
-        checking.check(study, check.engine, check.solver, found.picked, check.tol, check.progress) if check is not None else []
-    )  # fmt: skip
     run = circumstances([case], started=started, tol=tol, command=command)
     run["cases"][case.name]["notes"] += start_notes(case.mechanism, ready.model.request, case.sweep.path, tol)
     return results.SweepResults(
@@ -133,7 +160,8 @@ def sweep_designs(
         case=case.name,
         mode=str(variation.mode),
         seed=seed,
-        samples=study.samples,
+        samples=found.done,
+        asked=study.samples,
         coordinates=results.coordinates(study),
         driver={name: values.tolist() for name, values in case.sweep.moved.items()},
         outputs=results.envelopes(study, found.summary, kept, ready.nominal),
@@ -159,7 +187,7 @@ class _Gathered:
         self.picked: dict[int, Array] = {}
         self.unsolved: list[Unsolved] = []
         self.effects: dict[int, Array] = {}
-        self.done = self.failures = self.retried = 0
+        self.done = self.chunks = self.failures = self.retried = 0
 
     def add(self, chunk: Chunk) -> None:
         """Take a chunk; chunks come in order."""
@@ -170,6 +198,7 @@ class _Gathered:
         if chunk.effects is not None:  # the first variant is the nominal design
             self.effects |= {self.done + k: each for k, each in enumerate(chunk.effects.T) if self.done + k}
         self.done += chunk.count
+        self.chunks += 1
         self.failures += chunk.failures
         self.retried += chunk.retried
 
@@ -199,11 +228,11 @@ def _kept(study: Study) -> int:
     return max(1, min(KEPT, KEPT_BYTES // (8 * len(study.rows) * len(study.case.sweep.values))))
 
 
-def _measured(study: Study, jobs: int | None, seconds: float, cpu: float) -> dict[str, Any]:
+def _measured(study: Study, solved: int, jobs: int | None, seconds: float, cpu: float) -> dict[str, Any]:
     """Rates of the solution and reduction of the variants; those by core are not known of a cluster."""
-    points = study.samples * len(study.case.sweep.values)
-    found: dict[str, Any] = {"seconds": seconds, "variants_per_second": study.samples / seconds}
-    if jobs is not None:
+    points = solved * len(study.case.sweep.values)
+    found: dict[str, Any] = {"seconds": seconds, "variants_per_second": solved / seconds}
+    if jobs is not None and points:
         found |= {"jobs": jobs, "us_per_sample_and_core": 1e6 * seconds * jobs / points, "cpu_us_per_sample": 1e6 * cpu / points}
     return found
 

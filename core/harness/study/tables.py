@@ -82,18 +82,20 @@ def remarks(results: SweepResults) -> list[str]:
 
 
 def envelope_csv(results: SweepResults) -> str:
-    """A line for each output and sample [SI]; empty where there is no value."""
+    """A line for each output and sample [SI]; empty where there is no value. A column says of how many variants a part is."""
     swept = next(iter(results.driver))
     probabilities = list(next(iter(results.outputs.values())).quantiles)
     columns = ["output", "unit", "sample", swept, "nominal", "count", "min", "max", "mean", "standard_deviation"]
     errors = any(each.standard_errors for each in results.outputs.values())
     columns += [f"quantile_{p}" for p in probabilities] + ([f"standard_error_{p}" for p in probabilities] if errors else [])
+    columns += ["partial"] if results.partial else []
     rows: list[Sequence[Any]] = []
     for name, each in results.outputs.items():
         numbers = [each.nominal, each.count, each.min, each.max, each.mean, each.standard_deviation, *each.quantiles.values()]
         numbers += list((each.standard_errors or {}).values())
         for k, value in enumerate(results.driver[swept]):
-            rows.append([name, each.unit, k, value, *(column[k] for column in numbers)])
+            partial = [f"{results.partial} variants"] if results.partial else []
+            rows.append([name, each.unit, k, value, *(column[k] for column in numbers), *partial])
     return _csv(columns, rows)
 
 
@@ -116,7 +118,8 @@ class ParquetStore:
 
     Columns: variant, the offset of each coordinate [SI], and each output as a list over the samples, NaN where there is no value.
     A coordinate that is named like an output, W.x say, has the column W.x.offset.
-    The file's metadata under the key "kincheck" says case, seed, mode, units, signs and the driver's values, as JSON.
+    The file's metadata under the key "kincheck" says case, seed, mode, units, signs and the driver's values, as JSON; where not all
+    variants are there, "kincheck.partial" says how many of how many.
 
     Raises:
         KincheckError: pyarrow is not installed, or the file cannot be written.
@@ -128,7 +131,7 @@ class ParquetStore:
             parquet: Any = importlib.import_module("pyarrow.parquet")
         except ImportError as error:
             raise KincheckError("--store needs pyarrow, which is not installed; pip install 'kincheck[parquet]'") from error
-        arrow, self._first = self._arrow, 0
+        arrow, self._first, self._samples = self._arrow, 0, study.samples
         n = len(study.case.sweep.values)
         fields = [arrow.field("variant", arrow.int64())]
         offsets = _offset_columns(study)
@@ -152,6 +155,8 @@ class ParquetStore:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._first < self._samples:
+            self._writer.add_key_value_metadata({"kincheck.partial": f"{self._first} of {self._samples} variants"})
         self._writer.close()
 
     def write(self, chunk: Chunk) -> None:

@@ -1,0 +1,149 @@
+"""Ctrl-C and SIGTERM at any moment: one line, status 130 or 143, no traceback, and what was made is written."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from kincheck.core.harness import interrupts
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
+
+# The process sends itself a signal at its so many-th event of a kind: the same moment however fast the machine is.
+AT = """
+import os, sys
+from kincheck.__main__ import main
+kind, left, number = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+def hook(event, arguments):
+    global left
+    if event == kind:
+        left -= 1
+        if not left:
+            os.kill(os.getpid(), number)
+sys.addaudithook(hook)
+sys.argv[1:] = sys.argv[4:]
+sys.exit(main())
+"""
+
+
+def listening():
+    """Have the child take Ctrl-C, also where these tests run in the background."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def ended(process):
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+def stopped_at(kind, count, number, *arguments):
+    command = [sys.executable, "-c", AT, kind, str(count), str(int(number)), *map(str, arguments)]
+    return ended(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening))
+
+
+def lines(err):
+    return [line for line in err.splitlines() if not line.startswith("[")]  # progress
+
+
+@pytest.mark.parametrize(("number", "status", "said"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")])
+@pytest.mark.parametrize("count", [1, 10, 100, 300])
+def test_during_imports(count, number, status, said):
+    assert stopped_at("import", count, number, "list") == (status, "", f"kincheck: {said}\n")
+
+
+@pytest.mark.parametrize("command", [["list"], ["run", "rssr", "--engine", "native"], ["trace", "four_bar"], ["doctor"]])
+def test_an_interrupt_of_any_command_is_one_line(command):
+    """Texts that imports compile, which make Python end by the signal if it is left to itself."""
+    for count in (5, 40):
+        status, _, err = stopped_at("exec", count, signal.SIGINT, *command)
+        assert (status, lines(err)) == (130, ["kincheck: interrupted"])
+
+
+def test_what_was_made_is_written(tmp_path):
+    """While records come, and once more while they are written."""
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "kincheck", "run", "--engine", "native", "mujoco", "--jobs", "1", "--out", str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening)
+    first = process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    status, _, err = ended(process)
+    assert first.startswith("[1/")
+    assert status == 130
+    (said,) = lines(err)
+    assert said.startswith("kincheck: interrupted: ")
+    assert said.endswith(" records were made and are kept")
+    found = json.loads((out / "results.json").read_text())
+    assert found["records"]
+    assert found["run"]["missing"]
+    assert (out / "report.html").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_while_results_are_written_they_are_written_to_the_end(tmp_path, number):
+    """A file is renamed when it is whole: the signal comes with the first of three."""
+    names = ["junit.xml", "results.json", "report.html"]
+    command = ["run", "rssr", "--engine", "native", "--junit", tmp_path / "junit.xml", "--out", tmp_path]
+    status, out, err = stopped_at("os.rename", 1, number, *command)
+    assert status == 128 + number
+    assert lines(err) == [f"kincheck: {'terminated' if number == signal.SIGTERM else 'interrupted'}"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == sorted(names)
+    assert "1 pass" in out
+
+
+@pytest.mark.parametrize("trial", range(4))
+def test_at_any_moment(tmp_path, trial):
+    """From when Python has begun to the end of the run, workers and history included."""
+    generator = random.Random(trial)
+    command = ["run", "rssr", "bennett", "--engine", "native", "mujoco", "--history", tmp_path / "h.sqlite", "--out", tmp_path]
+    begun = tmp_path / "begun"
+    code = f"open({str(begun)!r}, 'w').close(); from kincheck.__main__ import main; import sys; sys.exit(main())"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *map(str, command)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=listening,
+    )
+    while not begun.exists():
+        time.sleep(0.01)
+    time.sleep(0.1 + generator.uniform(0.0, 6.0))
+    process.send_signal(signal.SIGINT)
+    status, _, err = ended(process)
+    assert status in (0, 130)
+    assert len(lines(err)) == (status == 130), err
+
+
+def test_a_second_interrupt_is_noted_and_a_third_stops():
+    heard = interrupts.Interrupts()
+    with pytest.raises(KeyboardInterrupt):
+        heard(signal.SIGINT, None)
+    heard(signal.SIGTERM, None)
+    assert isinstance(heard.held, interrupts.Terminated)
+    with pytest.raises(KeyboardInterrupt):
+        heard(signal.SIGINT, None)
+
+
+def test_what_is_deferred_is_done_whole():
+    heard, done = interrupts.Interrupts(), []
+
+    def work():
+        with heard.deferred():
+            heard(signal.SIGTERM, None)
+            done.append("whole")
+
+    with pytest.raises(interrupts.Terminated):
+        work()
+    assert done == ["whole"]
+
+
+def test_a_signal_that_is_ignored_stays_ignored():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with interrupts.listening():
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
