@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from .record import Outcome, Record, Results
@@ -23,7 +24,7 @@ def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
 
     def tell(record: Record, done: int, total: int) -> None:
         records.append(record)
-        line = visible(f"[{done}/{total}] {record.case} {record.engine}: {record.outcome}")
+        line = visible(f"[{done}/{total}] {record.case} {record.engine}: {record.outcome.shown}")
         if terminal:
             line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
@@ -31,14 +32,19 @@ def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
     return tell
 
 
-def lacking(results: Results, required: Sequence[str]) -> list[str]:
-    """What a required engine could not do."""
+def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
+    """Return what a required engine could not do, and which of the engines that were named are missing."""
     lines = [
         f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
         if record.outcome is Outcome.UNAVAILABLE
         else f"required engine {record.engine!r}: case {record.case!r} is unsupported: {record.message}"
         for record in results.records
         if record.engine in required and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
+    ]
+    lines += [
+        f"engine {record.engine!r} is named and missing: {record.message}; {how_to_install(record.engine)}"
+        for record in results.records
+        if record.engine in named and record.engine not in required and record.outcome is Outcome.UNAVAILABLE
     ]
     return list(dict.fromkeys(lines))
 
@@ -49,6 +55,15 @@ def unsolved(results: Results) -> list[str]:
     if outcomes & {Outcome.PASS, Outcome.FAIL} or not any(outcome.bad for outcome in outcomes):
         return []
     return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
+
+
+def unjudged(results: Results) -> list[str]:
+    """Return that nothing was compared in a run that has all its records, and what would change that."""
+    counts = Counter(record.outcome for record in results.records)
+    if results.missing or not counts or any(outcome.judged or outcome.bad for outcome in counts):
+        return []
+    found = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
+    return [f"nothing was compared ({found}); give the case a reference, or run an engine beside the native one"]
 
 
 def how_to_install(engine: str) -> str:

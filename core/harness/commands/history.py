@@ -84,16 +84,17 @@ def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> 
 
 
 def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
+    from ..history.schema import OUTCOME
     from ..printing import columns, page
     from ..record import Outcome
 
     table = columns(">run", "started", "status", "outcomes", "engines", "commit", "host", "command")
     for row in rows:
         found = store.connection.execute(
-            "SELECT outcome, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
+            f"SELECT {OUTCOME}, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
         ).fetchall()
         counts = Counter(outcome for outcome, _, _ in found)
-        told = ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome])
+        told = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
         missing = len(row.plan) - len(found)
         versions = {engine: version for _, engine, version in found if version}
         git: dict[str, Any] = row.circumstances.get("git") or {}
@@ -126,7 +127,7 @@ def _print_trends(history: History) -> None:
         for entry in entries:
             row = history.runs[entry.run]
             error = largest_length(entry, case, row)
-            table.add_row(run_name(row), entry.version or "–", str(entry.outcome), number(error), number(entry.us_per_step))
+            table.add_row(run_name(row), entry.version or "–", entry.outcome.shown, number(error), number(entry.us_per_step))
         console.print(table)
     for step in steps(history):
         sign = "worse" if step.worse else "better"

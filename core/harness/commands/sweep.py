@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, unknown
-from ..console import complain
+from ..console import complain, lacking, unjudged
 from . import foreign, isolation
 from .house import House, Status, whole
 from .run import TOL, positive
@@ -181,6 +181,8 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
     results = running.run(cases, engines, tol=options.tol, command=options.command, solver=_solver(options, engines[-1]))
     problems: list[str] = []
     delivery.deliver(results, problems, delivery.Destinations.of(options))
+    if engine is not None:
+        problems += lacking(results, [], [engine.name]) + unjudged(results)
     complain(problems)
     if problems:
         return Status.FAILED

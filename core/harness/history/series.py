@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import msgspec
 
 from ..record import Deviations, Outcome
+from .schema import OUTCOME
 from .store import RunRow, Store
 
 NIGHTS = 60
@@ -83,7 +84,7 @@ def _wanted(pair: Pair, cases: Sequence[str], engines: Sequence[str]) -> bool:
 
 
 def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
-    columns = "case_name, engine, mode, outcome, version, errors, warm_seconds, waited_seconds, us_per_step"
+    columns = f"case_name, engine, mode, {OUTCOME}, version, errors, warm_seconds, waited_seconds, us_per_step"
     found: list[tuple[Pair, Entry]] = []
     with store.explained("read"):
         # rowid: the order in which they were made
@@ -110,7 +111,9 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
         HistoryError: the file cannot be read.
     """
     bad = ", ".join(f"'{outcome}'" for outcome in Outcome if outcome.bad)
-    query = f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0 AND sum(outcome = 'pass') > 0"
+    query = (
+        f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0 AND sum({OUTCOME} = 'pass') > 0"
+    )
     with store.explained("read"):
         good: dict[int, int] = dict(store.connection.execute(query).fetchall())
     # a finished run lacks the pairs of cases that could not be read: its status was 2

@@ -26,7 +26,7 @@ import msgspec
 
 from ...errors import KincheckError
 from ..circumstances import missing, versions
-from ..record import Record, Results
+from ..record import Record, Results, settled
 from .owner import alive, owner
 from .schema import MIGRATIONS, check, migrate, write_ahead
 
@@ -184,7 +184,7 @@ class Store:
         place = {pair: k for k, pair in enumerate(self.run(run).plan)}
         with self.explained("read"):
             rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
-            records = [msgspec.json.decode(zlib.decompress(blob), type=Record) for (blob,) in rows]
+            records = [settled(msgspec.json.decode(zlib.decompress(blob), type=Record)) for (blob,) in rows]
         return sorted(records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place)))
 
     def results(self, run: int) -> Results:

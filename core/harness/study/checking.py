@@ -109,7 +109,9 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked
     case = study.of_variant(variant)
     beat = pace(case)
     lost = ""
-    worst = Checked(variant=variant, outcome=Outcome.FAIL, message="there is nothing to compare: no row has values from both")
+    worst = Checked(variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both")
+    if contradicted := _contradicted(result, ours):
+        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=contradicted)
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
@@ -136,3 +138,14 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked
     if lost:
         return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message="; ".join(filter(None, (lost, worst.message))))
     return worst
+
+
+def _contradicted(answer: Answer, ours: Array) -> str:
+    """Return at how many samples an engine has values where the sweep has no solution; empty where at none."""
+    theirs = np.logical_or.reduce([np.isfinite(series.position) for series in answer.outputs.values()])
+    count = int((theirs & ~np.isfinite(ours).any(axis=0)).sum())
+    return (
+        f"values at {count} of {ours.shape[1]} samples that native cannot reach; --replay says where the motion ends"
+        if count
+        else ""
+    )
