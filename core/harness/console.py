@@ -49,21 +49,18 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
     return list(dict.fromkeys(lines))
 
 
-def unsolved(results: Results) -> list[str]:
-    """That nothing came of a run but errors, timeouts and crashes: no result deviates, for there is none."""
-    outcomes = {record.outcome for record in results.records}
-    if outcomes & {Outcome.PASS, Outcome.FAIL} or not any(outcome.bad for outcome in outcomes):
-        return []
-    return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
-
-
-def unjudged(results: Results) -> list[str]:
-    """Return that nothing was compared in a run that has all its records, and what would change that."""
+def uncompared(results: Results) -> list[str]:
+    """Return that a run has compared nothing, and why: then no result deviates, and none is right."""
     counts = Counter(record.outcome for record in results.records)
-    if results.missing or not counts or any(outcome.judged or outcome.bad for outcome in counts):
+    if any(outcome.judged for outcome in counts):
+        return []
+    if not counts[Outcome.UNJUDGED] and any(outcome.bad for outcome in counts):
+        return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
+    if not counts or results.missing:  # it was stopped, or its cases cannot be read, which is said already
         return []
     found = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
-    return [f"nothing was compared ({found}); give the case a reference, or run an engine beside the native one"]
+    remedy = "give the case a reference, or run another engine beside the native one"
+    return [f"nothing was compared ({found}); {remedy if counts[Outcome.UNJUDGED] else 'run other engines'}"]
 
 
 def how_to_install(engine: str) -> str:

@@ -9,6 +9,7 @@ from time import perf_counter
 import msgspec
 import numpy as np
 
+from ..errors import shortened
 from .attempt import Answer
 from .case import Case, Quantity
 from .compare import NOT_JUDGED, describe, deviations, size
@@ -17,6 +18,10 @@ from .standard import NATIVE, Standard, known
 
 ROUNDED = 2.0
 """Engines measure in a unit near the mechanism's size, a power of two, which may be larger."""
+
+
+NAMED = 3
+"""Outputs whose values a message gives; the record has all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +105,14 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
     if not at.any():
         return ""
     first = int(np.argmax(at))
-    values = ", ".join(
+    values = [
         f"{output.name} = {value:.6g} {output.unit}"
         for output in case.outputs
         if np.isfinite(value := answer.outputs[output.name].position[first])
-    )
+    ]
     where = f"sample {first} ({case.sweep.driver} = {case.sweep.values[first]:.9g})"
     return (
-        f"values at {at.sum()} of {samples} samples that {NATIVE} cannot reach, first at {where}: {values}; "
+        f"values at {at.sum()} of {samples} samples that {NATIVE} cannot reach, first at {where}: {shortened(values, NAMED)}; "
         f"{NATIVE}: {native.why or 'gives no reason'}"
     )
 

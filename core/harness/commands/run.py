@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, SolveError
-from ..console import complain, lacking, progress, unjudged, unsolved
+from ..console import complain, lacking, progress, uncompared
 from ..visible import visible
 from . import foreign, isolation
 from .house import House, Status
@@ -147,7 +147,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     delivery.deliver(results, problems, to, matrix=options.joints, precision=precision, history=history)
     if options.explain:
         print(*_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
-    problems += lacking(results, options.require, options.engine) + unsolved(results) + unjudged(results)
+    problems += lacking(results, options.require, options.engine) + uncompared(results)
     complain(problems)
     if problems or plan.unread:
         return Status.FAILED

@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, unknown
-from ..console import complain, lacking, unjudged
+from ..console import complain, lacking, uncompared
 from . import foreign, isolation
 from .house import House, Status, whole
 from .run import TOL, positive
@@ -182,7 +182,7 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
     problems: list[str] = []
     delivery.deliver(results, problems, delivery.Destinations.of(options))
     if engine is not None:
-        problems += lacking(results, [], [engine.name]) + unjudged(results)
+        problems += lacking(results, [], [engine.name]) + uncompared(results)
     complain(problems)
     if problems:
         return Status.FAILED

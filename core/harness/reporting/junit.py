@@ -16,7 +16,8 @@ FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]
 def to_junit(results: Results) -> bytes:
     """Return the results as JUnit XML.
 
-    A missing engine or feature, and an output that was not judged, is a skip with its reason. A pair that was never made is an error.
+    A missing engine or feature, and an output that was not judged, is a skip with its reason. A
+    pair that was never made is an error.
 
     What is to be known of a case's geometry is the output of its suite.
     """

@@ -144,8 +144,6 @@ def _contradicted(answer: Answer, ours: Array) -> str:
     """Return at how many samples an engine has values where the sweep has no solution; empty where at none."""
     theirs = np.logical_or.reduce([np.isfinite(series.position) for series in answer.outputs.values()])
     count = int((theirs & ~np.isfinite(ours).any(axis=0)).sum())
-    return (
-        f"values at {count} of {ours.shape[1]} samples that native cannot reach; --replay says where the motion ends"
-        if count
-        else ""
-    )
+    if not count:
+        return ""
+    return f"values at {count} of {ours.shape[1]} samples that native cannot reach; --replay says where the motion ends"
