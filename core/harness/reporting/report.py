@@ -137,7 +137,7 @@ def headline(results: Results) -> str:
     compared = [record for record in records if judged([record]) or record.outcome is Outcome.FAIL]
     broken = _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
-    faults = Counter(map(_fault, failed))
+    faults = Counter(_fault(record, results.run.get("tol", 0.0)) for record in failed)
     counts = [
         f"{n} of {len(compared)} comparisons {one if n == 1 else more} {what}" for one, more, what in FAULTS if (n := faults[what])
     ]
@@ -158,14 +158,14 @@ def headline(results: Results) -> str:
     return said + (f"; the run ended before {missing} more" if missing else "")
 
 
-def _fault(record: Record) -> str:
+def _fault(record: Record, tol: float) -> str:
     """Return what is wrong with a record that fails, one of `FAULTS`; where several are, the first."""
     errors = record.errors.values()
     holds = (
         any(not each.within for each in errors),
         any(each.contradicted for each in errors),
         any(each.lost for each in errors),
-        record.solved == record.samples,
+        record.solved == record.samples and (record.residual_max or 0.0) > tol,
         True,
     )
     return next(what for (_, _, what), true in zip(FAULTS, holds, strict=True) if true)
