@@ -19,10 +19,7 @@ from .compare import as_numbers
 from .engine import Engine
 from .record import Deviations, Outcome, Record, Results, Seconds
 from .standard import NATIVE, Standard, has_everything, standard_of
-from .verdict import Verdict, judged
-
-PROJECTION = "projection"
-"""The mode whose engines promise the tolerance; a simulation is held to its outputs alone."""
+from .verdict import Verdict, judged, promised
 
 UNTOLD = {
     "residual_max": "no sample was solved",
@@ -171,9 +168,9 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
     facts = attempt.facts or Facts("unknown")
     result = attempt.result
     if isinstance(result, Answer):
-        held = residuals and engine.name != NATIVE and engine.mode == PROJECTION
+        tol = promised(engine, pair.tol) if residuals else math.inf
         try:
-            verdict = judged(case, result, native, pair.tol if held else math.inf)
+            verdict = judged(case, result, native, tol)
             return _answered(case, engine, facts, result, attempt.seconds or Seconds(), verdict)
         except Exception as error:  # a reference that does not fit, for one
             result = Failure(Outcome.ERROR, said(error))

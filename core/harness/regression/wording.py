@@ -60,7 +60,10 @@ def headline(found: Regressions) -> str:
     said = ", ".join(counts) or "nothing regressed"
     fixed = len(pairs(found, Kind.FIXED))
     known = len(found.failing) - len(pairs(found, Kind.FAILURE))
+    again = len(pairs(found, Kind.JUDGED))
     rest = [f"{fixed} fixed"] if fixed else []
+    rest += [f"{again} judged again"] if again else []
+    rest += [f"{len(found.unjudged)} not judged"] if found.unjudged else []
     rest += [f"{known} not right before either"] if known > 0 else []
     rest += [", ".join(map(str, versions(found)))] if versions(found) else []
     return "; ".join([f"{found.run.name} against {found.against.name}: {said}", *rest])

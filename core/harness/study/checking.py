@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from ..case import Series
 from ..compare import describe, deviation, pace
 from ..engine import Engine
 from ..record import Outcome
+from ..verdict import excess, promised
 from .study import Study
 
 
@@ -96,13 +98,20 @@ def check(
     with closing(solver(pairs)) as attempts:
         for index, attempt in attempts:
             variant = pairs.variants[index]
-            found[variant] = judged(study, variant, attempt, picked[variant])
+            found[variant] = judged(study, variant, attempt, picked[variant], promised(engine, tol))
             progress(len(found), len(pairs))
     return [found[variant] for variant in sorted(found)]
 
 
-def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked:
-    """Compare an engine's answer with the sweep's values: every row within its output's tolerance, wherever both have one."""
+def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf) -> Checked:
+    """Compare an engine's answer with the sweep's values: every row within its output's tolerance, wherever both have one.
+
+    A variant without a row that both have a value of is not judged. One fails where the engine has
+    values and the sweep has no solution, or the engine has none and the sweep has one.
+
+    Args:
+        tol: the largest residual that the engine promises, relative to the mechanism's size.
+    """
     result = attempt.result
     if not isinstance(result, Answer):
         return Checked(variant=variant, outcome=result.outcome, message=result.message)
@@ -110,8 +119,8 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked
     beat = pace(case)
     lost = ""
     worst = Checked(variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both")
-    if contradicted := _contradicted(result, ours):
-        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=contradicted)
+    if fault := _contradicted(result, ours) or excess(case, result.residual if result.solved else 0.0, tol):
+        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=fault)
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
