@@ -15,6 +15,10 @@ NATIVE = "native"
 """Name of the engine that stands in where a case has no reference."""
 
 
+UNCERTAIN = "uncertain_samples"
+"""Key of a record's details: samples that were reached, and refused because they are uncertain."""
+
+
 @dataclass(frozen=True, eq=False)
 class Standard:
     """The native engine's answer to a case.
@@ -22,7 +26,9 @@ class Standard:
     Attributes:
         outputs: by name; empty where there are none.
         absent: why there are none, as the end of a sentence on the missing reference.
-        refused: samples that the native engine cannot reach, shape (n,); None where it reaches all.
+        refused: samples that the native engine cannot reach, shape (n,); None where there are none.
+            Samples that it reaches, and refuses because the pose or its rates are uncertain beside a
+            singular pose, are not among them: it says nothing of the values of others there.
         why: its own message.
     """
 
@@ -46,8 +52,9 @@ def standard_of(native: Record) -> Standard:
     outputs = {name: _series(output) for name, output in native.outputs.items()}
     if native.solved == native.samples:
         return Standard(outputs)
-    reached = known(outputs.values(), native.samples or 0)
-    return Standard(outputs, refused=~reached, why=native.message)
+    refused = ~known(outputs.values(), native.samples or 0)
+    refused[native.details.get(UNCERTAIN, [])] = False
+    return Standard(outputs, refused=refused, why=native.message)
 
 
 def has_everything(case: Case) -> bool:

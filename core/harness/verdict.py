@@ -66,7 +66,10 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
         return Verdict(Outcome.FAIL, faults, errors, perf_counter() - begin)
     compared = any(each.items() for each in errors.values())
     outcome = Outcome.PASS if compared else Outcome.UNJUDGED
-    return Verdict(outcome, _not_judged(case, errors), errors, perf_counter() - begin)
+    messages = _not_judged(case, errors)
+    if native.why and any(NOT_JUDGED in message for message in messages):
+        messages.append(f"{NATIVE}: {native.why}")
+    return Verdict(outcome, messages, errors, perf_counter() - begin)
 
 
 def _deviations(case: Case, output: Quantity, answer: Answer, native: Standard, *, complete: bool) -> Deviations:
