@@ -133,7 +133,7 @@ def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_wi
     [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
     assert max(curve["y"]) == pytest.approx(output["half_track_change"].position.max_abs, rel=5e-3)  # type: ignore[union-attr]
     words = re.sub(r"\s+", " ", page.text)
-    assert "1 of 1 comparisons is outside tolerance, 1 is not judged" in words
+    assert "1 of 1 comparisons is outside tolerance, 1 not judged" in words
     assert "✗ fail 1 ? not judged 1" in words
     assert "Not judged: native on strut the case has no reference" in words
 

@@ -153,7 +153,7 @@ def headline(results: Results) -> str:
         )
     said += f", {broken} could not be completed" if broken else ""
     unjudged = _count(records, Outcome.UNJUDGED)
-    said += f", {unjudged} {'is' if unjudged == 1 else 'are'} {Outcome.UNJUDGED.shown}" if unjudged else ""
+    said += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
     said += f"; {unread_count(unread)}" if unread else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
 
