@@ -36,8 +36,8 @@ from .record import Deviation, Deviations, OutputSeries
 # D of a mechanism whose points all coincide, to rounding, [m]: keeps the pace finite.
 NO_SIZE = 1e-3
 ROUNDING = 1e-12
-NOT_JUDGED = "not judged there"
-"""What a reason says of samples where the standard has no value."""
+NO_VALUE = "has no value at"
+"""What a reason says of a standard that lacks samples, which are not judged."""
 
 
 def pace(case: Case) -> float:
@@ -160,7 +160,7 @@ def deviations(
                 reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
             alone = np.isfinite(values) & ~np.isfinite(reference) & ~unreached
             if off is not None and (count := int(alone.sum())):
-                reasons.append(f"{quantity}: {name} has no value at {count} of {len(values)} samples: {NOT_JUDGED}")
+                reasons.append(f"{quantity}: {name} {NO_VALUE} {count} of {len(values)} samples")
     contradicted = int((unreached & np.isfinite(found.position)).sum())
     if contradicted:
         reasons.append(f"values at {contradicted} of {len(found.position)} samples that the standard cannot reach")

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import shortened
 from .attempt import Answer
 from .case import Case, Quantity
-from .compare import NOT_JUDGED, describe, deviations, size
+from .compare import NO_VALUE, describe, deviations, size
 from .engine import Engine
 from .record import Deviation, Deviations, Outcome
 from .standard import NATIVE, Standard, known
@@ -67,7 +67,9 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     compared = any(each.items() for each in errors.values())
     outcome = Outcome.PASS if compared else Outcome.UNJUDGED
     messages = _not_judged(case, errors)
-    if native.why and any(NOT_JUDGED in message for message in messages):
+    if outcome is Outcome.PASS and messages:
+        messages[0] = f"{Outcome.UNJUDGED.shown}: {messages[0]}"
+    if native.why and any(NO_VALUE in message for message in messages):
         messages.append(f"{NATIVE}: {native.why}")
     return Verdict(outcome, messages, errors, perf_counter() - begin)
 
@@ -160,6 +162,6 @@ def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for output in case.outputs:
         each = errors[output.name]
-        if len(each.items()) < output.orders or NOT_JUDGED in (each.reason or ""):
+        if len(each.items()) < output.orders or NO_VALUE in (each.reason or ""):
             reasons.setdefault(each.reason or "", []).append(output.name)
     return [reason if len(names) == len(case.outputs) else f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
