@@ -11,13 +11,16 @@ from typing import overload
 import msgspec
 import numpy as np
 
-from ...errors import KincheckError
+from ...analysis.prepare import prepare
+from ...analysis.request import Request
+from ...errors import KincheckError, SolveError
 from ...trajectory import QUANTITIES, Array
 from ..attempt import Answer, Attempt, Pair, Solver
-from ..case import Series
+from ..case import Case, Series
 from ..compare import describe, deviation, pace
 from ..engine import Engine
 from ..record import Outcome
+from ..standard import NATIVE, UNCERTAIN
 from ..verdict import excess, promised
 from .study import Study
 
@@ -119,7 +122,7 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float
     beat = pace(case)
     lost = ""
     worst = Checked(variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both")
-    if fault := _contradicted(result, ours) or excess(case, result.residual if result.solved else 0.0, tol):
+    if fault := _contradicted(study, case, result, ours) or excess(case, result.residual if result.solved else 0.0, tol):
         return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=fault)
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
@@ -149,10 +152,22 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float
     return worst
 
 
-def _contradicted(answer: Answer, ours: Array) -> str:
-    """Return at how many samples an engine has values where the sweep has no solution; empty where at none."""
-    theirs = np.logical_or.reduce([np.isfinite(series.position) for series in answer.outputs.values()])
-    count = int((theirs & ~np.isfinite(ours).any(axis=0)).sum())
-    if not count:
+def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
+    """Return what an engine has where native cannot reach the sample, with native's reason; empty where there is nothing.
+
+    Many variants at once are refused beside singular poses that one by itself passes, so that
+    native solves a variant in question again, alone.
+    """
+    values = np.logical_or.reduce([np.isfinite(series.position) for series in answer.outputs.values()])
+    if not (values & ~np.isfinite(ours).any(axis=0)).any():
         return ""
-    return f"values at {count} of {ours.shape[1]} samples that native cannot reach; --replay says where the motion ends"
+    path = case.sweep.path
+    try:
+        alone = prepare(case.mechanism, Request(tuple(path.motions), case.points), path)(study.tol)
+    except SolveError:  # without an answer there is no standard
+        return ""
+    refused = values & ~alone.solved
+    refused[alone.details.get(UNCERTAIN, [])] = False
+    if not refused.any():
+        return ""
+    return f"values at {refused.sum()} of {len(refused)} samples that {NATIVE} cannot reach; {NATIVE}: {alone.message}"
