@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -21,7 +21,7 @@ from kincheck.core.harness.commands import bench as command
 from kincheck.core.harness.engine import Floor
 from kincheck.core.harness.record import Outcome
 
-from .fakes import Fake, crank, off, partial, raising
+from .fakes import Fake, crank, off, partial, raising, solution
 
 TOL = 1e-12
 
@@ -211,6 +211,24 @@ def test_command_and_report_of_a_run(tmp_path, capsys):
     assert "Work and precision" not in (tmp_path / "report.html").read_text("utf-8")
     assert cli.main([*run, "--bench", str(tmp_path / "bench.json")]) == 0
     assert "Work and precision" in (tmp_path / "report.html").read_text("utf-8")
+
+
+@pytest.mark.usefixtures("one_thread")
+def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
+    found = measured()  # of an engine "gone" too
+    monkeypatch.setattr(engines, "measure", lambda cases, engines, **options: found)
+    for name, status in (("gone", 2), ("native", 0)):
+        monkeypatch.setattr("kincheck.core.harness.commands.house.House.find_engines", lambda house, names, *rest: [])
+        assert cli.main(["bench", "engines", "--engine", name, "--cases", "rssr"]) == status
+        assert ("engine 'gone' is named and missing" in capsys.readouterr().err) is (status == 2)
+
+
+def test_an_effort_leaves_a_residual_on_purpose():
+    def answer(case):
+        return replace(solution(case), residual=1e-6)
+
+    (effort,) = precision.contestants(crank(), {"one step": Fake(answer=answer)}, TOL)
+    assert (effort.entry.outcome, effort.entry.residual) == (Outcome.PASS, 1e-6)
 
 
 def test_run_refuses_what_is_no_benchmark(tmp_path, capsys):

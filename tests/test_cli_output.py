@@ -86,7 +86,7 @@ steps = 3
 def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(tmp_path, capsys, length, told):
     file, out = tmp_path / "rod.toml", tmp_path / "out"
     file.write_text(ROD.replace("LENGTH", length))
-    assert cli.main(["run", str(file), "--engine", "native", "--out", str(out), "--markdown", str(tmp_path / "rod.md")]) == 0
+    assert cli.main(["run", str(file), "--engine", "native", "--out", str(out), "--markdown", str(tmp_path / "rod.md")]) == 2
     note = (
         f"joint 'rod' (distance): length {length} m, points 1 m apart at design: "
         "assembled from there, so the design position is another than the given one"
@@ -114,7 +114,7 @@ def test_a_length_that_contradicts_the_points_is_told_where_a_case_is_explained_
         assert cli.main(command) == 0
         assert (f"\nnote: {note}" in capsys.readouterr().out) is told
     assert ("Nominal design of rod: joint &#39;rod&#39;" in (out / "sweep.html").read_text()) is told
-    assert cli.main(["run", str(file), "--engine", "native", "--explain"]) == 0
+    assert cli.main(["run", str(file), "--engine", "native", "--explain"]) == 2
     assert (f"\n  note: {note}" in capsys.readouterr().out) is told
 
 
@@ -122,7 +122,7 @@ def test_a_case_that_cannot_be_solved_keeps_no_other_from_being_explained(tmp_pa
     (tmp_path / "far.toml").write_text(ROD.replace("LENGTH", "5.0").replace('name = "rod"', 'name = "far"'))
     (tmp_path / "rod.toml").write_text(ROD.replace("LENGTH", "1.0"))
     files = [str(tmp_path / f"{name}.toml") for name in ("far", "rod")]
-    assert cli.main(["run", *files, "--engine", "native", "--explain"]) == 1
+    assert cli.main(["run", *files, "--engine", "native", "--explain"]) == 2
     printed = capsys.readouterr().out
     assert "\nfar: nothing is computed: mechanism 'far' does not close at the design position" in printed
     assert "\n  note: joint 'rod' (distance): length 5 m" in printed
@@ -141,9 +141,9 @@ def test_a_file_that_standard_output_goes_to_is_not_written_over(tmp_path):
         assert done.returncode == 2
         expected = f"kincheck: --junit {name}: found the file that standard output goes to, expected one of its own; give another\n"
         assert done.stderr == expected
-    done = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True)  # a pipe takes both
+    done = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=False)  # a pipe takes both
     assert "</testsuites>" in done.stdout
-    assert "1 pass" in done.stdout
+    assert "1 not judged" in done.stdout
 
 
 def test_out_of_memory_says_so_where_the_exception_says_nothing(monkeypatch):

@@ -60,4 +60,4 @@ def test_joints_between_fixed_bodies_are_named_and_in_no_engine(tmp_path, capsys
     assert main(["run", str(file), "--explain", "--json", str(tmp_path / "out.json")]) == 0
     assert "  joints between fixed bodies, which hold at the design: left out: bolt, stay" in capsys.readouterr().out.splitlines()
     for record in read_results(tmp_path / "out.json").records:
-        assert record.outcome in (Outcome.PASS, Outcome.UNAVAILABLE), record.message
+        assert record.outcome in (Outcome.PASS, Outcome.UNJUDGED, Outcome.UNAVAILABLE), record.message

@@ -54,7 +54,7 @@ def test_cells_say_how_far_off_or_why_not(run):
     assert head == ["", *(f"{each.name} {each.installed or ''}".strip() for each in ENGINES)]
     assert row == [
         "`crank`",
-        "residual 1e-15",
+        "not judged, residual 1e-15",
         "0e+00 · 3e-11 · 0e+00",
         "fail: 2e-03 · 0e+00 · 0e+00",
         "unsupported",

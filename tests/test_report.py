@@ -15,7 +15,7 @@ import msgspec
 import pytest
 from kincheck.core import solve
 from kincheck.core.harness.bench.ring import ring
-from kincheck.core.harness.record import Deviation, Deviations, Results
+from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
 from kincheck.core.harness.reporting.axis import SAMPLES
 from kincheck.core.harness.reporting.figures import SYMBOLS
 from kincheck.core.harness.reporting.measures import Past
@@ -124,16 +124,18 @@ def test_error_figures_hold_the_distances_from_the_reference(tmp_path: Path, mot
 def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_with(tmp_path: Path) -> None:
     run = results("consensus_only")
     native, one, _ = run.records
-    nothing = Deviations(position=None, velocity=None, acceleration=None, reason="no reference: compared with nothing")
-    native = msgspec.structs.replace(native, errors=dict.fromkeys(native.errors, nothing))
+    nothing = Deviations(position=None, velocity=None, acceleration=None, reason="the case has no reference")
+    native = msgspec.structs.replace(native, errors=dict.fromkeys(native.errors, nothing), outcome=Outcome.UNJUDGED)
     output = {name: judged(one.outputs[name], native.outputs[name], 1e-9, "native") for name in one.outputs}
     page = report(Results(run=run.run, records=[native, msgspec.structs.replace(one, errors=output)]), tmp_path)
     assert traces(page, "case-0-0", "reference", "lines") == []
     assert traces(page, "case-0-0-position", "native", "lines+markers") == []
     [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
     assert max(curve["y"]) == pytest.approx(output["half_track_change"].position.max_abs, rel=5e-3)  # type: ignore[union-attr]
-    assert "1 with nothing to compare with" in page.text
-    assert "no reference: compared with nothing" in page.text
+    words = re.sub(r"\s+", " ", page.text)
+    assert "1 of 1 comparisons is outside tolerance, 1 not judged" in words
+    assert "✗ fail 1 ? not judged 1" in words
+    assert "Not judged: native on strut the case has no reference" in words
 
 
 def test_samples_that_are_missing_are_not_called_out_of_tolerance(tmp_path: Path) -> None:

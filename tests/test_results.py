@@ -84,7 +84,9 @@ def test_junit_has_a_test_case_per_case_engine_and_output():
     assert found["a.wrong.projection", "x"] == []  # only y is wrong
     assert found["a.wrong.projection", "y"][0][0] == "failure"
     assert "y: position is off by" in found["a.wrong.projection", "y"][0][1]
-    assert found["a.partial.projection", "x"] == [("failure", "7 of 9 samples solved: cannot be followed beyond 0.5")]
+    assert found["a.partial.projection", "x"] == [
+        ("failure", "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2 of the others")
+    ]
     assert found["b.broken.projection", "y"] == [("error", "error: ValueError: no")]
     assert found["b.missing.projection", "y"] == [
         ("skipped", "unavailable: missing is not installed, or cannot be imported: kincheck doctor says which")

@@ -1,6 +1,7 @@
 """kincheck stress on the command line, its files, and the writing of case files."""
 
 import json
+import re
 from dataclasses import replace
 
 import kincheck.adapters
@@ -14,8 +15,10 @@ from kincheck.core.harness import cli
 from kincheck.core.harness.case_writer import case_text
 from kincheck.core.harness.probe import probes
 from kincheck.core.harness.reading.casefile import load_case
-from kincheck.core.harness.stress.report import markdown, report
+from kincheck.core.harness.stress.report import headline, markdown, report
 from kincheck.core.harness.stress.results import Cell, Finding, Stress
+
+from .fakes import Fake
 
 
 class Shifted(Native):
@@ -70,6 +73,39 @@ def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
     file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
     assert cli.main(["stress", "--replay", str(file)]) == 0
     assert "right 181" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("engine", "why"),
+    [
+        (Fake("native", refusal="no joint of that kind"), "choose other families or another engine"),
+        (Fake("native", installed=None, refusal="not there"), "it is not installed"),
+    ],
+    ids=["unable", "missing"],
+)
+def test_an_engine_that_supports_nothing_is_not_praised(tmp_path, capsys, monkeypatch, engine, why):
+    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
+    assert cli.main(["stress", "--family", "units", "--samples", "20", "--no-proofs"]) == 2
+    out, err = capsys.readouterr()
+    count = re.search(r"^No sample was examined, (\d+) unsupported$", out, re.MULTILINE)
+    assert count, out
+    assert f"kincheck: native projection: no sample was examined, {count[1]} unsupported: {why}\n" in err
+    file = tmp_path / "rssr.toml"
+    file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
+    assert cli.main(["stress", "--replay", str(file)]) == 2
+    out, err = capsys.readouterr()
+    assert "unsupported 181" in out
+    assert "kincheck: no sample was examined of native: give another engine or other files\n" in err
+
+
+def test_samples_without_a_verdict_are_counted_apart():
+    samples = {"right": 5, "refused, right reason": 2, "refused, wrong reason": 0, "silently wrong": 0}
+    cell = {"engine": "one", "mode": "projection", "version": "1", "settings": {}, "worst": [None] * 3, "seconds": 0.0}
+    cell |= {"family": "arms", "specimens": 1, "elsewhere": 0, "bad": 0}
+    found = Cell(samples=samples | {"not judged": 3, "unsupported": 4}, **cell)
+    assert headline([found]) == "None of 7 samples silently wrong, 3 not judged, 4 unsupported"
+    wrong = Cell(samples=samples | {"silently wrong": 1, "not judged": 0, "unsupported": 0}, **cell)
+    assert headline([found, wrong]) == "1 of 15 samples silently wrong, 3 not judged, 4 unsupported"
 
 
 @pytest.mark.parametrize(

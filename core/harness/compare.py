@@ -36,8 +36,8 @@ from .record import Deviation, Deviations, OutputSeries
 # D of a mechanism whose points all coincide, to rounding, [m]: keeps the pace finite.
 NO_SIZE = 1e-3
 ROUNDING = 1e-12
-NOTHING = "these are compared with nothing"
-"""Said of samples that the standard has no value at."""
+NO_VALUE = "has no value at"
+"""What a reason says of a standard that lacks samples, which are not judged."""
 
 
 def pace(case: Case) -> float:
@@ -112,7 +112,13 @@ def _numbers(values: Array) -> list[float | None]:
 
 
 def deviations(
-    case: Case, output: Quantity, found: Series, standards: Sequence[tuple[str, Series]], *, complete: bool = False
+    case: Case,
+    output: Quantity,
+    found: Series,
+    standards: Sequence[tuple[str, Series]],
+    *,
+    complete: bool = False,
+    refused: NDArray[np.bool_] | None = None,
 ) -> Deviations:
     """How far an output is off in position, velocity and acceleration.
 
@@ -120,11 +126,13 @@ def deviations(
         found: the engine's output.
         standards: what it may be compared with, (name, series), best first; each quantity takes the first that has it.
         complete: every sample was solved: one without a value where the standard has one is out of tolerance.
+        refused: samples that the standard's solver cannot reach, shape (n,): a value there contradicts it.
     """
     beat = pace(case)
     compared: dict[str, Deviation | None] = {}
     reasons: list[str] = []
     losses = 0
+    unreached = np.zeros(len(found.position), dtype=np.bool_) if refused is None else refused
     for order, quantity in enumerate(QUANTITIES):
         values: Array | None = getattr(found, quantity)
         known: list[tuple[str, Array]] = [
@@ -150,9 +158,18 @@ def deviations(
                 reasons.append(f"{quantity}: the engine gives no velocities to make it of")
             elif off is None:
                 reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
-            if off is not None and (alone := int((np.isfinite(values) & ~np.isfinite(reference)).sum())):
-                reasons.append(f"{quantity}: {name} has no value at {alone} of {len(values)} samples: {NOTHING}")
-    return Deviations(**compared, reason="; ".join(reasons) or None, lost=losses or msgspec.UNSET)
+            alone = np.isfinite(values) & ~np.isfinite(reference) & ~unreached
+            if off is not None and (count := int(alone.sum())):
+                reasons.append(f"{quantity}: {name} {NO_VALUE} {count} of {len(values)} samples")
+    contradicted = int((unreached & np.isfinite(found.position)).sum())
+    if contradicted:
+        reasons.append(f"values at {contradicted} of {len(found.position)} samples that the standard cannot reach")
+    return Deviations(
+        **compared,
+        reason="; ".join(reasons) or None,
+        lost=losses or msgspec.UNSET,
+        contradicted=contradicted or msgspec.UNSET,
+    )
 
 
 def deviation(values: Array, reference: Array, atol: float, rtol: float, against: str) -> Deviation | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from .record import Outcome, Record, Results
@@ -23,7 +24,7 @@ def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
 
     def tell(record: Record, done: int, total: int) -> None:
         records.append(record)
-        line = visible(f"[{done}/{total}] {record.case} {record.engine}: {record.outcome}")
+        line = visible(f"[{done}/{total}] {record.case} {record.engine}: {record.outcome.shown}")
         if terminal:
             line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
@@ -31,8 +32,8 @@ def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
     return tell
 
 
-def lacking(results: Results, required: Sequence[str]) -> list[str]:
-    """What a required engine could not do."""
+def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
+    """Return what a required engine could not do, and which of the engines that were named are missing."""
     lines = [
         f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
         if record.outcome is Outcome.UNAVAILABLE
@@ -40,15 +41,26 @@ def lacking(results: Results, required: Sequence[str]) -> list[str]:
         for record in results.records
         if record.engine in required and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
     ]
+    lines += [
+        f"engine {record.engine!r} is named and missing: {record.message}; {how_to_install(record.engine)}"
+        for record in results.records
+        if record.engine in named and record.engine not in required and record.outcome is Outcome.UNAVAILABLE
+    ]
     return list(dict.fromkeys(lines))
 
 
-def unsolved(results: Results) -> list[str]:
-    """That nothing came of a run but errors, timeouts and crashes: no result deviates, for there is none."""
-    outcomes = {record.outcome for record in results.records}
-    if outcomes & {Outcome.PASS, Outcome.FAIL} or not any(outcome.bad for outcome in outcomes):
+def uncompared(results: Results) -> list[str]:
+    """Return that a run has compared nothing, and why: then no result deviates, and none is right."""
+    counts = Counter(record.outcome for record in results.records)
+    if any(outcome.judged for outcome in counts):
         return []
-    return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
+    if not counts[Outcome.UNJUDGED] and any(outcome.bad for outcome in counts):
+        return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
+    if not counts or results.missing:  # it was stopped, or its cases cannot be read, which is said already
+        return []
+    found = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
+    remedy = "give the case a reference, or run another engine beside the native one"
+    return [f"nothing was compared ({found}); {remedy if counts[Outcome.UNJUDGED] else 'run other engines'}"]
 
 
 def how_to_install(engine: str) -> str:

@@ -48,7 +48,8 @@ class Engine(Protocol):
 
         Args:
             model: what `build` gave; may be used for several solves.
-            tol: largest accepted constraint residual, relative to the mechanism's size. In simulate mode the simulator's own
+            tol: largest accepted constraint residual, relative to the mechanism's size. A pair whose solved samples have a
+                larger one fails. In simulate mode the simulator's own
                 settings say what it accepts, and the residual tells what came of it.
 
         Returns:

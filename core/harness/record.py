@@ -14,10 +14,14 @@ from .case import Truth
 
 
 class Outcome(StrEnum):
-    """What became of a pair. Every pair gets exactly one."""
+    """What became of a pair. Every pair gets exactly one.
+
+    UNJUDGED is a pair that was solved and that nothing could be compared with: neither a pass nor a fault.
+    """
 
     PASS = "pass"
     FAIL = "fail"
+    UNJUDGED = "unjudged"
     ERROR = "error"
     UNSUPPORTED = "unsupported"
     UNAVAILABLE = "unavailable"
@@ -27,7 +31,17 @@ class Outcome(StrEnum):
     @property
     def bad(self) -> bool:
         """Whether something was run and went wrong; a missing engine or feature is no fault of a result."""
-        return self not in (Outcome.PASS, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
+        return self not in (Outcome.PASS, Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
+
+    @property
+    def judged(self) -> bool:
+        """Whether an answer was compared with a standard."""
+        return self in (Outcome.PASS, Outcome.FAIL)
+
+    @property
+    def shown(self) -> str:
+        """The outcome in the words of every table, page and message."""
+        return "not judged" if self is Outcome.UNJUDGED else self.value
 
 
 class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
@@ -67,6 +81,7 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         lost: how many values there are none of where what they are compared with has one, all samples being solved; absent where
             none are. Where all are there is no deviation either.
+        contradicted: how many samples have a value although the standard's solver cannot reach them; absent where none have.
     """
 
     position: Deviation | None
@@ -74,6 +89,12 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
     acceleration: Deviation | None
     reason: str | None = None
     lost: int | msgspec.UnsetType = msgspec.UNSET
+    contradicted: int | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing is out of tolerance, lost or contradicted."""
+        return self.within and not self.lost and not self.contradicted
 
     @property
     def within(self) -> bool:
@@ -153,6 +174,11 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
             and Truth(self.truth).validates
             and all(each is not None and each.against == self.truth for each in judged)
         )
+
+    @property
+    def compared(self) -> bool:
+        """Whether any output was compared with a standard."""
+        return any(deviations.items() for deviations in self.errors.values())
 
 
 class SceneBody(msgspec.Struct, frozen=True, kw_only=True):
@@ -247,11 +273,19 @@ def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
     return rows.sub(lambda row: re.sub(rb"\n *", b"", row[0].replace(b",\n", b", \n")), text) + b"\n"
 
 
+def settled(record: Record) -> Record:
+    """Return a record with the outcome that it has today: older files call it a pass where nothing was compared."""
+    if record.outcome is Outcome.PASS and not record.compared:
+        return msgspec.structs.replace(record, outcome=Outcome.UNJUDGED)
+    return record
+
+
 def from_json(text: bytes) -> Results:
-    """The results that `to_json` wrote.
+    """The results that `to_json` wrote, now or with an older version.
 
     Raises:
         msgspec.ValidationError: not the schema kincheck-results/1; the message names the key.
         msgspec.DecodeError: not JSON.
     """
-    return msgspec.json.decode(text, type=Results)
+    results = msgspec.json.decode(text, type=Results)
+    return msgspec.structs.replace(results, records=[settled(record) for record in results.records])

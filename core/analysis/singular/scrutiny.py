@@ -49,6 +49,7 @@ class Findings:
         retried: samples that were solved again.
         sigma: smallest singular value among those.
         renewed: how often rows were chosen anew.
+        uncertain: samples that are refused because their pose or rates are uncertain; the motion does not end there.
     """
 
     notes: list[str] = field(default_factory=list[str])
@@ -57,6 +58,7 @@ class Findings:
     retried: int = 0
     sigma: float = np.inf
     renewed: int = 0
+    uncertain: list[int] = field(default_factory=list[int])
 
     @property
     def details(self) -> dict[str, Any]:
@@ -68,6 +70,8 @@ class Findings:
             found["rows_chosen_anew"] = self.renewed
         if self.poses:
             found["singular_poses"] = self.poses
+        if self.uncertain:
+            found["uncertain_samples"] = sorted(self.uncertain)
         return found | ({"notes": self.notes} if self.notes else {})
 
 
@@ -83,6 +87,7 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
     for end in scrutiny.followed.ends:
         scrutiny.end(end)
     scrutiny.findings.renewed = scrutiny.followed.renewed
+    scrutiny.findings.uncertain = [k for k in scrutiny.findings.uncertain if not found.solved[k]]
     return scrutiny.findings
 
 
@@ -167,6 +172,7 @@ class _Scrutiny:
         """Refuse doubtful samples that are not reached a second time: rounding alone had them accepted."""
         if samples:
             self.found.kept[:, samples], self.found.solved[samples] = np.nan, False
+            self.findings.uncertain += samples
             places = listed([self._where(float(self.times[k])) for k in samples])
             why = f"reached once and not again, so near are residuals to the tolerance {self.tol:.3g}; allow more"
             self.findings.messages.append(f"refused at {places}: {why}")
@@ -208,6 +214,7 @@ class _Scrutiny:
 
     def _refuse(self, system: System, indices: NDArray[np.intp], state: Array, sample: Array, error: Array) -> None:
         self.found.kept[:, indices], self.found.solved[indices] = np.nan, False
+        self.findings.uncertain += indices.tolist()
         found = [examine(system, state[:, [at]], sample[:, [at]]) for at in range(len(indices))]
         for k, each in zip(indices.tolist(), found, strict=True):
             if each.sigma < REGULAR:

@@ -131,7 +131,7 @@ def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[C
     """
     found: list[Contestant] = []
     for setting, engine in engines.items():
-        (record,) = run([case], [engine], tol=tol).records
+        (record,) = run([case], [engine], tol=tol, residuals=False).records
         entry = _entry(case, record, setting)
         found.append(Contestant(entry, _work(case, engine, tol) if record.us_per_step is not None else None))
         if record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):

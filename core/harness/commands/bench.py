@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError
-from ..console import complain
+from ..console import complain, how_to_install
 from .house import House, Status, add_joint_types, whole
 from .run import TOL
 
@@ -87,6 +87,7 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
     from ..bench.engines_report import report
     from ..bench.pages import deliver
     from ..circumstances import THREADS
+    from ..record import Outcome
     from ..reporting.deliver import json_only
 
     if not any(name in os.environ for name in THREADS):
@@ -118,7 +119,9 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
             rows = bench_formulation.measure(house.case(STRUT), SEED, bench_formulation.STATES)
             found = bench_engines.with_formulation(found, rows)
     deliver(report(found), found, out=options.out, json=options.json)
-    return Status.WITHIN
+    missing = {entry.engine for entry in found.entries if entry.outcome is Outcome.UNAVAILABLE and entry.engine in options.engine}
+    complain(f"engine {name!r} is named and missing; {how_to_install(name)}" for name in sorted(missing))
+    return Status.FAILED if missing else Status.WITHIN
 
 
 def _with_one_thread(command: str, variables: Sequence[str]) -> int:

@@ -105,13 +105,14 @@ def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
 
 
 def _cells(store: Store, row: RunRow) -> list[str]:
+    from ..history.schema import OUTCOME
     from ..record import Outcome
 
     found = store.connection.execute(
-        "SELECT outcome, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
+        f"SELECT {OUTCOME}, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
     ).fetchall()
     counts = Counter(outcome for outcome, _, _ in found)
-    told = ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome])
+    told = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
     missing = len(row.plan) - len(found)
     versions = {engine: version for _, engine, version in found if version}
     git: dict[str, Any] = row.circumstances.get("git") or {}
@@ -140,7 +141,7 @@ def _print_trends(history: History) -> None:
         for entry in entries:
             row = history.runs[entry.run]
             error = largest_length(entry, case, row)
-            table.add_row(run_name(row), entry.version or "–", str(entry.outcome), number(error), number(entry.us_per_step))
+            table.add_row(run_name(row), entry.version or "–", entry.outcome.shown, number(error), number(entry.us_per_step))
         console.print(table)
     for step in steps(history):
         sign = "worse" if step.worse else "better"

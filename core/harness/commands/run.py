@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, SolveError
-from ..console import complain, lacking, progress, unsolved
+from ..console import complain, lacking, progress, uncompared
 from ..interrupts import hold, status_of, words_of
 from ..visible import visible
 from . import foreign, isolation, kept
@@ -45,7 +45,8 @@ def add(commands: Any) -> None:
     run.set_defaults(do=_run)
     run.add_argument("case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases")
     run.add_argument("--joints", action="store_true", help="run a small closed loop around every joint type, and the cases named")
-    run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: all engines")
+    must = "only these, which must be installed (else status 2); default: all engines"
+    run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help=must)
     run.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
     run.add_argument(
         "--tol", type=positive, default=TOL, metavar="X", help=f"largest constraint residual [m or -]; default {TOL:g}"
@@ -120,8 +121,9 @@ def _run(options: argparse.Namespace, house: House) -> int:
     """Solve every case with every engine, judge each, print a table and write what was asked for.
 
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a crash, 2 the tool could not do
-    its work: a case cannot be read (the others are run), a file cannot be written, a required engine is missing, or nothing at all
-    was solved.
+    its work: a case cannot be read (the others are run), a file cannot be written, an engine that is named or required is
+    missing, or nothing at all was solved or compared. Pairs with nothing to compare are not judged, and change no status as
+    long as others are.
     """
     from ..reporting import deliver as delivery
 
@@ -147,7 +149,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     delivery.deliver(results, problems, to, matrix=options.joints, precision=precision, history=history)
     if options.explain:
         print(*_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
-    problems += lacking(results, options.require) + unsolved(results)
+    problems += lacking(results, options.require, options.engine) + uncompared(results)
     complain(problems)
     if stopped is not None:
         return stopped

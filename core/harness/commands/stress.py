@@ -50,13 +50,14 @@ def add(commands: Any) -> None:
 def _stress(options: argparse.Namespace, house: House) -> int:
     """Drive engines through random mechanisms that break kinematic solvers, and judge every sample.
 
-    Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool could not do its work.
+    Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool could not do its work, or an
+    engine supports none of the samples.
     """
     from ..bench.pages import deliver
     from ..reporting import deliver as delivery
     from ..stress.families import Family
     from ..stress.outcomes import BAD
-    from ..stress.report import markdown, report
+    from ..stress.report import idle, markdown, report
     from ..writing import write
 
     if options.list:
@@ -89,8 +90,8 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     deliver(made, found, out=options.out, json=options.json)
     if options.out is not None:
         write("--out", options.out / FILES[2], markdown(made).encode())
-    if found.unfinished:
-        raise KincheckError("\n".join(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()))
+    if undone := [*(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()), *idle(found)]:
+        raise KincheckError("\n".join(undone))
     bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
     return Status.DEVIATES if bad else Status.WITHIN
 
@@ -124,13 +125,15 @@ def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) ->
     from ..stress.outcomes import BAD, Verdict
     from ..stress.saving import judge
 
-    bad = False
+    bad, examined = False, set[str]()
     for file in options.replay:
         case = house.find_case(str(file))
         for engine in engines:
             found = judge(case, engine, options.tol or TOL)
             counts = ", ".join(f"{verdict} {found.counts[verdict]}" for verdict in Verdict if found.counts[verdict])
             print(f"{file.name}  {engine.name} {engine.mode}: {counts}")
+            if any(found.counts[verdict] for verdict in Verdict if verdict not in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)):
+                examined.add(engine.name)
             for verdict in BAD:
                 sample = found.first(verdict)
                 if sample is not None:
@@ -140,4 +143,6 @@ def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) ->
                     print(f"  {verdict} first at {case.sweep.driver} = {case.sweep.values[sample]:.9g}{off}")
             if found.message:
                 print(f"  {found.message}")
+    if idle := [engine.name for engine in engines if engine.name not in examined]:
+        raise KincheckError(f"no sample was examined of {', '.join(idle)}: give another engine or other files")
     return Status.DEVIATES if bad else Status.WITHIN

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import KincheckError, unknown
 from ...version import VERSION
-from ..console import complain
+from ..console import complain, lacking, uncompared
 from ..interrupts import hold, status_of, words_of
 from . import foreign, isolation
 from .house import House, Status, whole
@@ -229,6 +229,8 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
     results = running.run(cases, engines, tol=options.tol, command=options.command, solver=_solver(options, engines[-1]))
     problems: list[str] = []
     delivery.deliver(results, problems, delivery.Destinations.of(options))
+    if engine is not None:
+        problems += lacking(results, [], [engine.name]) + uncompared(results)
     complain(problems)
     if problems:
         return Status.FAILED

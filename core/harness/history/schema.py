@@ -14,6 +14,12 @@ from time import monotonic, sleep
 APPLICATION = 0x6B696E63
 """The application_id of these files ("kinc"): another program's database is refused, not added to."""
 
+OUTCOME = """CASE WHEN outcome = 'pass' AND NOT errors GLOB '*"max_abs":[0-9]*' THEN 'unjudged' ELSE outcome END"""
+"""The outcome of a row of `records`: older versions call a solved pair a pass although nothing was compared.
+
+No text in a JSON string looks like a deviation, for its quotation marks are escaped.
+"""
+
 MIGRATIONS = (
     """
     CREATE TABLE runs (

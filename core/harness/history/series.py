@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import msgspec
 
 from ..record import Deviations, Outcome
+from .schema import OUTCOME
 from .store import RunRow, Store
 
 NIGHTS = 60
@@ -97,7 +98,7 @@ def _wanted(pair: Pair, cases: Sequence[str], engines: Sequence[str]) -> bool:
 
 
 def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
-    columns = "case_name, engine, mode, outcome, version, errors, warm_seconds, waited_seconds, us_per_step, message, truth"
+    columns = f"case_name, engine, mode, {OUTCOME}, version, errors, warm_seconds, waited_seconds, us_per_step, message, truth"
     found: list[tuple[Pair, Entry]] = []
     with store.explained("read", run):  # also the texts that are not used here: nothing of a damaged run is
         # rowid: the order in which they were made
@@ -124,7 +125,9 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
         HistoryError: the file cannot be read.
     """
     bad = ", ".join(f"'{outcome}'" for outcome in Outcome if outcome.bad)
-    query = f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0 AND sum(outcome = 'pass') > 0"
+    query = (
+        f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0 AND sum({OUTCOME} = 'pass') > 0"
+    )
     with store.explained("read"):
         good: dict[int, int] = dict(store.connection.execute(query).fetchall())
     # a finished run lacks the pairs of cases that could not be read: its status was 2

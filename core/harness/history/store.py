@@ -25,7 +25,7 @@ from typing import Any, Literal, Self, TypeAlias
 import msgspec
 
 from ..circumstances import missing, versions
-from ..record import Record, Results
+from ..record import Record, Results, settled
 from . import faults
 from .faults import DamagedRunError, HistoryError, explained, told
 from .owner import alive, owner
@@ -202,7 +202,7 @@ class Store:
         place = {pair: k for k, pair in enumerate(self.run(run).plan)}
         with self.explained("read", run):
             rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
-            records = [msgspec.json.decode(zlib.decompress(blob), type=Record) for (blob,) in rows]
+            records = [settled(msgspec.json.decode(zlib.decompress(blob), type=Record)) for (blob,) in rows]
         return sorted(records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place)))
 
     def results(self, run: int) -> Results:

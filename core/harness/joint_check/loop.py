@@ -17,6 +17,7 @@ from ..engine import Engine
 from ..probe import alternatives
 from ..record import Deviation
 from ..run import NATIVE
+from ..verdict import excess
 from .checks import ROUND_OFF
 from .findings import Finding, Verdict, judged
 
@@ -148,6 +149,8 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
             if worst is None or figure > worst[0]:
                 worst = figure, output.name, quantity, deviation
     assert worst is not None
+    if above := excess(case, found.residual, TOL):
+        return Finding(name, Verdict.FAIL, message=above)
     figure, output_name, quantity, deviation = worst
     message = "" if figure <= 1.0 else describe(output_name, quantity, deviation, case.sweep.driver, case.sweep.values.tolist())
     verdict = Verdict.PASS if figure <= 1.0 else Verdict.FAIL

@@ -46,7 +46,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             record, _usual(before, old, entries, history, same_machine(now.facts, before.facts)), now.facts, slowest
         )
     asked = set(now.results.missing)
-    findings += [_finding(Kind.ABSENT, old, f"{old.outcome} there") for pair, old in earlier.items() if pair not in asked]
+    findings += [_finding(Kind.ABSENT, old, f"{old.outcome.shown} there") for pair, old in earlier.items() if pair not in asked]
     return findings
 
 
@@ -92,9 +92,13 @@ def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
 
 def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
     if now.outcome.bad and not before.outcome.bad:
-        yield _finding(Kind.FAILURE, now, f"{before.outcome} → {_said(now)}")
+        yield _finding(Kind.FAILURE, now, f"{before.outcome.shown} → {_said(now)}")
     elif before.outcome.bad and now.outcome is Outcome.PASS:
         yield _finding(Kind.FIXED, now, f"{before.outcome} → {now.outcome}")
+    elif before.outcome.judged and now.outcome is Outcome.UNJUDGED:
+        yield _finding(Kind.UNJUDGED, now, f"{before.outcome} → {_said(now)}")
+    elif before.outcome is Outcome.UNJUDGED and now.outcome is Outcome.PASS:
+        yield _finding(Kind.JUDGED, now, f"{before.outcome.shown} → {now.outcome}")
 
 
 def _lost(now: Record, before: Record) -> Iterator[Finding]:
@@ -107,6 +111,8 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
     if (now.solved or 0) < (before.solved or 0):
         asked = "" if now.samples == before.samples else f" of {before.samples}"
         yield _finding(Kind.LOST, now, f"{now.solved} of {now.samples} samples solved, {before.solved}{asked} before")
+    if now.outcome is Outcome.UNJUDGED:  # the pair as a whole is no longer judged, which is a finding of its own
+        return
     for output, old in before.errors.items():
         new = now.errors.get(output)
         gone = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
@@ -239,7 +245,7 @@ def _slower(now: Record, usual: tuple[float | None, float | None], facts: Mappin
 
 
 def _said(record: Record) -> str:
-    return f"{record.outcome}: {record.message}" if record.message else str(record.outcome)
+    return f"{record.outcome.shown}: {record.message}" if record.message else record.outcome.shown
 
 
 def _finding(kind: Kind, record: Record, message: str, **about: Any) -> Finding:

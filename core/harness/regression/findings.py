@@ -10,14 +10,16 @@ import msgspec
 
 
 class Kind(StrEnum):
-    """What a finding says. The first five are regressions."""
+    """What a finding says. The first six are regressions."""
 
     FAILURE = "new failure"
     LOST = "lost"
+    UNJUDGED = "no longer judged"
     MOVED = "another motion"
     DRIFTED = "accuracy drifted"
     SLOWER = "slower"
     FIXED = "fixed"
+    JUDGED = "judged again"
     TOLERANCE = "tolerance changed"
     REFERENCE = "reference changed"
     ADDED = "new in this run"
@@ -26,16 +28,18 @@ class Kind(StrEnum):
     @property
     def regression(self) -> bool:
         """Whether something is worse than it was."""
-        return self in (Kind.FAILURE, Kind.LOST, Kind.MOVED, Kind.DRIFTED, Kind.SLOWER)
+        return self in (Kind.FAILURE, Kind.LOST, Kind.UNJUDGED, Kind.MOVED, Kind.DRIFTED, Kind.SLOWER)
 
 
 WHY: Mapping[Kind, str] = {
     Kind.FAILURE: "these results were right, or at least not wrong, and are not to be relied on now",
     Kind.LOST: "what is no longer reached or compared is no longer checked: a fault there would go unseen",
+    Kind.UNJUDGED: "solved, but nothing is compared any more: a fault there would go unseen",
     Kind.MOVED: "the case is another than it was, or its solution is of another assembly",
     Kind.DRIFTED: "within tolerance, but a decimal digit worse: something computes differently than it did",
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
     Kind.FIXED: "they failed in the run compared with",
+    Kind.JUDGED: "nothing was compared in the run compared with",
     Kind.TOLERANCE: "what passes now need not have passed before, or the reverse",
     Kind.REFERENCE: "what passes now is judged by other true values than it was: somebody has edited them, or the case",
     Kind.ADDED: "nothing to compare with",
@@ -148,6 +152,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         against: the run compared with; null, and `reason` says why, where there is none.
         pairs: how many records the run has.
         failing: case, engine and mode of all that is not within tolerance or broken, new or not.
+        unjudged: the same of all that was solved and compared with nothing, new or not.
         unread: cases that were asked for and make no sense; their pairs are among the findings, lost.
         time_limit: the ratio from which on a time was called slower.
     """
@@ -158,6 +163,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
     reason: str
     pairs: int
     failing: list[tuple[str, str, str]]
+    unjudged: list[tuple[str, str, str]] = []
     unread: list[str] = []
     time_limit: float
     findings: list[Finding]

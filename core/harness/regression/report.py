@@ -6,6 +6,7 @@ import msgspec
 
 from ..history.series import NIGHTS, NOTHING, History, read
 from ..history.store import Store
+from ..record import Outcome
 from .compare import changes, compare, same_machine, unmade
 from .creeping import crept
 from .findings import Finding, Kind, Regressions, Step
@@ -42,6 +43,7 @@ def regressions(subject: Subject, against: Subject | None, reason: str, store: S
         reason=reason,
         pairs=len(records),
         failing=[(record.case, record.engine, record.mode) for record in records if record.outcome.bad],
+        unjudged=[(record.case, record.engine, record.mode) for record in records if record.outcome is Outcome.UNJUDGED],
         unread=[*subject.results.unread],
         time_limit=limit,
         findings=[_since(finding, standing) for finding in found],

@@ -15,7 +15,7 @@ from ..case import Array
 from ..history.series import Entry, History, Pair, calibration
 from ..history.store import RunRow
 from ..history.trends import unit_of
-from ..record import Deviation
+from ..record import Deviation, Outcome
 from .compare import changes
 from .findings import Change, Step
 from .limits import DRIFT, DRIFT_FLOOR, TIME_FLOOR
@@ -102,10 +102,10 @@ def _noise(left: Array, right: Array) -> float:
 
 
 def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Where a pair that was not bad became bad, or the reverse."""
+    """Return where a pair that was not bad became bad, or the reverse; runs that did not judge it say neither."""
     return [
         _step(pair, OUTCOME, None, a, b, history, worse=b.outcome.bad)
-        for a, b in pairwise(entries)
+        for a, b in pairwise(entry for entry in entries if entry.outcome is not Outcome.UNJUDGED)
         if a.outcome.bad is not b.outcome.bad
     ]
 

@@ -47,10 +47,12 @@ class Row:
 def headline(found: Regressions) -> str:
     """The report in one sentence."""
     if found.against is None:
-        failing = f"{len(found.failing)} of {found.pairs} not right" if found.failing else f"all {found.pairs} right"
+        judged = found.pairs - len(found.unjudged)
+        failing = f"{len(found.failing)} of {judged} not right" if found.failing else f"all {judged} right"
         # with nothing to compare with there are no other regressions
         never = _counted(found, Kind.LOST)
-        rest = [f"{never} never made"] if never else []
+        rest = [f"{len(found.unjudged)} not judged"] if found.unjudged else []
+        rest += [f"{never} never made"] if never else []
         rest += [unread_count(len(found.unread))] if found.unread else []
         return f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing: {found.reason}"
     counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if kind.regression and _counted(found, kind)]
@@ -58,7 +60,10 @@ def headline(found: Regressions) -> str:
     said = ", ".join(counts) or "nothing regressed"
     fixed = len(pairs(found, Kind.FIXED))
     known = len(found.failing) - len(pairs(found, Kind.FAILURE))
+    again = len(pairs(found, Kind.JUDGED))
     rest = [f"{fixed} fixed"] if fixed else []
+    rest += [f"{again} judged again"] if again else []
+    rest += [f"{len(found.unjudged)} not judged"] if found.unjudged else []
     rest += [f"{known} not right before either"] if known > 0 else []
     rest += [", ".join(map(str, versions(found)))] if versions(found) else []
     return "; ".join([f"{found.run.name} against {found.against.name}: {said}", *rest])

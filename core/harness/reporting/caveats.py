@@ -9,7 +9,8 @@ from ..record import Outcome, Record, Results
 from .axis import SAMPLES
 from .wording import engine_name, notes, product
 
-COMPARED = (Outcome.PASS, Outcome.FAIL)
+ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
+"""Outcomes of pairs that have an answer."""
 
 
 def caveats(results: Results) -> list[tuple[str, str]]:
@@ -36,8 +37,8 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         say(f"Geometry of {case}", f"{note[:1].upper()}{note[1:]}.")
     for outcome in Outcome:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
-        if pairs and outcome not in COMPARED:
-            say(f"{outcome.value.capitalize()}: {len(pairs)}", f"Nothing is said about {'; '.join(pairs)}.")
+        if pairs and outcome not in ANSWERED:
+            say(f"{outcome.shown.capitalize()}: {len(pairs)}", f"Nothing is said about {'; '.join(pairs)}.")
     for case, why in results.unread.items():
         say(f"Not read: {case}", f"{why}. Nothing is said about it.")
     if pairs := [f"{product(engine, mode)} on {case}" for case, engine, mode in results.missing if case not in results.unread]:
@@ -46,8 +47,8 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         if record.solved is not None and record.samples is not None and record.solved < record.samples:
             say(_pair(record), f"{record.solved} of {record.samples} samples were solved; nothing is said about the others.")
     for reason, pairs in _uncompared(results).items():
-        say(f"Not compared: {', '.join(pairs)}", reason)
-    if len({record.mode for record in records if record.outcome in COMPARED}) > 1:
+        say(f"Not judged: {', '.join(pairs)}", reason)
+    if len({record.mode for record in records if record.outcome in ANSWERED}) > 1:
         say("Modes", "Projection and simulate are different products; their times and errors are no ranking.")
     if len({record.loop for record in records if record.us_per_step is not None}) > 1:
         say("Times", "The loops over the samples run in different places (see loop): a time is that of engine and loop together.")
@@ -66,7 +67,7 @@ def _pair(record: Record) -> str:
 def _uncompared(results: Results) -> dict[str, list[str]]:
     reasons: dict[str, list[str]] = {}
     for record in results.records:
-        if record.outcome not in COMPARED:
+        if record.outcome not in ANSWERED:
             continue
         for reason in dict.fromkeys(errors.reason for errors in record.errors.values() if errors.reason):
             reasons.setdefault(reason, []).append(_pair(record))

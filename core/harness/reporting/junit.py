@@ -14,7 +14,10 @@ FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]
 
 
 def to_junit(results: Results) -> bytes:
-    """The results as JUnit XML; a missing engine or feature is a skip with its reason, a pair that was never made an error.
+    """Return the results as JUnit XML.
+
+    A missing engine or feature, and an output that was not judged, is a skip with its reason. A
+    pair that was never made is an error.
 
     What is to be known of a case's geometry is the output of its suite.
     """
@@ -57,16 +60,24 @@ def _test(suite: ElementTree.Element, record: Record, output: str, deviations: D
 
 
 def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
-    """The element a test case needs, none where it passed, and its message."""
-    if record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
-        return "skipped", f"{record.outcome}: {record.message}"
+    """Return the element a test case needs, none where it passed, and its message."""
+    if record.outcome in (Outcome.UNJUDGED, Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
+        return "skipped", f"{record.outcome.shown}: {record.message}"
     if record.outcome is Outcome.FAIL:
         (driver, values), *_ = record.driver.items()
         unit = record.outputs[output].unit
         off = [describe(output, quantity, each, driver, values, unit) for quantity, each in deviations.items() if not each.within]
         if deviations.lost and not off:
             off = [f"{output}: {deviations.reason}"]
-        # samples that are missing are missing from every output
-        missing = [record.message] if record.solved != record.samples and not off else []
-        return ("failure", "; ".join(off + missing)) if off or missing else ("", "")
-    return ("error", f"{record.outcome}: {record.message}") if record.outcome.bad else ("", "")
+        if deviations.contradicted:
+            off.append(record.message)
+        # missing samples are missing from every output, and a residual is of all of them
+        of_all = record.solved != record.samples or all(each.sound for each in record.errors.values())
+        off += [record.message] if of_all and not off else []
+        if off:
+            return "failure", "; ".join(off)
+    elif record.outcome.bad:
+        return "error", f"{record.outcome}: {record.message}"
+    if not deviations.items():
+        return "skipped", f"{Outcome.UNJUDGED.shown}: {deviations.reason}"
+    return "", ""

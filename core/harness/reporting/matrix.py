@@ -50,7 +50,7 @@ def to_markdown(results: Results) -> str:
     lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
     lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
     lines += [
-        escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
+        escaped(f"{outcome.shown.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()
         if outcome is not Outcome.PASS
     ]
@@ -61,11 +61,11 @@ def cell(record: Record) -> str:
     """What an engine made of a case, in a few signs."""
     errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
     if errors:
-        verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome}: "
+        verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: "
         return verdict + " · ".join(f"{error.max_abs:.0e} {unit}".rstrip() for error, unit in errors)
-    if record.outcome is Outcome.PASS and record.residual_max is not None:
-        return f"residual {record.residual_max:.0e}"
-    return str(record.outcome)
+    if record.outcome is Outcome.UNJUDGED and record.residual_max is not None:
+        return f"{record.outcome.shown}, residual {record.residual_max:.0e}"
+    return record.outcome.shown
 
 
 def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]]:

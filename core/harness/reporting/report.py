@@ -17,17 +17,25 @@ from markupsafe import Markup
 
 from ...trajectory import QUANTITIES
 from ..record import Outcome, Record, Results
-from .caveats import COMPARED, caveats
+from .caveats import ANSWERED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
 from .wording import TRUTHS, against, engine_name, known, number, output_label, product, unread_count
 
-NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
+NOT_JUDGED = (Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
 
 WITHOUT_TRENDS = "No trends", "The history cannot be read, so that this page says nothing of earlier runs."
 """Limit of a report whose history has a fault."""
+FAULTS = (
+    ("is", "are", "outside tolerance"),
+    ("contradicts", "contradict", "the native engine"),
+    ("has", "have", "outputs without a value"),
+    ("has", "have", "a residual above the tolerance"),
+    ("lacks", "lack", "samples"),
+)
+"""What is wrong with records that fail, as the headline says it of one and of several."""
 
 _HERE = Path(__file__).parent
 
@@ -82,9 +90,8 @@ def render(given: Material, changes: Markup | None = None) -> str:
             changes=changes,
             worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
             counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
-            unjudged=sum(record.outcome in COMPARED and not judged([record]) for record in records),
             problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
-            not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
+            not_judged=_grouped(record for record in records if record.outcome in NOT_JUDGED),
             circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
             unread=given.results.unread,
             settings=_settings(records),
@@ -95,7 +102,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
             never=never,
             truths=TRUTHS,
             motions=QUANTITIES,
-            compared=COMPARED,
+            answered=ANSWERED,
             validation=validation,
             severity=severity,
             searched=searched,
@@ -134,14 +141,10 @@ def headline(results: Results) -> str:
     compared = [record for record in records if judged([record]) or record.outcome is Outcome.FAIL]
     broken = _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
-    within = [record for record in failed if all(each.within for each in record.errors.values())]  # where there is a deviation
-    outside, without = len(failed) - len(within), sum(map(_lost, within))
-    parts = (
-        (outside, "is", "are", "outside tolerance"),
-        (without, "has", "have", "outputs without a value"),
-        (len(within) - without, "lacks", "lack", "samples"),
-    )
-    counts = [f"{n} of {len(compared)} comparisons {one if n == 1 else more} {what}" for n, one, more, what in parts if n]
+    faults = Counter(_fault(record, results.run.get("tol", 0.0)) for record in failed)
+    counts = [
+        f"{n} of {len(compared)} comparisons {one if n == 1 else more} {what}" for one, more, what in FAULTS if (n := faults[what])
+    ]
     if not compared:
         said = "Nothing was compared"
     elif failed:
@@ -153,13 +156,23 @@ def headline(results: Results) -> str:
             else "The one comparison is within tolerance"
         )
     said += f", {broken} could not be completed" if broken else ""
+    unjudged = _count(records, Outcome.UNJUDGED)
+    said += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
     said += f"; {unread_count(unread)}" if unread else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
 
 
-def _lost(record: Record) -> bool:
-    """Whether an output has no value where it should."""
-    return any(each.lost for each in record.errors.values())
+def _fault(record: Record, tol: float) -> str:
+    """Return what is wrong with a record that fails, one of `FAULTS`; where several are, the first."""
+    errors = record.errors.values()
+    holds = (
+        any(not each.within for each in errors),
+        any(each.contradicted for each in errors),
+        any(each.lost for each in errors),
+        record.solved == record.samples and (record.residual_max or 0.0) > tol,
+        True,
+    )
+    return next(what for (_, _, what), true in zip(FAULTS, holds, strict=True) if true)
 
 
 def _worst_of(record: Record, motion: str | None = None) -> Judged | None:

@@ -16,7 +16,7 @@ from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
 from .wording import against, motion_unit, notes, signs, unread
 
-COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
+COLOURS = {Outcome.PASS: "green", Outcome.UNJUDGED: "yellow", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
 
 
@@ -34,7 +34,7 @@ def print_table(results: Results, file: TextIO) -> None:
     table.add_column("us/step", justify="right", no_wrap=True)
     several = len({record.mode for record in results.records}) > 1
     for record in results.records:
-        outcome = Text(record.outcome, style=COLOURS.get(record.outcome, "bold red"))
+        outcome = Text(record.outcome.shown, style=COLOURS.get(record.outcome, "bold red"))
         errors = [_error(record, quantity) for quantity in QUANTITIES]
         time = "–" if record.us_per_step is None else f"{record.us_per_step:.3g}"
         engine = f"{record.engine} · {record.mode}" if several else record.engine
@@ -57,9 +57,9 @@ def print_messages(results: Results, console: Console) -> None:
     for case, note in notes(results.run):
         console.print(Text(visible(f"note: {case}: {note}")), soft_wrap=True)
     for (engine, outcome, message), cases in messages(results).items():
-        console.print(Text(visible(f"{outcome}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
+        console.print(Text(visible(f"{outcome.shown}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
-    console.print(", ".join(f"{count} {outcome}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
+    console.print(", ".join(f"{count} {outcome.shown}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
     if said := unread(results.run):
         console.print(Text(visible(said), style="bold red"), soft_wrap=True)
 

@@ -29,8 +29,6 @@ NOTES = (
 
 def report(found: Stress) -> Report:
     """The tables."""
-    total = sum(sum(cell.samples.values()) for cell in found.cells)
-    wrong = sum(cell.samples[Verdict.SILENTLY_WRONG] for cell in found.cells)
     sections = [_shares(found), _families(found)]
     sections += [_findings(found.findings)] if found.findings else []
     sections += [_proofs(found)] if found.proofs else []
@@ -38,7 +36,7 @@ def report(found: Stress) -> Report:
     spent = ", ".join(f"{what} {seconds:.1f} s" for what, seconds in found.seconds.items())
     return Report(
         NAME,
-        f"{wrong} of {total} samples silently wrong" if wrong else f"None of {total} samples silently wrong",
+        headline(found.cells),
         [
             f"kincheck {found.kincheck}",
             f"seed {found.seed}",
@@ -47,6 +45,32 @@ def report(found: Stress) -> Report:
         ],
         sections,
     )
+
+
+def headline(cells: Sequence[Cell]) -> str:
+    """Return how many of the examined samples are silently wrong, and how many were not examined."""
+    count = {verdict: sum(cell.samples[verdict] for cell in cells) for verdict in Verdict}
+    apart = [f"{count[verdict]} {SHORT[verdict]}" for verdict in (Verdict.UNJUDGED, Verdict.UNSUPPORTED) if count[verdict]]
+    wrong, examined = count[Verdict.SILENTLY_WRONG], sum(map(_examined, cells))
+    said = f"{wrong or 'None'} of {examined} samples silently wrong" if examined else "No sample was examined"
+    return ", ".join([said, *apart])
+
+
+def _examined(cell: Cell) -> int:
+    """Return how many samples have a verdict on an answer."""
+    return sum(cell.samples.values()) - cell.samples[Verdict.UNJUDGED] - cell.samples[Verdict.UNSUPPORTED]
+
+
+def idle(found: Stress) -> list[str]:
+    """Return which engines had none of their samples examined, and why."""
+    lines: list[str] = []
+    for engine in dict.fromkeys(map(_engine, found.cells)):
+        cells = [cell for cell in found.cells if _engine(cell) == engine]
+        if cells[0].version is not None and any(map(_examined, cells)):
+            continue
+        why = "it is not installed" if cells[0].version is None else "choose other families or another engine"
+        lines.append(f"{engine}: {headline(cells)[0].lower()}{headline(cells)[1:]}: {why}")
+    return lines
 
 
 def _shares(found: Stress) -> Section:

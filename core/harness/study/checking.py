@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -10,13 +11,17 @@ from typing import overload
 import msgspec
 import numpy as np
 
-from ...errors import KincheckError
+from ...analysis.prepare import prepare
+from ...analysis.request import Request
+from ...errors import KincheckError, SolveError
 from ...trajectory import QUANTITIES, Array
 from ..attempt import Answer, Attempt, Pair, Solver
-from ..case import Series
+from ..case import Case, Series
 from ..compare import describe, deviation, pace
 from ..engine import Engine
 from ..record import Outcome
+from ..standard import NATIVE, UNCERTAIN
+from ..verdict import excess, promised
 from .study import Study
 
 
@@ -96,20 +101,29 @@ def check(
     with closing(solver(pairs)) as attempts:
         for index, attempt in attempts:
             variant = pairs.variants[index]
-            found[variant] = judged(study, variant, attempt, picked[variant])
+            found[variant] = judged(study, variant, attempt, picked[variant], promised(engine, tol))
             progress(len(found), len(pairs))
     return [found[variant] for variant in sorted(found)]
 
 
-def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked:
-    """Compare an engine's answer with the sweep's values: every row within its output's tolerance, wherever both have one."""
+def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf) -> Checked:
+    """Compare an engine's answer with the sweep's values: every row within its output's tolerance, wherever both have one.
+
+    A variant without a row that both have a value of is not judged. One fails where the engine has
+    values and the sweep has no solution, or the engine has none and the sweep has one.
+
+    Args:
+        tol: the largest residual that the engine promises, relative to the mechanism's size.
+    """
     result = attempt.result
     if not isinstance(result, Answer):
         return Checked(variant=variant, outcome=result.outcome, message=result.message)
     case = study.of_variant(variant)
     beat = pace(case)
     lost = ""
-    worst = Checked(variant=variant, outcome=Outcome.FAIL, message="there is nothing to compare: no row has values from both")
+    worst = Checked(variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both")
+    if fault := _contradicted(study, case, result, ours) or excess(case, result.residual if result.solved else 0.0, tol):
+        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=fault)
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
@@ -136,3 +150,24 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array) -> Checked
     if lost:
         return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message="; ".join(filter(None, (lost, worst.message))))
     return worst
+
+
+def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
+    """Return what an engine has where native cannot reach the sample, with native's reason; empty where there is nothing.
+
+    Many variants at once are refused beside singular poses that one by itself passes, so that
+    native solves a variant in question again, alone.
+    """
+    values = np.logical_or.reduce([np.isfinite(series.position) for series in answer.outputs.values()])
+    if not (values & ~np.isfinite(ours).any(axis=0)).any():
+        return ""
+    path = case.sweep.path
+    try:
+        alone = prepare(case.mechanism, Request(tuple(path.motions), case.points), path)(study.tol)
+    except SolveError:  # without an answer there is no standard
+        return ""
+    refused = values & ~alone.solved
+    refused[alone.details.get(UNCERTAIN, [])] = False
+    if not refused.any():
+        return ""
+    return f"values at {refused.sum()} of {len(refused)} samples that {NATIVE} cannot reach; {NATIVE}: {alone.message}"

@@ -97,6 +97,7 @@ def headline(results: SweepResults) -> str:
     if results.checked:
         off = len(results.deviating)
         said += f"; {len(results.checked)} checked with {results.check_engine}, " + (f"{off} deviate" if off else "none deviates")
+        said += f", {results.unjudged} not judged" if results.unjudged else ""
     return said
 
 

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from ...trajectory import Array
+from ..record import Outcome
 from .checking import Checked
 from .gradients import Gradients
 from .reduce import QUANTILES, Quantiles, Summary
@@ -147,6 +148,11 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
     def deviating(self) -> list[Checked]:
         """The checked variants that did not pass."""
         return [each for each in self.checked if each.outcome.bad]
+
+    @property
+    def unjudged(self) -> int:
+        """How many checked variants have no value to compare; all are among those without a solution."""
+        return sum(each.outcome is Outcome.UNJUDGED for each in self.checked)
 
 
 def numbers(values: Array) -> Numbers:

@@ -1,0 +1,81 @@
+"""Standards: what the native engine gives or refuses where the reference of a case does not say it all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .case import Case, Series
+from .record import OutputSeries, Record
+
+NATIVE = "native"
+"""Name of the engine that stands in where a case has no reference."""
+
+
+UNCERTAIN = "uncertain_samples"
+"""Key of a record's details: samples that were reached, and refused because they are uncertain."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standard:
+    """The native engine's answer to a case.
+
+    Attributes:
+        outputs: by name; empty where there are none.
+        absent: why there are none, as the end of a sentence on the missing reference.
+        refused: samples that the native engine cannot reach, shape (n,); None where there are none.
+            Samples that it reaches, and refuses because the pose or its rates are uncertain beside a
+            singular pose, are not among them: it says nothing of the values of others there.
+        why: its own message.
+    """
+
+    outputs: Mapping[str, Series]
+    absent: str = ""
+    refused: NDArray[np.bool_] | None = None
+    why: str = ""
+
+    def refuses(self, case: Case) -> NDArray[np.bool_] | None:
+        """Return the samples that the native engine cannot reach and the reference does not have, shape (n,)."""
+        if self.refused is None:
+            return None
+        return self.refused & ~known(case.reference.values(), len(self.refused))
+
+
+def standard_of(native: Record) -> Standard:
+    """Return the standard that a record of the native engine makes."""
+    if not native.outputs:
+        why = f", and the native engine has no answer ({native.outcome.shown}: {native.message})"
+        return Standard({}, why)
+    outputs = {name: _series(output) for name, output in native.outputs.items()}
+    if native.solved == native.samples:
+        return Standard(outputs)
+    refused = ~known(outputs.values(), native.samples or 0)
+    refused[native.details.get(UNCERTAIN, [])] = False
+    return Standard(outputs, refused=refused, why=native.message)
+
+
+def has_everything(case: Case) -> bool:
+    """Return whether the reference has a value of everything there is to compare, at every sample."""
+    return all(
+        (series := case.reference.get(output.name)) is not None
+        and all(each is not None for each in (series.position, series.velocity, series.acceleration)[: output.orders])
+        and np.isfinite(series.position).all()
+        for output in case.outputs
+    )
+
+
+def known(outputs: Iterable[Series], samples: int) -> NDArray[np.bool_]:
+    """Return the samples at which any output has a value, shape (samples,)."""
+    known = np.zeros(samples, dtype=np.bool_)
+    for each in outputs:
+        known |= np.isfinite(each.position)
+    return known
+
+
+def _series(output: OutputSeries) -> Series:
+    """Return what `as_numbers` wrote down, without loss: NaN for null."""
+    rates = [None if each is None else np.array(each, dtype=np.float64) for each in (output.velocity, output.acceleration)]
+    return Series(np.array(output.position, dtype=np.float64), *rates)

@@ -1,0 +1,167 @@
+"""Verdicts: what becomes of an answer, and why, by the standards of its case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+import msgspec
+import numpy as np
+
+from ..errors import shortened
+from .attempt import Answer
+from .case import Case, Quantity
+from .compare import NO_VALUE, describe, deviations, size
+from .engine import Engine
+from .record import Deviation, Deviations, Outcome
+from .standard import NATIVE, Standard, known
+
+ROUNDED = 2.0
+"""Engines measure in a unit near the mechanism's size, a power of two, which may be larger."""
+
+
+NAMED = 3
+"""Outputs whose values a message gives; the record has all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The outcome of an answer.
+
+    Attributes:
+        outcome: pass, fail or unjudged.
+        messages: why it fails, or which part of it could not be judged.
+        errors: deviations of every output.
+        seconds: that judging took.
+    """
+
+    outcome: Outcome
+    messages: Sequence[str]
+    errors: Mapping[str, Deviations]
+    seconds: float
+
+
+def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
+    """Judge an answer.
+
+    Args:
+        native: the native engine's answer, for all that the case's reference does not have.
+        tol: the largest residual of the samples that the engine calls solved, relative to the size.
+    """
+    begin = perf_counter()
+    solved, samples = answer.solved, len(case.sweep.values)
+    complete = solved == samples
+    errors = {output.name: _deviations(case, output, answer, native, complete=complete) for output in case.outputs}
+    faults: list[str] = []
+    if not complete:
+        why = answer.message or "the engine does not say why; ask it to"
+        faults.append(f"{solved} of {samples} samples solved: {why}{_reached_elsewhere(case, answer, native)}")
+    faults += filter(None, (_contradiction(case, answer, native), _worst(case, errors)))
+    # an output without any value has no deviation to be out of tolerance
+    faults += [f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within]
+    faults += filter(None, (excess(case, answer.residual if solved else 0.0, tol),))
+    if faults:
+        return Verdict(Outcome.FAIL, faults, errors, perf_counter() - begin)
+    compared = any(each.items() for each in errors.values())
+    outcome = Outcome.PASS if compared else Outcome.UNJUDGED
+    messages = _not_judged(case, errors)
+    if outcome is Outcome.PASS and messages:
+        messages[0] = f"{Outcome.UNJUDGED.shown}: {messages[0]}"
+    if native.why and any(NO_VALUE in message for message in messages):
+        messages.append(f"{NATIVE}: {native.why}")
+    return Verdict(outcome, messages, errors, perf_counter() - begin)
+
+
+def _deviations(case: Case, output: Quantity, answer: Answer, native: Standard, *, complete: bool) -> Deviations:
+    name, found = output.name, answer.outputs[output.name]
+    standards = [(str(case.truth), case.reference[name])] if name in case.reference else []
+    standards += [(NATIVE, native.outputs[name])] if name in native.outputs else []
+    refused = native.refuses(case)
+    result = deviations(case, output, found, standards, complete=complete, refused=refused)
+    if standards:
+        return result
+    lack = "the reference does not have it" if case.reference else "the case has no reference"
+    return msgspec.structs.replace(result, reason=lack + native.absent)
+
+
+def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
+    """Return the deviation that is most out of tolerance, in words; empty where all are within."""
+    outside: list[tuple[float, Quantity, str, Deviation]] = [
+        (off.max_abs / off.tolerance if off.tolerance else np.inf, output, quantity, off)
+        for output in case.outputs
+        for quantity, off in errors[output.name].items()
+        if not off.within
+    ]
+    if not outside:
+        return ""
+    _, output, quantity, off = max(outside, key=lambda each: each[0])
+    more = f" (worst of {len(outside)} quantities out of tolerance)" if len(outside) > 1 else ""
+    values = case.sweep.values.tolist()
+    return describe(output.name, quantity, off, case.sweep.driver, values, output.unit) + more
+
+
+def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
+    """Return what an engine has where the native engine refuses the sample, with both sides; empty where they agree."""
+    refused = native.refuses(case)
+    if refused is None:
+        return ""
+    samples = len(refused)
+    at = refused & known(answer.outputs.values(), samples)
+    if not at.any():
+        return ""
+    first = int(np.argmax(at))
+    values = [
+        f"{output.name} = {value:.6g} {output.unit}"
+        for output in case.outputs
+        if np.isfinite(value := answer.outputs[output.name].position[first])
+    ]
+    where = f"sample {first} ({case.sweep.driver} = {case.sweep.values[first]:.9g})"
+    return (
+        f"values at {at.sum()} of {samples} samples that {NATIVE} cannot reach, first at {where}: {shortened(values, NAMED)}; "
+        f"{NATIVE}: {native.why or 'gives no reason'}"
+    )
+
+
+def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
+    """Return how many of the samples that an engine did not solve have a value in a standard; empty where none has."""
+    samples = len(case.sweep.values)
+    unsolved = ~known(answer.outputs.values(), samples)
+    for name, series in ((str(case.truth), case.reference.values()), (NATIVE, native.outputs.values())):
+        if count := int((unsolved & known(series, samples)).sum()):
+            return f"; {name} has values at {count} of the others"
+    return ""
+
+
+def promised(engine: Engine, tol: float) -> float:
+    """Return the largest residual that an engine promises for its solved samples, relative to the size.
+
+    A simulation accepts what its own settings say, and is held to its outputs alone. The native
+    engine knows better how far a residual moves a pose.
+    """
+    return tol if engine.mode == "projection" and engine.name != NATIVE else math.inf
+
+
+def excess(case: Case, residual: float, tol: float) -> str:
+    """Return by how much the residual of solved samples is above the tolerance; empty where it is not.
+
+    The tolerance is relative to the mechanism's size for lengths, and absolute for residuals without a unit.
+    """
+    extent = size(case)
+    if not residual > tol * max(1.0, ROUNDED * extent):
+        return ""
+    return (
+        f"the residual of samples that the engine calls solved is {residual:.3g}, tolerance {tol:.3g} of the mechanism's "
+        f"size ({extent:.3g} m): it has not converged; let it iterate further, or allow more by --tol"
+    )
+
+
+def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
+    """Return which outputs, quantities or samples were not compared, and why; outputs with the same reason together."""
+    reasons: dict[str, list[str]] = {}
+    for output in case.outputs:
+        each = errors[output.name]
+        if len(each.items()) < output.orders or NO_VALUE in (each.reason or ""):
+            reasons.setdefault(each.reason or "", []).append(output.name)
+    return [reason if len(names) == len(case.outputs) else f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
