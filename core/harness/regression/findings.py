@@ -87,7 +87,7 @@ def _short(value: Any) -> str:
 
 
 class Step(msgspec.Struct, frozen=True, kw_only=True):
-    """A level of the history that changed for good, up to the latest run.
+    """A change of level in the history of a pair.
 
     Attributes:
         quantity: position, velocity or acceleration (errors), time, or outcome.
@@ -96,6 +96,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
         first: number of the first run of the new level; `started` is when it began.
         last: number of the last run of the level before.
         before, now: the levels: errors [SI], seconds; null for an outcome.
+        repaired: number of the first later run that is as good as before; null for a change to the better, and while it stands.
         changes: what else was not the same in these two runs.
     """
 
@@ -111,6 +112,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     before: float | None
     now: float | None
     worse: bool
+    repaired: int | None = None
     changes: list[Change]
 
 

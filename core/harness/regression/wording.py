@@ -110,7 +110,9 @@ def step_says(step: Step) -> str:
     else:
         what = f"{number(step.before)} → {number(step.now)} {motion_unit(step.unit, step.quantity)}".rstrip()
     changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
-    return f"{name}: {what} since run {step.first} ({step.started[:16].replace('T', ' ')}); after run {step.last}: {changed}"
+    repaired = f", repaired in run {step.repaired}" if step.repaired is not None else ""
+    since = f"since run {step.first} ({step.started[:16].replace('T', ' ')}){repaired}"
+    return f"{name}: {what} {since}; after run {step.last}: {changed}"
 
 
 def loose_says(loose: Sequence[Loose]) -> list[str]:
