@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...errors import shortened
@@ -15,6 +15,17 @@ LONGEST = 12
 
 NAMED = 4
 """Cases that are named where a row is of several."""
+
+
+COUNTED: Mapping[Kind, str] = {
+    Kind.LOST: "with something lost",
+    Kind.GONE: "with values gone",
+    Kind.FREEDOM: "with another dof",
+    Kind.UNIT: "with another unit",
+    Kind.DRIFTED: "less accurate",
+    Kind.RESIDUAL: "with a larger residual",
+}
+"""What follows the number of pairs with a finding, where it is not the name of the kind."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +62,18 @@ def headline(found: Regressions) -> str:
         # with nothing to compare with there are no other regressions
         never = _counted(found, Kind.LOST)
         rest = [f"{never} never made"] if never else []
+        absent = _counted(found, Kind.ABSENT)
+        rest += [f"{absent} {Kind.ABSENT}"] if absent else []
         rest += [unread_count(len(found.unread))] if found.unread else []
         return f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing: {found.reason}"
-    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if kind.regression and _counted(found, kind)]
+    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if found.fails(kind) and _counted(found, kind)]
     counts += [unread_count(len(found.unread))] if found.unread else []
     said = ", ".join(counts) or "nothing regressed"
     fixed = len(pairs(found, Kind.FIXED))
     known = len(found.failing) - len(pairs(found, Kind.FAILURE))
+    absent = 0 if found.missing_is_failure else _counted(found, Kind.ABSENT)
     rest = [f"{fixed} fixed"] if fixed else []
+    rest += [f"{absent} {Kind.ABSENT}"] if absent else []
     rest += [f"{known} not right before either"] if known > 0 else []
     rest += [", ".join(map(str, versions(found)))] if versions(found) else []
     return "; ".join([f"{found.run.name} against {found.against.name}: {said}", *rest])
@@ -82,7 +97,7 @@ def _counted(found: Regressions, kind: Kind) -> int:
 def _plural(kind: Kind, found: Regressions) -> str:
     if kind is Kind.FAILURE:
         return "new failure" + ("s" if len(pairs(found, kind)) > 1 else "")
-    return "with something lost" if kind is Kind.LOST else "less accurate" if kind is Kind.DRIFTED else str(kind)
+    return COUNTED.get(kind, str(kind))
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
