@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ..history.store import Store
+from ..history.store import RunRow, Store
 from .findings import Finding, Kind
 from .subject import Subject, pairs_of
 
@@ -17,12 +17,19 @@ def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> I
     Args:
         told: what is said of the subject already.
     """
-    earlier = [row for row in store.runs() if subject.before is None or row.id < subject.before] if store else []
-    command = subject.facts.get("command")
-    last = next((row for row in earlier if row.status != "running" and row.command == command), None)
+    last = _last(subject, store) if store else None
     if last is None:
         return
     known = pairs_of(subject) | {(each.case, each.engine, each.mode) for each in told if each.kind is Kind.ABSENT}
     for case, engine, mode in last.plan:
         if (case, engine, mode) not in known:
             yield Finding(kind=Kind.ABSENT, case=case, engine=engine, mode=mode, message=f"in run {last.id}, by the same command")
+
+
+def _last(subject: Subject, store: Store) -> RunRow | None:
+    """Return the last earlier run of the subject's command that nobody is writing now."""
+    query = "SELECT id FROM runs WHERE command = ? AND (? IS NULL OR id < ?) ORDER BY id DESC"
+    with store.explained("read"):
+        numbers = store.connection.execute(query, (subject.facts.get("command"), subject.before, subject.before)).fetchall()
+    rows = (store.run(number) for (number,) in numbers)
+    return next((row for row in rows if row.status != "running"), None)
