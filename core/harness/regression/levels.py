@@ -1,6 +1,7 @@
 """Levels of a series: the exact division into parts of steady level, under L1 cost.
 
-`ruptures` divides exactly too. It cannot demand that each change is sure, and its wheels end at Python 3.13.
+`ruptures` divides exactly too. It cannot demand that each change is sure, and its wheels end at
+Python 3.13.
 """
 
 from __future__ import annotations
@@ -13,21 +14,23 @@ import numpy as np
 from ..case import Array
 
 SURE = 6.0
-"""Distance of two levels in standard errors of a median. In 24 runs whose times were not freed of waiting, where any level is
-chance, the largest was 4.4. A change of level must also bring the values closer to their medians by as many, in sum."""
+"""Distance of two levels in standard errors of a median. In 24 runs whose times were not freed of
+waiting, where any level is chance, the largest was 4.4. A change of level must also bring the values
+closer to their medians by as many, in sum."""
 
-# Of normal values with standard deviation 1: standard error of a median times the root of their number, mean |difference| of two
-# values, and distance of the quartiles.
+# Of normal values with standard deviation 1: standard error of a median times the root of their
+# number, mean |difference| of two values, and distance of the quartiles.
 MEDIAN_ERROR, DIFFERENCE, QUARTILES = 1.253, 1.128, 1.349
 
 
 def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
     """Return the indices at which the level of a series changes.
 
-    Of all divisions whose every change is sure, the result has the least sum of distances from the medians of the parts, plus a
-    penalty for each change. A change is sure if
-    - the medians of `lasting` values before and after it differ by `least`: a slow drift is no change of level;
-    - three quarters of the shorter part lie beyond the median of the longer by `least`: of three values, all;
+    Of all divisions whose every change is sure, the result has the least sum of distances from the
+    medians of the parts, plus a penalty for each change. A change is sure if
+    - the medians of `lasting` values before and after it differ by `least`: a slow drift is none;
+    - three quarters of the shorter part lie beyond the median of the longer by `least`: of three
+      values, all;
     - the medians of the parts differ by `SURE` standard errors.
 
     Medians and distances, not means and squares: one outlier is not a level.
@@ -47,7 +50,8 @@ def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
         return []
     cost, middle, low, high, width = _parts(values, ends, lasting)
     deviation = _deviation(values)
-    # best[i, j]: cost of the division up to ends[j] whose last part begins at ends[i]; before[i, j]: where the part before begins
+    # best[i, j]: cost of the division up to ends[j] whose last part begins at ends[i]
+    # before[i, j]: where the part before that one begins
     best = np.full(cost.shape, np.inf)
     best[0] = cost[0]
     before = np.zeros(cost.shape, int)
@@ -77,8 +81,8 @@ def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
 def _deviation(values: Array) -> float:
     """Return the standard deviation by the mean difference of successive values, without the largest two.
 
-    A level that comes and goes makes two large differences. Single outliers make more: where there are many, three in a row are
-    chance, and a median would not know of them.
+    A level that comes and goes makes two large differences. Single outliers make more: where there
+    are many, three in a row are chance, and a median would not know of them.
     """
     differences = np.sort(np.abs(np.diff(values)))
     calm = differences[: -2 if len(differences) > 3 else -1]
@@ -88,7 +92,8 @@ def _deviation(values: Array) -> float:
 def _parts(values: Array, ends: list[int], lasting: int) -> Array:
     """Return cost, median, lower and upper quartile, and distance of the quartiles of all parts from one end to another.
 
-    The quartiles are values of the part, the outer ones; their distance is interpolated. A part that is too short costs infinity.
+    The quartiles are values of the part, the outer ones; their distance is interpolated. A part that
+    is too short costs infinity.
     """
     table = np.zeros((5, len(ends), len(ends)))
     table[0] = math.inf
