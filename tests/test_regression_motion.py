@@ -42,7 +42,9 @@ def test_other_values_at_the_same_samples(path, values):
 
 
 def test_round_off_and_missing_samples_are_no_other_motion(path):
-    assert found_after(path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0])[0] == []
+    kinds, messages, _ = found_after(path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0])
+    assert kinds == [(Kind.GONE, *FIRST)]
+    assert messages == ["y velocity has no value at 1 of 2 samples that had one, first at turn = 0.5: no reason is given"]
 
 
 @pytest.mark.parametrize(("off", "kinds"), [(1.9e-9, []), (2.1e-9, [(Kind.MOVED, *FIRST)])])

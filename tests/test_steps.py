@@ -6,6 +6,7 @@ import random
 import msgspec
 import numpy as np
 import pytest
+from kincheck.core.harness import cli
 from kincheck.core.harness.history.series import read
 from kincheck.core.harness.history.store import Store
 from kincheck.core.harness.record import Outcome
@@ -27,6 +28,38 @@ def found(path, **options):
 def noisy(levels, spread=0.05, seed=3):
     noise = random.Random(seed)
     return np.array([level + noise.gauss(0.0, spread) for level in levels])
+
+
+SHAPES = {
+    "comes and goes": ([8, 8, 8, 8], [8, 16, 24]),
+    "three slow runs": ([18, 3, 15], [18, 21]),
+    "three at the end": ([37, 3], [37]),
+    "one step": ([25, 8], [25]),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_comes_and_goes_is_found_exactly(shape, sign):
+    """Steps of ten standard deviations, a factor of two in time, up first or down first."""
+    lengths, expected = SHAPES[shape]
+    level = sign * math.log(2.0) * np.repeat([k % 2 for k in range(len(lengths))], lengths)
+    found = [change_points(noisy(level, 0.0693, seed), least=math.log(1.5), lasting=3) for seed in range(100)]
+    assert sum(each == expected for each in found) >= 95
+
+
+def test_a_slow_drift_is_no_step():
+    drift = np.linspace(0.0, math.log(4.0), 60)
+    for seed in range(20):
+        assert change_points(noisy(drift, seed=seed), least=math.log(1.5), lasting=3) == []
+
+
+def test_values_that_go_to_and_fro_are_no_steps():
+    """As errors on two kinds of hosted processors are."""
+    for seed in range(20):
+        chance = random.Random(seed)
+        values = np.array([math.log(30.0) * (chance.random() < 0.5) for _ in range(60)])
+        assert change_points(values, least=math.log(10.0), lasting=1) == []
 
 
 @pytest.mark.parametrize(
@@ -94,3 +127,57 @@ def test_slow_nights_are_no_step_of_time(path):
     for night in range(12):
         keep(path, changed(records(noise=noise), **times(3.0 if night in (5, 10, 11) else 1.0)))
     assert found(path) == []
+
+
+def test_the_present_bad_stretch_has_its_own_first_run_and_an_earlier_one_its_repair(path, capsys):
+    noise = random.Random(3)
+    for night in range(32):
+        keep(path, changed(records(noise=noise), **times(2.0 if night // 8 % 2 else 1.0)))
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
+        (25, True, None),
+        (17, False, None),
+        (9, True, 17),
+    ]
+    assert [(each.first, each.last) for each in found(path, standing=True)] == [(25, 24)]
+    assert cli.main(["report", "--against", "20", "--history", str(path)]) == 1
+    said = capsys.readouterr().out
+    assert " · since run 25 |" in said
+    assert "ms a sweep since run 25 (" in said
+    assert "since run 9" not in said
+    assert cli.main(["history", "--case", "first", "--engine", "mujoco", "--last", "0", "--history", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
+
+
+def test_what_is_only_partly_repaired_stands(path):
+    noise = random.Random(3)
+    for night in range(24):
+        keep(path, changed(records(noise=noise), **times((1.0, 8.0, 3.0)[night // 8])))
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [(17, False, None), (9, True, None)]
+    assert [each.first for each in found(path, standing=True)] == [9]
+
+
+def test_one_bad_night_of_error_is_a_step_and_its_repair(path):
+    for night in range(12):
+        keep(path, changed(records(), **worse(100.0 if night == 5 else 1.0)))
+    assert [(each.first, each.repaired) for each in found(path) if each.worse] == [(6, 7)]
+    assert found(path, standing=True) == []
+
+
+def test_outputs_that_became_worse_one_after_the_other_both_stand(path):
+    nights(path, 4)
+    for _ in range(4):
+        keep(path, changed(records(), **worse(100.0, "x")))
+    for _ in range(4):
+        keep(path, changed(changed(records(), **worse(100.0, "x")), **worse(50.0, "y")))
+    assert [(each.output, each.first) for each in found(path, standing=True)] == [("y", 9), ("x", 5)]
+
+
+def test_a_missing_engine_repairs_nothing(path):
+    nights(path, 2)
+    keep(path, changed(records(), outcome=Outcome.FAIL))
+    for _ in range(2):
+        keep(path, changed(records(), outcome=Outcome.UNAVAILABLE, seconds=None, errors={}))
+    assert [(each.first, each.repaired) for each in found(path, standing=True)] == [(3, None)]
+    nights(path, 1)
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [(6, False, None), (3, True, 6)]

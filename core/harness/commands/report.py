@@ -41,6 +41,12 @@ def add(commands: Any) -> None:
         help="the same, or last-green (the latest earlier run in which nothing went wrong, and no engine was missing that is there "
         "otherwise), or BRANCH-baseline (the latest earlier run of that branch, without changes to its files); default %(default)s",
     )
+    report.add_argument(
+        "--missing-is-failure",
+        action="store_true",
+        help="status 1 also where a case or an engine is missing that the run compared with had, or the last run by the same "
+        "command; for nightly runs, which should never have fewer",
+    )
     add_history(report, "the history of the runs, their steps and their spread")
     report.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(OUT)} there")
     report.add_argument("--json", metavar="FILE", help="write what changed as JSON; - for standard output")
@@ -67,7 +73,7 @@ def _report(options: argparse.Namespace, house: House) -> int:
         store = open_files.enter_context(Store(Path(options.history), writable=False)) if options.history else None
         subject = find(options.run, store)
         against, reason = find_against(options.against, subject, store)
-        found = regressions(subject, against, reason, store)
+        found = regressions(subject, against, reason, store, missing_is_failure=options.missing_is_failure)
         print(to_markdown(found), end="", file=sys.stderr if options.json == "-" else sys.stdout)
         _write(options, subject, found, store, problems)
         problems += store.damage if store is not None else []

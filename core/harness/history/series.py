@@ -15,6 +15,9 @@ from .store import RunRow, Store
 NIGHTS = 60
 """Runs that trends and steps look back on: two months, whose points can still be told apart in a figure."""
 
+IDLE = Outcome.UNAVAILABLE, Outcome.UNSUPPORTED
+"""Outcomes of a pair whose engine is missing or not able: they say nothing about its results."""
+
 Pair: TypeAlias = tuple[str, str, str]
 """Case, engine and mode."""
 
@@ -141,8 +144,7 @@ def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
     Raises:
         HistoryError: the file cannot be read.
     """
-    idle = Outcome.UNAVAILABLE, Outcome.UNSUPPORTED
-    able = ((pair, entry.errors) for pair, entry in _entries(store, run) if entry.outcome not in idle)
+    able = ((pair, entry.errors) for pair, entry in _entries(store, run) if entry.outcome not in IDLE)
     return {pair: {(output, motion) for output, each in errors.items() for motion, _ in each.items()} for pair, errors in able}
 
 

@@ -34,7 +34,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
     for pair, record in by_pair(now.results.records).items():
         old = earlier.pop(pair, None)
         if old is None:
-            findings.append(_finding(Kind.FAILURE if record.outcome.bad else Kind.ADDED, record, _said(record)))
+            findings.append(finding_of(Kind.FAILURE if record.outcome.bad else Kind.ADDED, record, _said(record)))
             continue
         findings += _outcomes(record, old)
         findings += _lost(record, old)
@@ -46,7 +46,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             record, _usual(before, old, entries, history, same_machine(now.facts, before.facts)), now.facts, slowest
         )
     asked = set(now.results.missing)
-    findings += [_finding(Kind.ABSENT, old, f"{old.outcome.shown} there") for pair, old in earlier.items() if pair not in asked]
+    findings += [finding_of(Kind.ABSENT, old, f"{old.outcome.shown} there") for pair, old in earlier.items() if pair not in asked]
     return findings
 
 
@@ -92,13 +92,13 @@ def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
 
 def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
     if now.outcome.bad and not before.outcome.bad:
-        yield _finding(Kind.FAILURE, now, f"{before.outcome.shown} → {_said(now)}")
+        yield finding_of(Kind.FAILURE, now, f"{before.outcome.shown} → {_said(now)}")
     elif before.outcome.bad and now.outcome is Outcome.PASS:
-        yield _finding(Kind.FIXED, now, f"{before.outcome} → {now.outcome}")
+        yield finding_of(Kind.FIXED, now, f"{before.outcome} → {now.outcome}")
     elif before.outcome.judged and now.outcome is Outcome.UNJUDGED:
-        yield _finding(Kind.UNJUDGED, now, f"{before.outcome} → {_said(now)}")
+        yield finding_of(Kind.UNJUDGED, now, f"{before.outcome} → {_said(now)}")
     elif before.outcome is Outcome.UNJUDGED and now.outcome is Outcome.PASS:
-        yield _finding(Kind.JUDGED, now, f"{before.outcome.shown} → {now.outcome}")
+        yield finding_of(Kind.JUDGED, now, f"{before.outcome.shown} → {now.outcome}")
 
 
 def _lost(now: Record, before: Record) -> Iterator[Finding]:
@@ -106,11 +106,11 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
     phases = [phase for phase in PHASES if _reached(before, phase) and not _reached(now, phase)]
     if phases:
         why = f": {_said(now)}" if now.outcome is not Outcome.PASS else ""
-        yield _finding(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
+        yield finding_of(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
         return
     if (now.solved or 0) < (before.solved or 0):
         asked = "" if now.samples == before.samples else f" of {before.samples}"
-        yield _finding(Kind.LOST, now, f"{now.solved} of {now.samples} samples solved, {before.solved}{asked} before")
+        yield finding_of(Kind.LOST, now, f"{now.solved} of {now.samples} samples solved, {before.solved}{asked} before")
     if now.outcome is Outcome.UNJUDGED:  # the pair as a whole is no longer judged, which is a finding of its own
         return
     for output, old in before.errors.items():
@@ -118,9 +118,11 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
         gone = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
         if gone:
             why = f"the case has no output {output!r} now" if new is None else new.reason or "no reason is given"
-            yield _finding(Kind.LOST, now, f"{output}: {', '.join(gone)} no longer compared: {why}", output=output, motion=gone[0])
+            yield finding_of(
+                Kind.LOST, now, f"{output}: {', '.join(gone)} no longer compared: {why}", output=output, motion=gone[0]
+            )
     if before.validated and not now.validated and now.outcome is Outcome.PASS:
-        yield _finding(
+        yield finding_of(
             Kind.LOST,
             now,
             f"no longer validated: judged against {now.truth.replace('_', ' ')}, before {before.truth.replace('_', ' ')}",
@@ -131,23 +133,23 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
     """Outputs whose values are others than they were, or samples: where there is no reference nothing else would show it."""
     if not (now.driver and before.driver):
         return
-    if not _same_samples(now, before):
-        yield _finding(Kind.MOVED, now, "solved at other values of the drivers than before")
+    if not same_samples(now, before):
+        yield finding_of(Kind.MOVED, now, "solved at other values of the drivers than before")
         return
     for output, old in before.outputs.items():
         for motion in QUANTITIES:
-            off = _apart(_values(old, motion), _values(now.outputs.get(output), motion))
+            off = _apart(values_of(old, motion), values_of(now.outputs.get(output), motion))
             judged = getattr(now.errors.get(output), motion, None)
             # as far as two values can be that are within a tolerance of one standard
             limit = 2.0 * judged.tolerance if judged else DEFAULT_ATOL + UNJUDGED * _largest(before, motion)
             if off > limit:
                 unit = motion_unit(old.unit, motion)
                 told = f"{output} {motion} differs by up to {number(off)} {unit} from what it was"
-                yield _finding(Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion)
+                yield finding_of(Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion)
                 break
 
 
-def _same_samples(now: Record, before: Record) -> bool:
+def same_samples(now: Record, before: Record) -> bool:
     """Whether all drivers have the values they had, but for the last digits of sines and splines on another processor."""
     here, there = now.driver, before.driver
     if {name: len(values) for name, values in here.items()} != {name: len(values) for name, values in there.items()}:
@@ -156,7 +158,8 @@ def _same_samples(now: Record, before: Record) -> bool:
     return all(_apart(values, there[name]) <= SAME_SAMPLE * sizes[name] for name, values in here.items())
 
 
-def _values(series: OutputSeries | None, motion: str) -> Sequence[float | None]:
+def values_of(series: OutputSeries | None, motion: str) -> Sequence[float | None]:
+    """Return the values of a motion over the samples; none where there is no such series."""
     return getattr(series, motion, None) or ()
 
 
@@ -167,7 +170,7 @@ def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
 
 def _largest(record: Record, motion: str) -> float:
     """The largest value of any output."""
-    values = (x for output in record.outputs.values() for x in _values(output, motion))
+    values = (x for output in record.outputs.values() for x in values_of(output, motion))
     return max((abs(x) for x in values if x is not None), default=0.0)
 
 
@@ -184,7 +187,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
             about: dict[str, Any] = {"output": output, "motion": motion}
             if a.tolerance != b.tolerance:
                 told = f"{output} {motion}: {number(a.tolerance)} → {number(b.tolerance)}"
-                yield _finding(Kind.TOLERANCE, now, told, before=a.tolerance, now=b.tolerance, **about)
+                yield finding_of(Kind.TOLERANCE, now, told, before=a.tolerance, now=b.tolerance, **about)
             # what is out of tolerance is a failure, and named there
             if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
                 unit = motion_unit(now.outputs[output].unit, motion) if output in now.outputs else ""
@@ -192,7 +195,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                 size = f"{number(a.max_abs)} → {number(b.max_abs)} {unit}"
                 told = f"{output} {motion} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
-                yield _finding(Kind.DRIFTED, now, told, before=a.max_abs, now=b.max_abs, ratio=ratio, limit=DRIFT, **about)
+                yield finding_of(Kind.DRIFTED, now, told, before=a.max_abs, now=b.max_abs, ratio=ratio, limit=DRIFT, **about)
 
 
 def _references(record: Record, now: References, before: References) -> Iterator[Finding]:
@@ -200,10 +203,10 @@ def _references(record: Record, now: References, before: References) -> Iterator
     for output, old in before.get(record.case, {}).items():
         new = now.get(record.case, {}).get(output)
         for motion in QUANTITIES:
-            was, off = _values(old, motion), _apart(_values(old, motion), _values(new, motion))
+            was, off = values_of(old, motion), _apart(values_of(old, motion), values_of(new, motion))
             if off > SAME_SAMPLE * max((abs(x) for x in was if x is not None), default=0.0):
                 told = f"{output} {motion} differs by up to {number(off)} {motion_unit(old.unit, motion)} from what it was"
-                yield _finding(Kind.REFERENCE, record, told, now=off, output=output, motion=motion)
+                yield finding_of(Kind.REFERENCE, record, told, now=off, output=output, motion=motion)
                 break
 
 
@@ -241,12 +244,13 @@ def _slower(now: Record, usual: tuple[float | None, float | None], facts: Mappin
         ratio = seconds / should
         spread = f"×{number(ratio)}; by the spread from run to run, ×{number(limit)} may be chance"
         told = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
-        yield _finding(Kind.SLOWER, now, told, before=should, now=seconds, ratio=ratio, limit=limit)
+        yield finding_of(Kind.SLOWER, now, told, before=should, now=seconds, ratio=ratio, limit=limit)
 
 
 def _said(record: Record) -> str:
     return f"{record.outcome.shown}: {record.message}" if record.message else record.outcome.shown
 
 
-def _finding(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
+def finding_of(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
+    """Return a finding about the pair of a record."""
     return Finding(kind=kind, case=record.case, engine=record.engine, mode=record.mode, message=message, **about)

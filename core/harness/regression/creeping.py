@@ -11,8 +11,9 @@ from ...trajectory import QUANTITIES
 from ..history.series import History
 from ..reporting.wording import motion_unit, number
 from .findings import Finding, Kind
+from .levels import change_points
 from .limits import DRIFT, drifted
-from .steps import above_floor, change_points, errors_of
+from .steps import above_floor, errors_of
 from .subject import Subject
 
 

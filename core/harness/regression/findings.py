@@ -10,38 +10,63 @@ import msgspec
 
 
 class Kind(StrEnum):
-    """What a finding says. The first six are regressions."""
+    """What a finding says."""
 
     FAILURE = "new failure"
     LOST = "lost"
     UNJUDGED = "no longer judged"
+    GONE = "values gone"
     MOVED = "another motion"
+    FREEDOM = "freedom changed"
+    UNIT = "unit changed"
     DRIFTED = "accuracy drifted"
+    RESIDUAL = "residual grew"
     SLOWER = "slower"
     FIXED = "fixed"
     JUDGED = "judged again"
     TOLERANCE = "tolerance changed"
     REFERENCE = "reference changed"
+    RANK = "rank changed"
     ADDED = "new in this run"
     ABSENT = "not in this run"
 
     @property
     def regression(self) -> bool:
         """Whether something is worse than it was."""
-        return self in (Kind.FAILURE, Kind.LOST, Kind.UNJUDGED, Kind.MOVED, Kind.DRIFTED, Kind.SLOWER)
+        return self in REGRESSIONS
 
+
+REGRESSIONS = frozenset(
+    (
+        Kind.FAILURE,
+        Kind.LOST,
+        Kind.UNJUDGED,
+        Kind.GONE,
+        Kind.MOVED,
+        Kind.FREEDOM,
+        Kind.UNIT,
+        Kind.DRIFTED,
+        Kind.RESIDUAL,
+        Kind.SLOWER,
+    )
+)
 
 WHY: Mapping[Kind, str] = {
     Kind.FAILURE: "these results were right, or at least not wrong, and are not to be relied on now",
     Kind.LOST: "what is no longer reached or compared is no longer checked: a fault there would go unseen",
     Kind.UNJUDGED: "solved, but nothing is compared any more: a fault there would go unseen",
+    Kind.GONE: "values that were numbers are null now: whoever reads the results has less than before",
     Kind.MOVED: "the case is another than it was, or its solution is of another assembly",
+    Kind.FREEDOM: "the mechanism can move in other ways than before: it is another, or it is counted wrongly",
+    Kind.UNIT: "whoever reads the numbers takes them for something else",
     Kind.DRIFTED: "within tolerance, but a decimal digit worse: something computes differently than it did",
+    Kind.RESIDUAL: "the constraints are met three digits worse: the solution is less converged than it was",
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
     Kind.FIXED: "they failed in the run compared with",
     Kind.JUDGED: "nothing was compared in the run compared with",
     Kind.TOLERANCE: "what passes now need not have passed before, or the reverse",
     Kind.REFERENCE: "what passes now is judged by other true values than it was: somebody has edited them, or the case",
+    Kind.RANK: "the engine solves other rows than before; where dof is the same, so is the motion",
     Kind.ADDED: "nothing to compare with",
     Kind.ABSENT: "not asked for, or gone from the library: nothing is known of them",
 }
@@ -53,7 +78,7 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         output, motion: what it is about; null where it is about the pair.
-        before, now: errors [SI], seconds, or tolerances, by the kind; null where there is no number to it.
+        before, now: errors [SI], residuals, seconds, tolerances, dof or rank, by the kind; null where there is no number to it.
         ratio: of now to before, for a time with the pace of the machine taken out; null where there is none.
         limit: the ratio from which on it is a finding.
         since: the first run that has it, where the history knows it.
@@ -91,7 +116,7 @@ def _short(value: Any) -> str:
 
 
 class Step(msgspec.Struct, frozen=True, kw_only=True):
-    """A level of the history that changed for good, up to the latest run.
+    """A change of level in the history of a pair.
 
     Attributes:
         quantity: position, velocity or acceleration (errors), time, or outcome.
@@ -100,6 +125,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
         first: number of the first run of the new level; `started` is when it began.
         last: number of the last run of the level before.
         before, now: the levels: errors [SI], seconds; null for an outcome.
+        repaired: number of the first later run that is as good as before; null for a change to the better, and while it stands.
         changes: what else was not the same in these two runs.
     """
 
@@ -115,6 +141,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     before: float | None
     now: float | None
     worse: bool
+    repaired: int | None = None
     changes: list[Change]
 
 
@@ -155,6 +182,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         unjudged: the same of all that was solved and compared with nothing, new or not.
         unread: cases that were asked for and make no sense; their pairs are among the findings, lost.
         time_limit: the ratio from which on a time was called slower.
+        missing_is_failure: whether a pair that an earlier run had and this one does not is a regression.
     """
 
     schema: Literal["kincheck-regression/1"] = "kincheck-regression/1"
@@ -166,15 +194,20 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
     unjudged: list[tuple[str, str, str]] = []
     unread: list[str] = []
     time_limit: float
+    missing_is_failure: bool = False
     findings: list[Finding]
     changes: list[Change]
     steps: list[Step]
     loose: list[Loose]
 
+    def fails(self, kind: Kind) -> bool:
+        """Return whether findings of a kind are regressions in this report."""
+        return kind.regression or (kind is Kind.ABSENT and self.missing_is_failure)
+
     @property
     def regressions(self) -> list[Finding]:
         """The findings that are one."""
-        return [finding for finding in self.findings if finding.kind.regression]
+        return [finding for finding in self.findings if self.fails(finding.kind)]
 
     @property
     def regressed(self) -> bool:

@@ -24,6 +24,8 @@ def to_regression_junit(results: Results, found: Regressions) -> bytes:
             continue
         place = ".".join(pair)
         name = finding.output or str(finding.kind)
+        if finding.case not in suites:  # a case that only the earlier run has
+            suites[finding.case] = ElementTree.SubElement(root, "testsuite", name=finding.case)
         if (place, name) not in tests:
             tests[place, name] = ElementTree.SubElement(
                 suites[finding.case], "testcase", classname=place, name=name, time="0.000000"

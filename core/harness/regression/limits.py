@@ -19,6 +19,13 @@ DRIFT = 10.0
 DRIFT_FLOOR = 1e-6
 """Of the tolerance: what is below matters to nobody. At the usual 1e-9 m this is 1e-15 m, a few last places of a metre."""
 
+RESIDUAL = 1e3
+"""Ratio of residuals: three digits. Newton's last step may gain or lose two where a sample only just meets its tolerance."""
+
+RESIDUAL_FLOOR = 2.0**-52
+"""The last place of a metre, or of one: a smaller residual cannot be told from zero, and counts as this. So what grows from
+1e-17 to 1e-14 is nothing, and from 5e-16 to 1e-8 is a constraint that is no longer met as it was."""
+
 UNJUDGED = 1e-6
 """Of the largest value: what differs by more, where nothing judges it, is another motion. Round-off is a millionth of that."""
 

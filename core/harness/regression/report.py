@@ -12,6 +12,8 @@ from .creeping import crept
 from .findings import Finding, Kind, Regressions, Step
 from .limits import slowest
 from .loose import loose
+from .missing import missing
+from .solution import differing
 from .steps import OUTCOME, TIME, steps
 from .subject import Subject
 
@@ -19,11 +21,19 @@ RECENT = 20
 """Runs that the spread of times is taken from: what the machine is like lately."""
 
 
-def regressions(subject: Subject, against: Subject | None, reason: str, store: Store | None) -> Regressions:
+def regressions(
+    subject: Subject,
+    against: Subject | None,
+    reason: str,
+    store: Store | None,
+    *,
+    missing_is_failure: bool = False,
+) -> Regressions:
     """All that changed.
 
     Args:
         reason: why there is nothing to compare with, where there is not.
+        missing_is_failure: whether a pair that an earlier run had and this one does not is a regression.
 
     Raises:
         HistoryError: the history cannot be read.
@@ -35,7 +45,9 @@ def regressions(subject: Subject, against: Subject | None, reason: str, store: S
     if against is not None:
         then = NOTHING if against.number is None else _alike(subject, around, before=against.number + 1)
         found += compare(subject, against, then, limit)
+        found += differing(subject, against)
         found += crept(subject, around, found)
+    found += missing(subject, store, found)
     records = subject.results.records
     return Regressions(
         run=subject.label,
@@ -46,6 +58,7 @@ def regressions(subject: Subject, against: Subject | None, reason: str, store: S
         unjudged=[(record.case, record.engine, record.mode) for record in records if record.outcome is Outcome.UNJUDGED],
         unread=[*subject.results.unread],
         time_limit=limit,
+        missing_is_failure=missing_is_failure,
         findings=[_since(finding, standing) for finding in found],
         changes=changes(subject.facts, against.facts) if against else [],
         steps=standing,

@@ -11,13 +11,13 @@ from typing import TypeAlias
 import numpy as np
 
 from ...trajectory import QUANTITIES
-from ..case import Array
-from ..history.series import Entry, History, Pair, calibration
+from ..history.series import IDLE, Entry, History, Pair, calibration
 from ..history.store import RunRow
 from ..history.trends import unit_of
 from ..record import Deviation, Outcome
 from .compare import changes
 from .findings import Change, Step
+from .levels import change_points
 from .limits import DRIFT, DRIFT_FLOOR, TIME_FLOOR
 
 OUTCOME, TIME = "outcome", "time"
@@ -29,84 +29,48 @@ PACE = 1.5
 """Ratio of levels of times, at least. In 26 equal runs of 20 pairs, a quarter of a minute each, on a busy machine, the largest
 ratio of three or more successive runs to those before was 1.44; nights have less in common than minutes. One run: see `limits`."""
 
-SURE = 6.0
-"""Distance of two levels in standard errors of a median. In 24 such runs whose times were not freed of waiting, where any level is
-chance, the largest was 4.4."""
-
 _Series: TypeAlias = Sequence[tuple[Entry, float]]
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A change of level: indices into the series of the values before it and of those after it, and the levels."""
+    """A change of level: indices into the series of the values before it and of those after it, and the levels.
+
+    Attributes:
+        repaired: index of the first value of a later level that is as low as the one before; None where there is none.
+    """
 
     earlier: range
     later: range
     before: float
     now: float
+    repaired: int | None
 
 
 def steps(history: History, *, standing: bool = False) -> list[Step]:
     """The steps of all pairs, the latest first.
 
     Args:
-        standing: only the last step of a series, and only for the worse: what still holds today.
+        standing: only the last step for the worse of a series, if no later run has repaired it: what still holds today.
     """
     found: list[Step] = []
     for pair, entries in history.pairs.items():
         by_quantity: list[list[Step]] = [_outcomes(pair, entries, history), _times(pair, entries, history)]
         by_quantity += [_errors(pair, entries, history, motion) for motion in QUANTITIES]
         for each in by_quantity:
-            found += [step for step in each[-1:] if step.worse] if standing else each
+            lasting = {step.output: step for step in each if step.worse and step.repaired is None}
+            found += lasting.values() if standing else each
     return sorted(found, key=lambda step: -step.first)
 
 
-def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
-    """Indices at which the level of a series changes.
-
-    The series is halved where that brings it closest to the medians of its parts, as long as these are far enough apart: by
-    `least`, and by `SURE` standard errors. Medians and distances, not means and squares: one outlier is not a level.
-
-    Args:
-        values: shape (n,).
-        least: distance of two levels that matters.
-        lasting: how many values make a level.
-    """
-    if len(values) < 2 * lasting or np.ptp(values) < least:
-        return []
-    places = range(lasting, len(values) - lasting + 1)
-    place = min(places, key=lambda k: _spread(values[:k]) + _spread(values[k:]))
-    left, right = values[:place], values[place:]
-    distance = _distance(*sorted((left, right), key=len))
-    if distance < least or distance < SURE * _noise(left, right) * math.sqrt(1 / len(left) + 1 / len(right)):
-        return []
-    before = change_points(left, least=least, lasting=lasting)
-    return [*before, place, *(place + each for each in change_points(right, least=least, lasting=lasting))]
-
-
-def _spread(values: Array) -> float:
-    return float(np.abs(values - np.median(values)).sum())
-
-
-def _distance(shorter: Array, longer: Array) -> float:
-    """How far three quarters of the shorter part are, at least, beyond the middle of the longer: of three values, all."""
-    apart = shorter - np.median(longer)
-    return float(np.quantile(apart * np.sign(np.median(apart)), 0.25, method="lower"))
-
-
-def _noise(left: Array, right: Array) -> float:
-    """Standard error of a median, of one value: from differences of successive ones, of which a further step is only one."""
-    differences = np.abs(np.concatenate([np.diff(left), np.diff(right)]))
-    # normal: median |difference| = 0.674 * sqrt 2 standard deviations; a median's standard error is sqrt(pi / 2) of a mean's
-    return float(np.median(differences)) / 0.954 * 1.253 if differences.size else 0.0
-
-
 def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Return where a pair that was not bad became bad, or the reverse; runs that did not judge it say neither."""
+    """Return where a pair became bad, or good again. Runs that did not judge it say nothing about it."""
+    able = [entry for entry in entries if entry.outcome not in (*IDLE, Outcome.UNJUDGED)]
+    turns = [(a, b) for a, b in pairwise(able) if a.outcome.bad is not b.outcome.bad]
+    repairs = [b.run if b.outcome.bad is False else None for _, b in turns[1:]] + [None]
     return [
-        _step(pair, OUTCOME, None, a, b, history, worse=b.outcome.bad)
-        for a, b in pairwise(entry for entry in entries if entry.outcome is not Outcome.UNJUDGED)
-        if a.outcome.bad is not b.outcome.bad
+        _step(pair, OUTCOME, None, a, b, history, worse=b.outcome.bad, repaired=repaired)
+        for (a, b), repaired in zip(turns, repairs, strict=False)
     ]
 
 
@@ -128,14 +92,14 @@ def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]
 
 def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str) -> list[Step]:
     """Where the error of an output has changed; of several outputs that changed in the same run, the one that did most."""
-    largest: dict[tuple[int, bool], tuple[float, Step]] = {}
+    largest: dict[tuple[int, bool, int | None], tuple[float, Step]] = {}
     for output in dict.fromkeys(output for entry in entries for output in entry.errors):
         errors = errors_of(entries, output, motion)
         series = [(entry, math.log(size)) for (entry, _), size in zip(errors, above_floor(errors), strict=True)]
         for each in _levels(series, math.log(DRIFT), 1):
             before, now = (float(np.median([errors[k][1].max_abs for k in part])) for part in (each.earlier, each.later))
             step = _levelled(pair, motion, output, series, each, before, now, history)
-            key, size = (step.first, step.worse), abs(each.now - each.before)
+            key, size = (step.first, step.worse, step.repaired), abs(each.now - each.before)
             if key not in largest or size > largest[key][0]:
                 largest[key] = size, step
     return [step for _, step in sorted(largest.values(), key=lambda each: each[1].first)]
@@ -156,16 +120,22 @@ def above_floor(errors: Sequence[tuple[Entry, Deviation]]) -> list[float]:
 def _levels(series: _Series, least: float, lasting: int) -> Iterator[_Found]:
     values = np.array([value for _, value in series])
     places = change_points(values, least=least, lasting=lasting)
-    for before, place, after in zip([0, *places], places, [*places[1:], len(values)], strict=False):
-        levels = float(np.median(values[before:place])), float(np.median(values[place:after]))
-        yield _Found(range(before, place), range(place, after), *levels)
+    if not places:
+        return
+    parts = [range(*each) for each in pairwise([0, *places, len(values)])]
+    levels = [float(np.median(values[part.start : part.stop])) for part in parts]
+    for k, ((earlier, later), (before, now)) in enumerate(zip(pairwise(parts), pairwise(levels), strict=True), 2):
+        rest = zip(parts[k:], levels[k:], strict=True)
+        repaired = next((part.start for part, level in rest if now > before > level - least), None)
+        yield _Found(earlier, later, before, now, repaired)
 
 
 def _levelled(
     pair: Pair, quantity: str, output: str | None, series: _Series, found: _Found, before: float, now: float, history: History
 ) -> Step:
     a, b = series[found.earlier[-1]][0], series[found.later[0]][0]
-    return _step(pair, quantity, output, a, b, history, worse=now > before, before=before, now=now)
+    repaired = None if found.repaired is None else series[found.repaired][0].run
+    return _step(pair, quantity, output, a, b, history, worse=now > before, before=before, now=now, repaired=repaired)
 
 
 def _step(
@@ -179,6 +149,7 @@ def _step(
     worse: bool,
     before: float | None = None,
     now: float | None = None,
+    repaired: int | None = None,
 ) -> Step:
     case, engine, mode = pair
     run: RunRow = history.runs[b.run]
@@ -195,6 +166,7 @@ def _step(
         before=before,
         now=now,
         worse=worse,
+        repaired=repaired,
         changes=_between(engine, a, b, history),
     )
 

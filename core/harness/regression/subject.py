@@ -84,7 +84,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
             # what is not compared any more would be told of once, and never again
             row = _most(green(store, before=subject.before), lambda row: _compared(store, row, subject))
         else:
-            row = _most(_of_branch(store, branch, subject), lambda row: len(_pairs(subject) & {*row.plan}))
+            row = _most(_of_branch(store, branch, subject), lambda row: len(pairs_of(subject) & {*row.plan}))
         if row is not None:
             with store.sparing():
                 return _kept(store, row, name.replace("-", " ")), ""
@@ -129,7 +129,8 @@ def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
     return [row for row in store.runs() if fits(row)]
 
 
-def _pairs(subject: Subject) -> set[Pair]:
+def pairs_of(subject: Subject) -> set[Pair]:
+    """Return the pairs that a run was to make."""
     return {(record.case, record.engine, record.mode) for record in subject.results.records} | {*subject.results.missing}
 
 
@@ -138,7 +139,7 @@ def _compared(store: Store, row: RunRow, subject: Subject) -> int:
     outputs = {(record.case, record.engine, record.mode): {*record.errors} for record in subject.results.records}
     there = compared(store, row.id)
     shared = 0
-    for pair in _pairs(subject) & there.keys():
+    for pair in pairs_of(subject) & there.keys():
         still = outputs.get(pair)  # none at all where it was not made
         shared += 1 + sum(not still or output in still for output, _ in there[pair])
     return shared

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...errors import shortened
@@ -15,6 +15,17 @@ LONGEST = 12
 
 NAMED = 4
 """Cases that are named where a row is of several."""
+
+
+COUNTED: Mapping[Kind, str] = {
+    Kind.LOST: "with something lost",
+    Kind.GONE: "with values gone",
+    Kind.FREEDOM: "with another dof",
+    Kind.UNIT: "with another unit",
+    Kind.DRIFTED: "less accurate",
+    Kind.RESIDUAL: "with a larger residual",
+}
+"""What follows the number of pairs with a finding, where it is not the name of the kind."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +64,11 @@ def headline(found: Regressions) -> str:
         never = _counted(found, Kind.LOST)
         rest = [f"{len(found.unjudged)} not judged"] if found.unjudged else []
         rest += [f"{never} never made"] if never else []
+        absent = _counted(found, Kind.ABSENT)
+        rest += [f"{absent} {Kind.ABSENT}"] if absent else []
         rest += [unread_count(len(found.unread))] if found.unread else []
         return f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing: {found.reason}"
-    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if kind.regression and _counted(found, kind)]
+    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if found.fails(kind) and _counted(found, kind)]
     counts += [unread_count(len(found.unread))] if found.unread else []
     said = ", ".join(counts) or "nothing regressed"
     fixed = len(pairs(found, Kind.FIXED))
@@ -64,6 +77,8 @@ def headline(found: Regressions) -> str:
     rest = [f"{fixed} fixed"] if fixed else []
     rest += [f"{again} judged again"] if again else []
     rest += [f"{len(found.unjudged)} not judged"] if found.unjudged else []
+    absent = 0 if found.missing_is_failure else _counted(found, Kind.ABSENT)
+    rest += [f"{absent} {Kind.ABSENT}"] if absent else []
     rest += [f"{known} not right before either"] if known > 0 else []
     rest += [", ".join(map(str, versions(found)))] if versions(found) else []
     return "; ".join([f"{found.run.name} against {found.against.name}: {said}", *rest])
@@ -87,7 +102,7 @@ def _counted(found: Regressions, kind: Kind) -> int:
 def _plural(kind: Kind, found: Regressions) -> str:
     if kind is Kind.FAILURE:
         return "new failure" + ("s" if len(pairs(found, kind)) > 1 else "")
-    return "with something lost" if kind is Kind.LOST else "less accurate" if kind is Kind.DRIFTED else str(kind)
+    return COUNTED.get(kind, str(kind))
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
@@ -115,7 +130,9 @@ def step_says(step: Step) -> str:
     else:
         what = f"{number(step.before)} → {number(step.now)} {motion_unit(step.unit, step.quantity)}".rstrip()
     changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
-    return f"{name}: {what} since run {step.first} ({step.started[:16].replace('T', ' ')}); after run {step.last}: {changed}"
+    repaired = f", repaired in run {step.repaired}" if step.repaired is not None else ""
+    since = f"since run {step.first} ({step.started[:16].replace('T', ' ')}){repaired}"
+    return f"{name}: {what} {since}; after run {step.last}: {changed}"
 
 
 def loose_says(loose: Sequence[Loose]) -> list[str]:
