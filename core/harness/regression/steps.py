@@ -12,9 +12,8 @@ import numpy as np
 
 from ...trajectory import QUANTITIES
 from ..case import Array
-from ..history.series import Entry, History, Pair, calibration
+from ..history.series import Entry, History, Pair, calibration, unit_of
 from ..history.store import RunRow
-from ..history.trends import unit_of
 from ..record import Deviation
 from .compare import changes
 from .findings import Change, Step
