@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..core.analysis.equations.constraints import unit_near
-from ..core.harness.case import Case
-from ..core.harness.compare import size
+from ..core.harness.case import Case, size
 from ..core.joints import Kind
 from ..core.mechanism import Vector
 from ..core.trajectory import Array

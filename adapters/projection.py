@@ -17,8 +17,7 @@ from ..core.analysis.continuity import LONGEST_TURN, ROUNDING, continuous
 from ..core.analysis.start import Start, by_ways, start_of
 from ..core.drivers import Driver
 from ..core.errors import SolveError
-from ..core.harness.case import Case
-from ..core.harness.compare import size
+from ..core.harness.case import Case, size
 from ..core.joints import Joint
 from ..core.motions import Path, outwards
 from ..core.trajectory import Array, PointMotion, Trajectory, largest_found

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .analysis.solve import solve
     from .drivers import JointAngle, JointDisplacement, PointCoordinate
     from .errors import CaseError, KincheckError, MechanismError, SolveError
+    from .harness.joint_check.check_joint import check_joint
     from .joints import (
         ConstantVelocity,
         Cylindrical,
@@ -75,6 +76,7 @@ __all__ = [
     "Universal",
     "__version__",
     "assemble",
+    "check_joint",
     "find_assemblies",
     "solve",
     "solve_designs",
@@ -84,6 +86,7 @@ __all__ = [
 _ROOMS = (
     *(".errors", ".mechanism", ".drivers", ".motions", ".joints"),
     *(f".analysis.{name}" for name in ("solve", "designs", "assembly.assemble", "assembly.assemblies", "singular.continuation")),
+    ".harness.joint_check.check_joint",
 )
 
 

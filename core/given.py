@@ -1,4 +1,4 @@
-"""The numbers of a description: as Python's own, finite, and directions with a direction."""
+"""Checks of input: numbers of a description are finite Python numbers, directions have a length, arguments are real."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .errors import MechanismError
+from .errors import MechanismError, SolveError, unknown
+from .trajectory import Array
 
 SHORTEST = 1e-150
 """Of a direction: the square of a shorter one has fewer digits than others, or none."""
@@ -69,3 +70,29 @@ def held(who: str, value: Any, count: int | None, expected: str) -> tuple[Any, .
     if found is None or count not in (None, len(found)) or isinstance(value, str):
         raise MechanismError(f"{who} is {value!r}, expected {expected}")
     return found
+
+
+def require_positive(who: str, what: str, number: Any) -> None:
+    """Raise SolveError unless a number is positive and finite."""
+    if not (finite(number) and number > 0):
+        raise SolveError(f"{who}: {what} is {number!r}, expected a positive number")
+
+
+def no_such(who: str, what: str, name: str, known: Sequence[str]) -> SolveError:
+    """The error that there is nothing of a name."""
+    return SolveError(f"{who}: {unknown(what, name, known)}")
+
+
+def real(who: str, what: str, given: Any, expected: str) -> Array:
+    """Numbers as an array of their own; an imaginary part is none to be lost.
+
+    Raises:
+        SolveError: they are no real numbers.
+    """
+    try:
+        found = np.asarray(given)
+        if not np.iscomplexobj(found):
+            return np.array(found, dtype=np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise SolveError(f"{who}: {what} are {given!r}, expected numbers: {expected}")

@@ -27,7 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "trajectory": set(),
     "primitives": {"algebra"},
     "program": {"algebra", "errors", "trajectory"},
-    "given": {"errors"},
+    "given": {"errors", "trajectory"},
     "motions": {"errors", "given", "trajectory"},
     "joints": {"algebra", "errors", "given", "primitives"},
     "drivers": {"errors", "given", "joints"},
@@ -36,7 +36,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "analysis": {"given", "primitives", "program", *DESCRIPTION},
     "jet": {"algebra"},
     "harness": {"analysis", "jet", "primitives", "program", "version", *DESCRIPTION},
-    "__init__": {"analysis", "version", *DESCRIPTION},
+    "__init__": {"analysis", "harness", "version", *DESCRIPTION},
 }
 """Room of core (a module or a folder) -> the rooms it may import besides itself."""
 ROAD = "road"

@@ -22,10 +22,12 @@ from kincheck.core.analysis.structure.components import components
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.analysis.variants import solve_variants
 from kincheck.core.motions import Path, Ramp
-from kincheck.core.program import LlvmCode, LlvmExecutor, Plan, Program, Tape, absolute, before, program
+from kincheck.core.program import Plan, Program, Tape, absolute, before, program
 from kincheck.core.program.bytecode import bytecode
 from kincheck.core.program.llvm import compiled, compiler
 from kincheck.core.program.llvm import machine_code as llvm
+from kincheck.core.program.llvm.executor import LlvmExecutor
+from kincheck.core.program.llvm.machine_code import LlvmCode
 from kincheck.core.program.lowering import lowered, unrolled
 
 from .mechanisms import four_bar, mcpherson

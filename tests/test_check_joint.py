@@ -12,10 +12,9 @@ from pathlib import Path
 import kincheck.core
 import pytest
 from kincheck import adapters
-from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Universal
+from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Universal, check_joint
 from kincheck.core import primitives as p
 from kincheck.core.errors import KincheckError, MechanismError
-from kincheck.core.harness import check_joint
 from kincheck.core.harness.cli import main
 from kincheck.core.harness.joint_check.findings import Verdict
 from kincheck.core.harness.joint_check.loading import load_joint

@@ -5,10 +5,9 @@ import math
 from dataclasses import dataclass
 
 import pytest
-from kincheck.core import ConstantVelocity, InPlane, Revolute, Spherical, Translational, Universal
+from kincheck.core import ConstantVelocity, InPlane, Revolute, Spherical, Translational, Universal, check_joint
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
-from kincheck.core.harness import check_joint
 from kincheck.core.harness.joint_check.loading import load_joint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row

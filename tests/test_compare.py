@@ -8,8 +8,8 @@ import pytest
 from kincheck import cases
 from kincheck.core.drivers import PointCoordinate
 from kincheck.core.errors import CaseError
-from kincheck.core.harness.case import ORDERS, Output, Series
-from kincheck.core.harness.compare import NO_SIZE, as_numbers, describe, deviation, deviations, output_series, pace, size
+from kincheck.core.harness.case import NO_SIZE, ORDERS, Output, Series, size
+from kincheck.core.harness.compare import as_numbers, describe, deviation, deviations, output_series, pace
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.reporting.junit import to_junit
 from kincheck.core.harness.reporting.report import headline, write_report

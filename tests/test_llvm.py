@@ -19,8 +19,6 @@ from kincheck.core.analysis.sweep import sweep
 from kincheck.core.motions import Path, Ramp
 from kincheck.core.program import (
     NODES,
-    LlvmCode,
-    LlvmExecutor,
     NumpyExecutor,
     Plan,
     Tape,
@@ -34,6 +32,8 @@ from kincheck.core.program import (
     where_larger,
 )
 from kincheck.core.program.llvm import compiler, machine_code
+from kincheck.core.program.llvm.executor import LlvmExecutor
+from kincheck.core.program.llvm.machine_code import LlvmCode
 
 from .mechanisms import four_bar, mcpherson
 from .running import forget_recent

@@ -15,12 +15,12 @@ import msgspec
 import pytest
 from kincheck.core import solve
 from kincheck.core.harness.bench.ring import ring
+from kincheck.core.harness.labels import number
 from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
 from kincheck.core.harness.reporting.axis import SAMPLES
 from kincheck.core.harness.reporting.figures import SYMBOLS
 from kincheck.core.harness.reporting.measures import Past
 from kincheck.core.harness.reporting.report import headline, write_report
-from kincheck.core.harness.reporting.wording import number
 
 from .made_up import CRANK, GRID, distances, judged, record, results, series
 from .test_chain import chain

@@ -1,7 +1,7 @@
 """Names and numbers of reports in words."""
 
 import pytest
-from kincheck.core.harness.reporting.wording import number, output_label
+from kincheck.core.harness.labels import number, output_label
 
 
 def test_outputs_are_labelled_in_words() -> None:

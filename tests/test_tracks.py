@@ -15,8 +15,10 @@ from kincheck.core.analysis.request import FROM, SIGMA, TIME, Request
 from kincheck.core.analysis.route import Route
 from kincheck.core.analysis.sweep import follow
 from kincheck.core.motions import Path, Ramp
-from kincheck.core.program import NODES, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, absolute, before, program
+from kincheck.core.program import NODES, NumpyExecutor, Plan, Tape, absolute, before, program
 from kincheck.core.program.llvm.compiler import available
+from kincheck.core.program.llvm.executor import LlvmExecutor
+from kincheck.core.program.llvm.machine_code import LlvmCode
 from kincheck.core.program.llvm.plan import TOGETHER, PlanInMemory, in_order
 
 from .mechanisms import four_bar, mcpherson, slider_crank

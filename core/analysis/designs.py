@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolveError
+from ..given import no_such, real
 from ..mechanism import Mechanism
 from ..motions import Motion
 from ..trajectory import QUANTITIES, Array, PointMotion
-from .arguments import no_such, real
 from .equations.geometry import places
 from .prepare import start_notes
 from .route import recent_route

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from ..errors import SolveError
 from ..mechanism import Mechanism
-from ..program import ITERATIONS, MARGIN, Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, make_loops_ready
+from ..program import ITERATIONS, MARGIN, Executor, NumpyExecutor, Plan, Program
 from ..program.llvm.compiler import available
+from ..program.llvm.executor import LlvmExecutor
+from ..program.llvm.machine_code import LlvmCode, make_loops_ready
 from ..trajectory import QUANTITIES, Array
 from . import acceptance, prediction
 from .equations.drives import drive_numbers

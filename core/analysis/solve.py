@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import SolveError
-from ..given import finite
+from ..given import finite, no_such, real
 from ..mechanism import Mechanism
 from ..motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
-from .arguments import no_such, real
 from .equations.constraints import Style
 from .prepare import prepare
 from .request import Request

@@ -9,6 +9,9 @@ from functools import reduce
 from operator import add
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..algebra import Vec3
 from ..jet import Jet
 from ..mechanism import Mechanism, Vector
@@ -23,6 +26,11 @@ MARKER = "~"
 
 PER_TRAVEL = ".per_travel"
 """Ends the names of derivatives by wheel travel, which the reading of a case adds to its outputs."""
+
+
+NO_SIZE = 1e-3
+"""Size of a mechanism whose points all coincide, to rounding [m]."""
+_COINCIDE = 1e-12
 
 
 class Truth(StrEnum):
@@ -224,3 +232,23 @@ class Case:
     def signs(self) -> str:
         """The convention of signs of the outputs that have one, in words; what heads every table of them. Empty without."""
         return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))
+
+
+def size(case: Case) -> float:
+    """Return the largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m].
+
+    Where nothing is compared yet, all points count.
+    """
+    path = case.sweep.path
+    values, _, _ = path.drive(list(path.motions), path.times)
+    compared = case.points or [point.name for point in case.mechanism.points]
+    points = [case.mechanism.point(name).position for name in compared if not name.startswith(MARKER)]
+    points += [position for joint in case.mechanism.joints for position in joint.points_on()]
+    shift = float(np.ptp(values[~turning(case)], axis=1).max(initial=0.0))
+    extent = max(float(np.ptp(np.array(points), axis=0).max()), shift)
+    return extent if extent > _COINCIDE * float(np.abs(points).max()) else NO_SIZE
+
+
+def turning(case: Case) -> NDArray[np.bool_]:
+    """Which of the moving drivers turn, shape (drivers,)."""
+    return np.array([case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_)

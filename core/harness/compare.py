@@ -30,43 +30,20 @@ from ..errors import CaseError
 from ..jet import Jet
 from ..mechanism import Vector
 from ..trajectory import PER_TIME, QUANTITIES, Array, PointMotion, Trajectory
-from .case import MARKER, ORDERS, Case, Quantity, Series
+from .case import ORDERS, Case, Quantity, Series, size, turning
 from .record import Deviation, Deviations, OutputSeries
 
-# D of a mechanism whose points all coincide, to rounding, [m]: keeps the pace finite.
-NO_SIZE = 1e-3
-ROUNDING = 1e-12
 NO_VALUE = "has no value at"
 """What a reason says of a standard that lacks samples, which are not judged."""
 
 
 def pace(case: Case) -> float:
     """How fast the mechanism goes through itself [1/s]: see the head of this file."""
-    path, turns = case.sweep.path, _turning(case)
+    path, turns = case.sweep.path, turning(case)
     _, rates, seconds = path.drive(list(path.motions), path.times)
     extent = np.where(turns, 1.0, size(case))
     rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
     return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
-
-
-def size(case: Case) -> float:
-    """Largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m].
-
-    Where nothing is compared yet, all points count.
-    """
-    path = case.sweep.path
-    values, _, _ = path.drive(list(path.motions), path.times)
-    compared = case.points or [point.name for point in case.mechanism.points]
-    points = [case.mechanism.point(name).position for name in compared if not name.startswith(MARKER)]
-    points += [position for joint in case.mechanism.joints for position in joint.points_on()]
-    shift = float(np.ptp(values[~_turning(case)], axis=1).max(initial=0.0))
-    extent = max(float(np.ptp(np.array(points), axis=0).max()), shift)
-    return extent if extent > ROUNDING * float(np.abs(points).max()) else NO_SIZE
-
-
-def _turning(case: Case) -> NDArray[np.bool_]:
-    """Which of the moving drivers turn, shape (drivers,)."""
-    return np.array([case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_)
 
 
 def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Series:

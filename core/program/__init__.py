@@ -2,8 +2,6 @@
 
 from .elimination import Elimination
 from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
-from .llvm.executor import LlvmExecutor
-from .llvm.machine_code import LlvmCode, make_loops_ready
 from .numpy_executor import NumpyExecutor
 from .straight_line import Prepared, Program, program
 from .trace import (
@@ -28,8 +26,6 @@ __all__ = [
     "NODES",
     "Elimination",
     "Executor",
-    "LlvmCode",
-    "LlvmExecutor",
     "NumpyExecutor",
     "Parts",
     "Plan",
@@ -43,7 +39,6 @@ __all__ = [
     "before",
     "cos",
     "groups_behind",
-    "make_loops_ready",
     "maximum",
     "minimum",
     "place_of",

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SolveError
+from ...given import no_such, real, require_positive
 from ...mechanism import Mechanism
 from ...primitives.base import Pose
 from ...program import NumpyExecutor, Plan, Program, program
 from ...trajectory import Array, BodyMotion
-from ..arguments import no_such, real, require_positive
 from ..equations.constraints import Style
 from ..equations.drives import standing_drives
 from ..equations.poses import displaced, state_of

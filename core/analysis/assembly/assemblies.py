@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Quat, quat, vec
+from ...given import require_positive
 from ...mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Pose
 from ...topology import spanning_tree
 from ...trajectory import Array
-from ..arguments import require_positive
 from ..equations.constraints import Frames
 from ..equations.poses import displaced
 from .assemble import Closing, require_named, require_shapes

@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import SolveError
+from ...given import no_such, require_positive
 from ...mechanism import Mechanism
 from ...motions import Path, Ramp
 from ...trajectory import Array
-from ..arguments import no_such, require_positive
 from ..equations.constraints import Style
 from ..model import compile_model
 from ..request import Request

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor
+from ...program import Executor, NumpyExecutor
 from ...program.llvm.compiler import available
+from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.machine_code import LlvmCode
 from ...trajectory import Array
 from ..equations.constraints import Constraint, Relation
 from .element_types import HOW, QUANTITIES, WHERE, ElementType, Member, Numbering

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...algebra import quat, turned_by, vec
-from ...program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Program, Tape, program
+from ...program import Executor, NumpyExecutor, Plan, Program, Tape, program
 from ...program.llvm.compiler import available
+from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.machine_code import LlvmCode
 from ...trajectory import Array
 
 BY, TO = range(7), range(7, 11)

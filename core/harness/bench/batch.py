@@ -16,8 +16,8 @@ from ...analysis.variants import Variants, solve_variants
 from ...joints import Kind
 from ...program.llvm.compiler import available
 from ...trajectory import QUANTITIES, Array, PointMotion, Trajectory
-from ..case import Case
-from ..compare import output_series, size
+from ..case import Case, size
+from ..compare import output_series
 from .levels import MOTIONS, flops_of
 from .peak import Peak
 from .rounds import Spread, Work, take_turns

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..reporting.wording import number
+from ..labels import number
 from .diagrams import batch_diagram, size_diagram, stage_diagram
 from .engines import Bench
 from .fresh import STAGES

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...trajectory import QUANTITIES
-from ..reporting.wording import against, motion_unit, number
+from ..labels import against, motion_unit, number
 from ..run import NATIVE
 from . import cost_report as cost
 from . import levels

@@ -9,7 +9,7 @@ import msgspec
 
 from ...trajectory import QUANTITIES
 from ..case import Case
-from ..reporting.wording import motion_unit
+from ..labels import motion_unit
 from . import operations as bench_operations
 from . import roundoff as bench_roundoff
 from . import whole as bench_whole

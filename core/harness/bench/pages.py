@@ -17,11 +17,11 @@ from rich.text import Text
 
 from ...errors import KincheckError
 from .. import printing
+from ..labels import known, number
 from ..record import to_json
 from ..reporting.figures import Figure, Style
 from ..reporting.report import packed
 from ..reporting.views import Plot
-from ..reporting.wording import known, number
 from ..writing import to_standard_output, write_all
 
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...analysis.equations.geometry import kinds, places
 from ...joints import Kind
-from ..case import Case
-from ..compare import size
+from ..case import Case, size
 from ..study.sweep import sweep_designs
 from ..study.variation import Coordinate, Law, Mode, Variation
 from .batch import SCATTER, SEED

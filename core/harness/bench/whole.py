@@ -16,7 +16,7 @@ from ...mechanism import Mechanism, Vector
 from ...trajectory import QUANTITIES, Array, Trajectory
 from ..case import Case
 from ..compare import output_series
-from ..reporting.wording import motion_unit
+from ..labels import motion_unit
 
 FAR: Vector = (0.6e6, -0.7e6, 0.39e6)
 AT_DESIGN, AWAY, BACK, DIFFERENCE = "as designed", "1e6 m away", "moved back from there", "away less moved back"

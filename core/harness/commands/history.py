@@ -130,10 +130,10 @@ def _cells(store: Store, row: RunRow) -> list[str]:
 
 def _print_trends(history: History) -> None:
     from ..history.trends import largest_length, run_name
+    from ..labels import number, product
     from ..printing import columns, page
     from ..regression.steps import steps
     from ..regression.wording import step_says
-    from ..reporting.wording import number, product
 
     console = page(None)
     for (case, engine, mode), entries in history.pairs.items():

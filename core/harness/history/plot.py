@@ -9,11 +9,11 @@ from typing import Any, cast
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from ..labels import known, number
 from ..reporting.figures import Figure, Style
 from ..reporting.measures import trend_figures
 from ..reporting.report import packed
 from ..reporting.views import Plot
-from ..reporting.wording import known, number
 from ..writing import write
 from .series import History
 from .trends import trends

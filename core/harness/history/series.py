@@ -153,3 +153,9 @@ def calibration(run: RunRow | Mapping[str, Any]) -> float | None:
     facts = run.circumstances if isinstance(run, RunRow) else run
     seconds = facts.get("calibration_seconds")
     return seconds if isinstance(seconds, float) and seconds > 0 else None
+
+
+def unit_of(row: RunRow, case: str, output: str) -> str:
+    """Return the unit of an output in that run; metres where the run does not say."""
+    outputs: Mapping[str, Mapping[str, Any]] = row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
+    return outputs.get(output, {}).get("unit", "m")

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
+from ..labels import product
 from ..reporting.measures import Past
-from ..reporting.wording import product
-from .series import Entry, History
+from .series import Entry, History, unit_of
 from .store import RunRow
 
 
@@ -37,9 +34,3 @@ def largest_length(entry: Entry, case: str, row: RunRow) -> float | None:
         if deviations.position is not None and unit_of(row, case, name) == "m"
     ]
     return max(lengths, default=None)
-
-
-def unit_of(row: RunRow, case: str, output: str) -> str:
-    """The unit of an output in that run; metres where the run does not say."""
-    outputs: Mapping[str, Mapping[str, Any]] = row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
-    return outputs.get(output, {}).get("unit", "m")

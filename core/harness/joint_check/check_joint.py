@@ -1,6 +1,6 @@
 """Check a joint type: everything that can be found out about a Joint class without knowing what it is.
 
-    from kincheck.core.harness import check_joint
+    from kincheck.core import check_joint
 
     def test_my_joint():
         report = check_joint(MyJoint)

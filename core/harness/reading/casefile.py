@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import remedy
 from ...joints import Coupler, Joint, Kind
 from ...mechanism import Body, Mechanism, Point, Vector
-from ..case import PER_TRAVEL, Case, Output, Quantity, Truth
-from ..compare import size
+from ..case import PER_TRAVEL, Case, Output, Quantity, Truth, size
 from .coordinates import AXES, with_all_coordinates
 from .document import as_table, class_of, explained, fault, join, parse, read_text, shown, typed
 from .driving import read_drivers, read_sweep

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from ...mechanism import Vector
-from ..case import Case, Output
-from ..compare import size
+from ..case import Case, Output, size
 from .tolerance import default
 
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

@@ -16,8 +16,7 @@ from msgspec import Meta
 from ...algebra import vec
 from ...errors import remedy
 from ...mechanism import Mechanism, Point, Vector
-from ..case import Case, Quantity
-from ..compare import size
+from ..case import Case, Quantity, size
 from ..suspension import Axle, Convention, PerTravel, Rate, Reaction, Side, SuspensionOutput, Vehicle, own_keys
 from .document import fault, join, shown, typed
 from .reference import Convert

@@ -8,9 +8,9 @@ from typing import Any
 
 from ...trajectory import QUANTITIES
 from ..history.series import Entry, History, Pair, calibration, own_seconds
+from ..labels import UNMADE, motion_unit, number
 from ..reading.tolerance import DEFAULT_ATOL
 from ..record import Outcome, OutputSeries, Record
-from ..reporting.wording import UNMADE, motion_unit, number
 from .findings import Change, Finding, Kind
 from .limits import DRIFT, ENOUGH, SAME_SAMPLE, TIME_FLOOR, UNJUDGED, drifted
 from .subject import Subject

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...trajectory import QUANTITIES
 from ..history.series import History
-from ..reporting.wording import motion_unit, number
+from ..labels import motion_unit, number
 from .findings import Finding, Kind
 from .levels import change_points
 from .limits import DRIFT, drifted

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...trajectory import QUANTITIES
+from ..labels import number
 from ..record import Record
-from ..reporting.wording import number
 from .compare import by_pair, finding_of, same_samples, values_of
 from .findings import Finding, Kind
 from .limits import RESIDUAL, RESIDUAL_FLOOR

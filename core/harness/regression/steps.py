@@ -11,9 +11,8 @@ from typing import TypeAlias
 import numpy as np
 
 from ...trajectory import QUANTITIES
-from ..history.series import IDLE, Entry, History, Pair, calibration
+from ..history.series import IDLE, Entry, History, Pair, calibration, unit_of
 from ..history.store import RunRow
-from ..history.trends import unit_of
 from ..record import Deviation, Outcome
 from .compare import changes
 from .findings import Change, Step

@@ -8,8 +8,8 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from ..labels import product
 from ..markdown import escaped, row
-from ..reporting.wording import product
 from .findings import WHY, Kind, Regressions, Step
 from .wording import LONGEST, headline, loose_says, pairs, rows, step_says
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...errors import shortened
-from ..reporting.wording import motion_unit, number, product, unread_count
+from ..labels import motion_unit, number, product, unread_count
 from .findings import Finding, Kind, Loose, Regressions, Step
 
 LONGEST = 12

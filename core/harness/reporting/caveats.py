@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..case import Truth
+from ..labels import engine_name, notes, product
 from ..record import Outcome, Record, Results
 from .axis import SAMPLES
-from .wording import engine_name, notes, product
 
 ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
 """Outcomes of pairs that have an answer."""

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from ..labels import output_label
 from ..record import Deviation, OutputSeries
 from .axis import DISPLAY, Axis
-from .wording import output_label
 
 Figure: TypeAlias = dict[str, Any]
 Values: TypeAlias = Sequence[float | None]

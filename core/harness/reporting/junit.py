@@ -6,8 +6,8 @@ import re
 from xml.etree import ElementTree
 
 from ..compare import describe
+from ..labels import UNMADE, notes
 from ..record import Deviations, Outcome, Record, Results
-from .wording import UNMADE, notes
 
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold, not even escaped; a simulator's message may."""

@@ -9,11 +9,11 @@ from rich.text import Text
 
 from ...trajectory import QUANTITIES
 from .. import printing
+from ..labels import against, motion_unit, notes, signs, unread
 from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
-from .wording import against, motion_unit, notes, signs, unread
 
 NOT_ASKED = "–"
 

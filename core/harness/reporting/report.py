@@ -16,12 +16,12 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ...trajectory import QUANTITIES
+from ..labels import TRUTHS, against, engine_name, known, number, output_label, product, unread_count
 from ..record import Outcome, Record, Results
 from .caveats import ANSWERED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
-from .wording import TRUTHS, against, engine_name, known, number, output_label, product, unread_count
 
 NOT_JUDGED = (Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)

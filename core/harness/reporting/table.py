@@ -12,9 +12,9 @@ from rich.text import Text
 
 from ...trajectory import QUANTITIES
 from .. import printing
+from ..labels import against, motion_unit, notes, signs, unread
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
-from .wording import against, motion_unit, notes, signs, unread
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNJUDGED: "yellow", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"

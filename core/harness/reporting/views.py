@@ -8,12 +8,12 @@ from typing import Any
 
 from ...trajectory import QUANTITIES
 from ..case import Truth
+from ..labels import against, engine_name, motion_unit, number, output_label
 from ..record import Deviation, OutputSeries, Record, Results
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
 from .figures import Figure, Style, Values, band_is_thin, error_figure, output_figure
 from .measures import Effort, Past, precision_figure, trend_figures
-from .wording import against, engine_name, motion_unit, number, output_label
 
 
 @dataclass(frozen=True)

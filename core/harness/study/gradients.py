@@ -17,7 +17,7 @@ import numpy as np
 
 from ...motions import Path
 from ...trajectory import Array
-from ..compare import size
+from ..case import size
 from .study import Ready
 
 STEP = 2e-4

@@ -11,11 +11,11 @@ from typing import Any, cast
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from ..labels import known, notes, number, output_label, signs
 from ..record import Outcome, Record
 from ..reporting.axis import DISPLAY, Axis, driver_axis
 from ..reporting.figures import Figure, plain
 from ..reporting.report import packed
-from ..reporting.wording import known, notes, number, output_label, signs
 from .results import Envelope, Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent

@@ -17,8 +17,8 @@ from rich.text import Text
 
 from ...errors import KincheckError
 from .. import printing
+from ..labels import notes, number
 from ..reporting.table import print_signs
-from ..reporting.wording import notes, number
 from ..visible import cell
 from .page import effect, headline
 from .results import SweepResults

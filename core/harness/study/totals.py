@@ -8,8 +8,10 @@ from functools import cache
 import numpy as np
 
 from ...analysis.thread_cache import ThreadCache
-from ...program import Executor, LlvmCode, LlvmExecutor, NumpyExecutor, Plan, Tape, maximum, minimum, program, where_larger
+from ...program import Executor, NumpyExecutor, Plan, Tape, maximum, minimum, program, where_larger
 from ...program.llvm.compiler import available
+from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.machine_code import LlvmCode
 from ...trajectory import Array
 from .reduce import Summary
 

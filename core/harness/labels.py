@@ -1,13 +1,13 @@
-"""Numbers, units and kinds of truth in the words of the report."""
+"""Labels of numbers, units, engines and kinds of reference, for every report."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
-from ...trajectory import PER_TIME, QUANTITIES
-from ..case import PER_TRAVEL, Truth
-from ..record import Record
+from ..trajectory import PER_TIME, QUANTITIES
+from .case import PER_TRAVEL, Truth
+from .record import Record
 
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
