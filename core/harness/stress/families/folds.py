@@ -6,13 +6,17 @@ from functools import partial
 
 import numpy as np
 
-from ....motions import Motion, Table
+from ....motions import Motion, Sine
+from ..turning import turning
 from .base import Family, Rng, Specimen, as_case, power
 from .loops import Builder
 
 LARGEST, DRIVERS = 4, 3
-# A sweep goes so many times as far as the rates at design would turn something by a third to a whole radian: [powers of ten].
-FARTHER = -0.5, 0.7
+# A fold is looked for so many times as far as the rates at design would turn something by a third to a whole radian.
+FARTHER = 5.0
+# A sample stands before the fold by such a part of the way there; the next one is beyond it by a step of so many times that way:
+# [powers of ten].
+BEFORE, STEP = (-4.0, -0.3), (-1.0, 0.7)
 
 
 class Folds(Family):
@@ -21,28 +25,29 @@ class Folds(Family):
     name = "folds"
     about = (
         f"random closed mechanisms of 1 to {LARGEST} bodies, all joint types, gears and racks, 1 to {DRIVERS} drivers that move "
-        "at once, in 2 to 4 samples: half of them come to a fold, or pass near one, within a step"
+        "at once, in 2 to 4 samples: most have one 1e-4 to 0.5 of the way before a fold, and the next one far beyond it"
     )
 
     samples = 2
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """A sweep to both sides; the drivers that are not swept go through random values at both of its ends."""
+        """A sweep past the first fold, where there is one; the drivers that are not swept swing."""
         found = None
         while found is None:
             count = int(rng.integers(1, LARGEST + 1))
             found = Builder(rng, count, DRIVERS).built()
         mechanism, reach = found
-        reach *= power(rng, *FARTHER)
-        start, stop = -reach * float(rng.uniform(0.1, 1.0)), reach
+        driver, stop = mechanism.drivers[0].name, FARTHER * reach
 
-        def passing() -> Motion:
-            back, ahead = (float(each) for each in rng.uniform(-0.7, 0.7, 2) * reach)
-            return Table((start, 0.0, stop), (back, 0.0, ahead))
+        def swing() -> Motion:
+            return Sine(float(rng.uniform(-1.0, 1.0)) * reach, float(rng.uniform(0.05, 0.3)) / reach)
 
-        motions = {driver.name: passing() for driver in mechanism.drivers[1:]}
+        motions = {driver.name: swing() for driver in mechanism.drivers[1:]}
+        fold = turning(as_case(mechanism, driver, np.array([stop]), motions=motions), stop)
+        last = stop if fold is None else fold * (1.0 - power(rng, *BEFORE))
+        step = (last if fold is None else fold) * power(rng, *STEP)
         return Specimen(
             f"mechanism of {count} bodies, {len(mechanism.drivers)} drivers",
-            partial(as_case, mechanism, mechanism.drivers[0].name, np.linspace(start, stop, samples), motions=motions),
+            partial(as_case, mechanism, driver, last + step * np.arange(2.0 - samples, 2.0), motions=motions),
             facts=(("bodies", count),),
         )
