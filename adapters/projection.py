@@ -13,7 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ..core.analysis.continuity import LONGEST_TURN, ROUNDING, continued, continuous, regular_between
+from ..core.analysis.continuity import (
+    LONGEST_TURN,
+    ROUNDING,
+    continued,
+    continuous,
+    regular_between,
+)
 from ..core.drivers import Driver
 from ..core.errors import SolveError
 from ..core.harness.case import Case
@@ -32,10 +38,11 @@ EFFORTS: Mapping[str, int | None] = {"predictor only": 0, "1 Newton step": 1, "2
 SMALLEST_STEP = 2.0**-20
 # Singular values below this part of the largest count as zero: far above round-off (1e-15), far below a sound mechanism (1e-2).
 RANK_TOLERANCE = 1e-9
-# Where a singular value of the Jacobian may have been zero on the way, steps are shortened to this part of the sample distance
-# before they are believed. Beside a fold the motion turns round, and another assembly goes straight on; a motion that really
-# passes a singular pose goes on in steps as short as that. It is a few times the smallest step, so that a pose that fails there
-# can still be approached. Closer to a singular pose than the root of round-off, rounding would choose the assembly.
+# Where a singular value of the Jacobian may have been zero on the way, a step is shortened to this
+# part of the sample distance before it is believed. Beside a fold the motion turns round, and another
+# assembly goes straight on. A motion that really passes a singular pose passes it in such a step.
+# It is a few times the smallest step, so that a pose that fails there can still be approached. Closer
+# to a singular pose than the root of round-off, rounding would choose the assembly.
 FOLD = 8.0 * SMALLEST_STEP
 # Least squares have arrived where a step is this short: no more is to be gained, and what is left are rows that contradict others.
 ARRIVED = 1e-6
@@ -211,10 +218,11 @@ class Walk:
         dt = np.float64(new.t - at.t)
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
         change = dt * at.v + new.corrected
-        return bool(watched & continuous(change, new.v, at.v, dt, self.size)) and continued(change, new.v, at.v, dt)
+        everything = continuous(change, new.v, at.v, dt, self.size)
+        return bool(watched & everything) and continued(change, new.v, at.v, dt)
 
     def regular(self, at: _Sample, new: _Sample) -> bool:
-        """Return whether no singular value of the Jacobian can have been zero on the way from one pose to the other."""
+        """Return whether no singular value of the Jacobian can have been zero between two poses."""
         try:
             return regular_between(self.linear(at.jacobian, new.jacobian))
         except np.linalg.LinAlgError:

@@ -1,4 +1,4 @@
-"""Folds: steps that lead over one are refused, by every engine; and the stress family that looks for such steps."""
+"""Folds: every engine refuses steps over one, and a stress family looks for such steps."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def installed(name):
 
 @pytest.mark.parametrize("name", ["native", *SIMULATORS])
 def test_a_fold_just_after_a_sample_ends_the_motion(name):
-    """The rates beside the fold are so large that they seemed to lead to a pose of another assembly beyond it."""
+    """The rates beside the fold are so large that they seem to lead to another assembly."""
     engine, case = installed(name), load_case(BEYOND)
     found = engine.solve(engine.build(case), case, 1e-12)
     assert found.solved.tolist() == [True, True, False]
@@ -50,13 +50,14 @@ def test_the_end_of_a_stroke_is_a_fold():
     crank, rod = 0.3, 1.0
     b = (crank * np.cos(0.4), crank * np.sin(0.4))
     c = (float(b[0] + np.sqrt(rod**2 - b[1] ** 2)), 0.0)
-    case = as_case(slider_crank(any_plane(np.random.default_rng(2)), b, c, "rod", "slide"), "slide", np.array([0.1]))
+    plane = any_plane(np.random.default_rng(2))
+    case = as_case(slider_crank(plane, b, c, "rod", "slide"), "slide", np.array([0.1]))
     assert turning(case, 1.0) == pytest.approx(crank + rod - c[0], abs=1e-8)
     assert turning(case, -1.0) == pytest.approx(rod - crank - c[0], abs=1e-8)
 
 
 def test_no_simulator_steps_over_a_fold():
-    """A small part of the campaign: `kincheck stress --family folds --engine mujoco pinocchio exudyn --samples 15000`."""
+    """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples 15000`."""
     engines = [installed(name) for name in SIMULATORS]
     found, _ = stress([Family.registry["folds"]], engines, samples=60, seed=0, prove=False)
     for cell in found.cells:
@@ -95,10 +96,10 @@ def test_a_jacobian_stays_regular_where_it_changes_by_less_than_half_of_itself(r
 
 
 def test_a_step_is_compared_with_itself_and_not_with_its_rates():
-    """Beside a fold the rates are as large as one likes: half their sum over the step may be any change."""
+    """Beside a fold the rates are very large: half their sum over the step may be any change."""
     dt, before, now = 0.02, np.array([60.0]), np.array([2.0])
     assert continuous(np.array([0.49]), now, before, dt, 1.0)
     assert not continued(np.array([0.49]), now, before, dt)
     assert continued(np.array([0.49]), np.array([24.0]), np.array([25.5]), dt)
-    assert not continued(np.array([0.51]), np.array([25.5]), np.array([25.5]), dt)  # longer than anything is believed
+    assert not continued(np.array([0.51]), np.array([25.5]), np.array([25.5]), dt)  # too long
     assert continued(np.zeros(1), np.zeros(1), np.zeros(1), dt)

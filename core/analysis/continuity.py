@@ -36,8 +36,9 @@ LARGEST_RATIO = 16.0
 # 4,600 so. The third alone gives thousands of parts to a screw so fine that sigma is 0.002 everywhere. (Comparing the frames of all
 # rows of two poses, as one sign of a determinant, leaves 0.5 %: there both may turn over within a step too.)
 STEEPER, FALLS, STEEPEST = 4.0, 0.5, 4.0
-# The same question where whole Jacobians are at hand, as a simulator gives them: J may change over a step by this part of itself. At
-# one it may be singular on the straight way from one to the other; a half leaves as much again for what it does beside that way.
+# The same question where whole Jacobians are at hand, as a simulator gives them: over a step J may
+# change by this part of itself. At one, J may be singular on the straight way between both. A half
+# leaves as much again for what J does beside that way.
 LARGEST_CHANGE = 0.5
 # Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9
 # m that outputs are held to.
@@ -110,12 +111,13 @@ def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float
 def continued(change: Array, velocity: Array, velocity_before: Array, dt: float | Array) -> bool:
     """Return whether a step of all coordinates is short, and as their velocities predict it.
 
-    A pose beside a fold has rates so large that they allow any deviation: here it is compared with the step itself.
+    Beside a fold the rates are so large that they allow any deviation. So the deviation is compared
+    with the step itself.
 
     Args:
-        change: all coordinates now less coordinates before, shape (k,); angles in radians, lengths in parts of the mechanism's size.
+        change: all coordinates now less coordinates before, shape (k,) [rad, mechanism's size].
         velocity, velocity_before: their rates at both poses, same shape.
-        dt: time between the poses.
+        dt: time between the poses [s].
     """
     moved = float(np.abs(change).max(initial=0.0))
     gap = float(np.abs(change - 0.5 * dt * (velocity + velocity_before)).max(initial=0.0))
@@ -123,17 +125,19 @@ def continued(change: Array, velocity: Array, velocity_before: Array, dt: float 
 
 
 def regular_between(ratio: Array) -> bool:
-    """Return whether a Jacobian stays regular on the way from one pose to another (see LARGEST_CHANGE).
+    """Return whether a Jacobian stays regular on the way between two poses (see LARGEST_CHANGE).
 
-    With C = J_before^-1 J - I, the Jacobian is regular on the straight way from J_before to J where some norm of C is below one.
-    The norm that is asked is the smallest of all that differ by the units of the unknowns only: the largest eigenvalue of |C|
-    (Perron and Frobenius). So neither the units nor the weights of the rows matter, and each block of the rows is judged by itself.
+    Let C = J_before^-1 J - I. The Jacobian is regular on the straight way from J_before to J where
+    some norm of C is below one. The norm used is the smallest of all those that differ only by the
+    units of the unknowns: the largest eigenvalue of |C| (Perron and Frobenius). So the units do not
+    matter, nor the weights of the rows, and each block of the rows is judged by itself.
 
     Args:
-        ratio: J_before^-1 J, or the least-squares solution where there are redundant rows, shape (k, k).
+        ratio: J_before^-1 J, or the least-squares solution where there are redundant rows.
     """
     change = np.abs(ratio - np.eye(len(ratio)))
     if not change.max() < 1.0 / EPSILON:  # singular where it begins, or not finite
         return False
-    # the norm of Frobenius is never smaller, and costs less
-    return bool(np.linalg.norm(change) <= LARGEST_CHANGE or np.abs(np.linalg.eigvals(change)).max() <= LARGEST_CHANGE)
+    if np.linalg.norm(change) <= LARGEST_CHANGE:  # never smaller than that eigenvalue, and cheap
+        return True
+    return bool(np.abs(np.linalg.eigvals(change)).max() <= LARGEST_CHANGE)
