@@ -50,7 +50,7 @@ class Folds(Family):
         fold = turning(as_case(mechanism, driver, np.array([stop]), motions=motions), stop)
         last = stop if fold is None else fold * (1.0 - power(rng, *BEFORE))
         step = (last if fold is None else fold) * power(rng, *STEP)
-        values = last + step * np.arange(2.0 - samples, 2.0)
+        values = np.linspace(last - (samples - 2) * step, last + step, samples)
         return Specimen(
             f"mechanism of {count} bodies, {len(mechanism.drivers)} drivers",
             partial(as_case, mechanism, driver, values, motions=motions),
