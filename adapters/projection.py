@@ -13,7 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ..core.analysis.continuity import LONGEST_TURN, ROUNDING, continuous
+from ..core.analysis.continuity import (
+    LONGEST_TURN,
+    ROUNDING,
+    continued,
+    continuous,
+    regular_between,
+)
 from ..core.analysis.start import Start, by_ways, start_of
 from ..core.drivers import Driver
 from ..core.errors import SolveError
@@ -32,10 +38,11 @@ EFFORTS: Mapping[str, int | None] = {"predictor only": 0, "1 Newton step": 1, "2
 SMALLEST_STEP = 2.0**-20
 # Singular values below this part of the largest count as zero: far above round-off (1e-15), far below a sound mechanism (1e-2).
 RANK_TOLERANCE = 1e-9
-# Where singular values of the Jacobian pass zero, steps are shortened to this part of the sample distance before they are
-# believed: beside a fold the motion turns round, and another assembly goes straight on. Where it really passes zero they are then.
-# A few times the smallest step: a pose that fails there can still be come nearer to. Nearer than the root of round-off to where it
-# passes zero, rounding would choose the assembly.
+# Where a singular value of the Jacobian may have been zero on the way, a step is shortened to this
+# part of the sample distance before it is believed. Beside a fold the motion turns round, and another
+# assembly goes straight on. A motion that really passes a singular pose passes it in such a step.
+# It is a few times the smallest step, so that a pose that fails there can still be approached. Closer
+# to a singular pose than the root of round-off, rounding would choose the assembly.
 FOLD = 8.0 * SMALLEST_STEP
 # Least squares have arrived where a step is this short: no more is to be gained, and what is left are rows that contradict others.
 ARRIVED = 1e-6
@@ -52,7 +59,7 @@ class _Sample:
     v: Array
     a: Array
     rows: tuple[Array, Array, Array]
-    sums: Array  # of the rows, as many as unknowns and independent at design; by the unknowns
+    jacobian: Array
     corrected: Array
     iterations: int
     residual: float
@@ -109,11 +116,10 @@ class Walk:
         model.reset()
         model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
-        left, singular, _ = np.linalg.svd(jacobian)
+        singular = np.linalg.svd(jacobian, compute_uv=False)
         self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
         joints = jacobian[~np.any(model.driver_columns(), axis=1)]
         self.dof = jacobian.shape[1] - (int(np.linalg.matrix_rank(joints, tol=RANK_TOLERANCE * singular[0])) if len(joints) else 0)
-        self.independent = left[:, : self.rank].T  # sums of rows that say all
         self.square = jacobian.shape == (self.rank, self.rank)
         self.rows, self.unknowns = jacobian.shape
         if self.rank < self.unknowns:
@@ -180,8 +186,7 @@ class Walk:
             self.lost = STUCK
             return None
         position, velocity, acceleration = (np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True))
-        sums = self.independent @ jacobian
-        return _Sample(t, c, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), sums, *done)
+        return _Sample(t, c, self.model.save(), position.ravel(), v, a, (position, velocity, acceleration), jacobian, *done)
 
     def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
         """Walk a path from start to time t, halving steps that fail; (where it ended, whether that is t).
@@ -196,8 +201,8 @@ class Walk:
             self.model.restore(at.saved)
             self.model.move(dt * at.v)
             new, whole = self.solve(path, to), step or abs(t - start.t)
-            folds = new is not None and abs(dt) > FOLD * whole and passes_zero(at.sums, new.sums)
-            if new is not None and not folds and self.connected(at, new):
+            short = abs(dt) <= FOLD * whole
+            if new is not None and self.connected(at, new) and (short or self.regular(at, new)):
                 at, h = new, 2.0 * h
             else:
                 h = 0.5 * min(abs(h), abs(t - at.t)) * math.copysign(1.0, h)
@@ -214,7 +219,16 @@ class Walk:
             return False
         dt = np.float64(new.t - at.t)
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
-        return bool(watched & continuous(dt * at.v + new.corrected, new.v, at.v, dt, self.size))
+        change = dt * at.v + new.corrected
+        everything = continuous(change, new.v, at.v, dt, self.size)
+        return bool(watched & everything) and continued(change, new.v, at.v, dt)
+
+    def regular(self, at: _Sample, new: _Sample) -> bool:
+        """Return whether no singular value of the Jacobian can have been zero between two poses."""
+        try:
+            return regular_between(self.linear(at.jacobian, new.jacobian))
+        except np.linalg.LinAlgError:
+            return False
 
     def start(self, path: Path, begin: Start) -> tuple[_Sample | None, str]:
         """Return the pose the samples are reached from, and why there is none."""
@@ -273,22 +287,6 @@ class Walk:
             **details,
         }
         return Trajectory(moves, solved, iterations, largest_found(unit * residual[solved]), "; ".join(messages), facts)
-
-
-def passes_zero(before: Array, after: Array) -> bool:
-    """Whether singular values of a matrix seem to have passed zero between two states of it: one or, of equal loops, several.
-
-    What the one makes of the other is near the identity where they are near each other; then its eigenvalues are. One that has
-    passed zero is negative. An even number of them leaves the sign of the determinant as it was.
-    """
-    try:
-        change = np.linalg.solve(before, after)
-    except np.linalg.LinAlgError:
-        return True
-    if np.linalg.norm(change - np.eye(len(change))) < 1.0:  # no eigenvalue is as far from one as zero is
-        return False
-    values = np.linalg.eigvals(change)
-    return bool((-values.real >= np.abs(values.imag)).any())  # equal ones come out as pairs beside the axis
 
 
 def _met(jacobian: Array, v: Array, wanted: Array) -> bool:

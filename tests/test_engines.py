@@ -110,12 +110,13 @@ def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
     assert found.outcome is Outcome.PASS
 
 
-# Exudyn's is 2e-10 in the mechanism's own frame, and was above the default in metres
-@pytest.mark.parametrize(("name", "more"), [("pinocchio", DEFAULT_ATOL), ("exudyn", 0.1 * DEFAULT_ATOL)])
-def test_round_off_near_a_singular_pose_is_within_the_default_tolerance(name, more):
+# It is 8e-11 and 2e-10 in the mechanism's own frame, and was above the default in metres. How much
+# of it there is depends on the steps that lead to the pose.
+@pytest.mark.parametrize("name", ["pinocchio", "exudyn"])
+def test_round_off_near_a_singular_pose_is_within_the_default_tolerance(name):
     """It is a nanometre at the driver's pace, or nearly: there the end of the rod goes seven thousand times as fast."""
     case = load_case(Path(__file__).parent / "data" / "fast_loop.toml")
     _, found = run([case], [engine("native"), engine(name)], tol=1e-12).records
     worst = max((each.acceleration for each in found.errors.values()), key=lambda each: each.max_abs)
-    assert more * case.sweep.rate**2 < worst.max_abs < 1e-12 * 1855.0
+    assert 0.1 * DEFAULT_ATOL * case.sweep.rate**2 < worst.max_abs < 1e-12 * 1855.0
     assert worst.within

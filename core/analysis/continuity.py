@@ -36,6 +36,10 @@ LARGEST_RATIO = 16.0
 # 4,600 so. The third alone gives thousands of parts to a screw so fine that sigma is 0.002 everywhere. (Comparing the frames of all
 # rows of two poses, as one sign of a determinant, leaves 0.5 %: there both may turn over within a step too.)
 STEEPER, FALLS, STEEPEST = 4.0, 0.5, 4.0
+# The same question where whole Jacobians are at hand, as a simulator gives them: over a step J may
+# change by this part of itself. At one, J may be singular on the straight way between both. A half
+# leaves as much again for what J does beside that way.
+LARGEST_CHANGE = 0.5
 # Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the 1e-12 of `kincheck run` to the 1e-9
 # m that outputs are held to.
 AMPLIFIED = 1e3
@@ -102,3 +106,38 @@ def continuous(change: Array, velocity: Array, velocity_before: Array, dt: float
     deviation = np.abs(change - half * (velocity + velocity_before)).max(axis=-1)
     speed = np.abs(velocity).max(axis=-1) + np.abs(velocity_before).max(axis=-1)
     return deviation <= LARGEST_DEVIATION * 0.5 * step * speed + NEGLIGIBLE * size
+
+
+def continued(change: Array, velocity: Array, velocity_before: Array, dt: float | Array) -> bool:
+    """Return whether a step of all coordinates is short, and as their velocities predict it.
+
+    Beside a fold the rates are so large that they allow any deviation. So the deviation is compared
+    with the step itself.
+
+    Args:
+        change: all coordinates now less coordinates before, shape (k,) [rad, mechanism's size].
+        velocity, velocity_before: their rates at both poses, same shape.
+        dt: time between the poses [s].
+    """
+    moved = float(np.abs(change).max(initial=0.0))
+    gap = float(np.abs(change - 0.5 * dt * (velocity + velocity_before)).max(initial=0.0))
+    return moved <= LONGEST_STEP and gap <= LARGEST_CORRECTION * moved + NEGLIGIBLE
+
+
+def regular_between(ratio: Array) -> bool:
+    """Return whether a Jacobian stays regular on the way between two poses (see LARGEST_CHANGE).
+
+    Let C = J_before^-1 J - I. The Jacobian is regular on the straight way from J_before to J where
+    some norm of C is below one. The norm used is the smallest of all those that differ only by the
+    units of the unknowns: the largest eigenvalue of |C| (Perron and Frobenius). So the units do not
+    matter, nor the weights of the rows, and each block of the rows is judged by itself.
+
+    Args:
+        ratio: J_before^-1 J, or the least-squares solution where there are redundant rows.
+    """
+    change = np.abs(ratio - np.eye(len(ratio)))
+    if not change.max() < 1.0 / EPSILON:  # singular where it begins, or not finite
+        return False
+    if np.linalg.norm(change) <= LARGEST_CHANGE:  # never smaller than that eigenvalue, and cheap
+        return True
+    return bool(np.abs(np.linalg.eigvals(change)).max() <= LARGEST_CHANGE)

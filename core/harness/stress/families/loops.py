@@ -45,7 +45,7 @@ class Loops(Family):
         """Far enough that every second one comes to a dead centre."""
         while True:
             count = bodies(rng, LARGEST)
-            found = _Builder(rng, count).built()
+            found = Builder(rng, count).built()
             if found is not None:
                 break
         mechanism, reach = found
@@ -58,9 +58,16 @@ class Loops(Family):
         )
 
 
-class _Builder:
-    def __init__(self, rng: Rng, count: int) -> None:
-        self.rng = rng
+class Builder:
+    """Builds one mechanism at random.
+
+    Args:
+        count: of bodies.
+        most: of drivers.
+    """
+
+    def __init__(self, rng: Rng, count: int, most: int = 2) -> None:
+        self.rng, self.most = rng, most
         self.places = {GROUND: np.zeros(3)}
         self.bodies = [Body(f"b{k + 1}") for k in range(count)]
         self.joints: list[Joint] = []
@@ -78,7 +85,7 @@ class _Builder:
             before = [name for name in nearest if name == GROUND or int(name[1:]) < int(body.name[1:])]
             while not self._join(str(self.rng.choice(CARRIERS)), before[0], body.name):
                 pass
-        drivers, tries = int(self.rng.integers(1, 3)), 0
+        drivers, tries = int(self.rng.integers(1, self.most + 1)), 0
         while self.freedoms > drivers:
             if (tries := tries + 1) > 40 * len(self.bodies):
                 return None
