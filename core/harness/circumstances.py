@@ -20,6 +20,7 @@ from ..version import VERSION
 from .case import TIME, Case, Truth
 from .compare import as_numbers
 from .record import OutputSeries, Record, Results
+from .suspect import suspect
 from .waiting import waited
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -43,8 +44,12 @@ def results(
         plan: the pairs that there were to be, of a run that does not have them all.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
+    suspects = {case.name: found for case in cases if (found := suspect(case, records))}
     return Results(
-        run=known | {"engines": versions(records), **missing(plan, records)}, records=list(records), references=references(cases)
+        run=known | {"engines": versions(records), **missing(plan, records)},
+        records=list(records),
+        references=references(cases),
+        suspects=suspects,
     )
 
 

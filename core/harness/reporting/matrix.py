@@ -13,7 +13,7 @@ from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
-from .wording import against, motion_unit, notes, signs, unread
+from .wording import against, motion_unit, notes, signs, suspects, unread
 
 NOT_ASKED = "–"
 
@@ -49,6 +49,7 @@ def to_markdown(results: Results) -> str:
     lines += ["", f"{escaped(_reading(results))}."]
     lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
     lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
+    lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
         escaped(f"{outcome.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()

@@ -21,7 +21,7 @@ from .caveats import COMPARED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
-from .wording import TRUTHS, against, engine_name, known, number, output_label, product, unread_count
+from .wording import TRUTHS, against, engine_name, known, number, output_label, product, suspects, unread_count
 
 NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
@@ -75,10 +75,19 @@ def render(given: Material, changes: Markup | None = None) -> str:
         .render(
             headline=headline(given.results),
             changes=changes,
-            worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
+            worst=max(
+                ((case, case.worst) for case in cases if case.worst and case.name not in given.results.suspects),
+                key=lambda each: each[1].ratio,
+                default=None,
+            ),
             counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
             unjudged=sum(record.outcome in COMPARED and not judged([record]) for record in records),
-            problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
+            suspects=suspects(given.results),
+            problems=_grouped(
+                record
+                for record in records
+                if record.outcome in (Outcome.FAIL, *BROKEN) and not given.results.blames_reference(record)
+            ),
             not_run=_grouped(record for record in records if record.outcome in NOT_RUN),
             circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
             unread=given.results.unread,
@@ -148,6 +157,7 @@ def headline(results: Results) -> str:
             else "The one comparison is within tolerance"
         )
     said += f", {broken} could not be completed" if broken else ""
+    said += f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
     said += f"; {unread_count(unread)}" if unread else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
 
