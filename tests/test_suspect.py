@@ -75,7 +75,7 @@ def test_reversed_samples_are_told_from_another_sign_by_the_derivatives():
 
 
 def test_it_is_said_once_on_every_surface(tmp_path):
-    results, found = suspected(CHANGES["with the other sign"])
+    results, _ = suspected(CHANGES["with the other sign"])
     assert messages(results) == {}
     assert to_markdown(results).count("Suspect: crank: all 3 engines agree") == 1
     assert "Fail: crank" not in to_markdown(results)

@@ -193,6 +193,23 @@ class Series:
     possible: bool = field(default=True, kw_only=True)
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Where the reference of a case comes from, and which one it is.
+
+    Attributes:
+        citation: author, title, page or address; empty where nobody says.
+        file: name of the file that holds the reference; empty where none does.
+        sha256: digest of that file.
+        own: kincheck has made it.
+    """
+
+    citation: str
+    file: str = ""
+    sha256: str = ""
+    own: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """All that an engine needs to solve it and the harness needs to judge it. SI units throughout.
@@ -200,6 +217,7 @@ class Case:
     Attributes:
         truth: the kind of the reference; consensus_only where there is none.
         reference: true values by output name, on the grid of the sweep.
+        origin: of the reference; without, it comes from where the case does.
     """
 
     name: str
@@ -209,16 +227,12 @@ class Case:
     sweep: Sweep
     outputs: tuple[Quantity, ...]
     reference: Mapping[str, Series] = field(default_factory=dict[str, Series])
+    origin: Origin | None = None
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points that outputs read; the motion of no other is needed."""
         return tuple(dict.fromkeys(point for output in self.outputs for point in output.points))
-
-    @property
-    def notes(self) -> list[str]:
-        """What a reader of results should know of the joints' geometry; see `Joint.notes`."""
-        return [note for joint in self.mechanism.joints for note in joint.notes]
 
     @property
     def signs(self) -> str:

@@ -8,11 +8,17 @@ from collections.abc import Mapping
 import msgspec
 import numpy as np
 
-from ..trajectory import QUANTITIES
-from .case import Series
+from ..trajectory import QUANTITIES, Array
+from .case import Case, Origin, Series, Truth
 
 VALUES = "values"
 """What a digest is of where no file holds the reference."""
+IDENTICAL = (
+    "the reference is identical to native's own result in every bit, which no data of others is: no pass is called validated; "
+    "give the data of their source"
+)
+# A straight line through the samples is met by rounding, and a driven coordinate is one.
+FEWEST, STRAIGHT = 3, 1e-9
 
 
 class Evidence(msgspec.Struct, frozen=True, kw_only=True):
@@ -34,6 +40,47 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
     def sound(self) -> bool:
         """Whether agreement with it can validate: it says where it comes from, and is not kincheck's own."""
         return bool(self.citation and self.sha256) and not self.own
+
+
+def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
+    """Return the evidence that the reference of a case is; None where it has none.
+
+    Args:
+        native: outputs of the native engine, as far as they are known.
+    """
+    if not case.reference:
+        return None
+    origin = case.origin or Origin(case.source)
+    return Evidence(
+        citation=origin.citation,
+        sha256=origin.sha256 or digest(case.reference),
+        of=origin.file or VALUES,
+        own=origin.own or (case.truth is Truth.THIRD_PARTY_DATA and _identical(case, native)),
+    )
+
+
+def _identical(case: Case, native: Mapping[str, Series]) -> bool:
+    """Whether every value of the reference equals native's in every bit, of series that are neither constant nor straight."""
+    telling = False
+    for name, series in case.reference.items():
+        for quantity in QUANTITIES:
+            reference: Array | None = getattr(series, quantity)
+            if reference is None:
+                continue
+            found: Array | None = getattr(native.get(name), quantity, None)
+            known = np.isfinite(reference)
+            if found is None or found.shape != reference.shape or not np.array_equal(reference[known], found[known]):
+                return False
+            telling = telling or not _straight(case.sweep.values[known], reference[known])
+    return telling
+
+
+def _straight(x: Array, y: Array) -> bool:
+    if len(y) < FEWEST:
+        return True
+    slope = float(y[x.argmax()] - y[x.argmin()]) / (float(np.ptp(x)) or 1.0)
+    off: Array = y - slope * x
+    return float(np.ptp(off)) <= STRAIGHT * float(np.abs(y).max())
 
 
 def digest(reference: Mapping[str, Series]) -> str:

@@ -14,10 +14,11 @@ import numpy as np
 
 from ..errors import CaseError
 from .attempt import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
-from .case import Case, Series
+from .case import Case, Series, Truth
 from .circumstances import results, truth_of
 from .compare import NOTHING, as_numbers, describe, deviations
 from .engine import Engine
+from .evidence import evidence
 from .record import Deviations, Outcome, OutputSeries, Record, Results, Seconds
 
 NATIVE = "native"
@@ -154,7 +155,8 @@ def _standard_known(
     case: Case, engines: Sequence[Engine], baseline: Engine | None, made: Mapping[tuple[str, str, str], Record]
 ) -> _Standard | None:
     """What to compare with, if it is known before anything is solved."""
-    if _referenced(case):
+    # of data of others it has to be known whether they are native's own
+    if _referenced(case) and case.truth is not Truth.THIRD_PARTY_DATA:
         return _Standard({})
     native = next((engine for engine in engines if engine.name == NATIVE), None)
     if native is not None:
@@ -204,6 +206,7 @@ def _record(pair: Pair, attempt: Attempt, native: _Standard) -> Record:
         outcome=result.outcome,
         message=result.message,
         errors={output.name: nothing for output in case.outputs},
+        evidence=evidence(case, native.outputs),
         seconds=attempt.seconds,
         reasons=dict.fromkeys(UNTOLD, f"{result.outcome}: see message"),
         details={"printed": result.printed} if result.printed else {},
@@ -260,6 +263,7 @@ def _judged(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: S
         samples=samples,
         seconds=msgspec.structs.replace(seconds, compare=perf_counter() - begin),
         details=details,
+        evidence=evidence(case, found if engine.name == NATIVE else native.outputs),
     )
 
 

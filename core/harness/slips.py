@@ -95,7 +95,7 @@ def _single(held: Held, reference: Array, others: Mapping[str, Held], offsets: b
 
 
 def _pairs(held: Held, reference: Array, others: Mapping[str, Held], offsets: bool) -> Iterator[Slip]:
-    both = [(f"times -{name}", lambda x, by=factor: -by * x) for name, factor in FACTORS.items()]
+    both = [(f"times -{name}", _times(-factor)) for name, factor in FACTORS.items()]
     yield from _fitting(held, reference, both, "", constant=True)
     for words, change in _scales():
         changed = change(reference)
@@ -104,7 +104,11 @@ def _pairs(held: Held, reference: Array, others: Mapping[str, Held], offsets: bo
 
 
 def _scales() -> list[_Change]:
-    return [(OTHER_SIGN, lambda x: -x), *((f"times {name}", lambda x, by=factor: by * x) for name, factor in FACTORS.items())]
+    return [(OTHER_SIGN, _times(-1.0)), *((f"times {name}", _times(factor)) for name, factor in FACTORS.items())]
+
+
+def _times(factor: float) -> Callable[[Array], Array]:
+    return lambda x: factor * x
 
 
 def _moves(held: Held, reference: Array, offsets: bool) -> Iterator[_Change]:

@@ -16,7 +16,7 @@ from ..compare import size
 from .coordinates import AXES, with_all_coordinates
 from .document import as_table, class_of, explained, fault, join, parse, read_text, shown, typed
 from .driving import read_drivers, read_sweep
-from .reference import Convert, ReferenceKeys, is_derivative, read_reference
+from .reference import Convert, ReferenceKeys, is_derivative, read_origin, read_reference
 from .schema import (
     COORDINATE,
     SCHEMA,
@@ -73,7 +73,7 @@ def load_case(path: str | Path) -> Case:
     columns = typed(file, "reference", keys.reference, ReferenceKeys)
     convention = "" if keys.suspension is None else str(as_table(file, "suspension", keys.suspension)["convention"])
     series = read_reference(file, columns, driver_unit, by_unit, sweep.values, case.outputs, convention)
-    return replace(case, truth=keys.truth, reference=series)
+    return replace(case, truth=keys.truth, reference=series, origin=read_origin(file, columns))
 
 
 def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:

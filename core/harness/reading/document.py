@@ -5,6 +5,7 @@ Nothing is evaluated or imported from a file. Every message says: file, key, wha
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import re
@@ -104,6 +105,11 @@ def read_text(file: Path, limit: int, why_limit: str) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise fault(file, "", f"byte {error.start} is not UTF-8; save the file as UTF-8") from None
+
+
+def sha256(file: Path) -> str:
+    """The digest of a file that has been read, as `sha256sum` prints it."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def parse(file: Path, text: str) -> dict[str, Any]:

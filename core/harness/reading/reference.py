@@ -27,9 +27,9 @@ from msgspec import Meta
 
 from ...errors import remedy
 from ...trajectory import Array
-from ..case import PER_TRAVEL, Quantity, Series
+from ..case import PER_TRAVEL, Origin, Quantity, Series
 from ..references import read, series
-from .document import LARGEST, decimal, fault, read_text, shown
+from .document import LARGEST, decimal, fault, read_text, sha256, shown
 
 LARGEST_FILE = 64_000_000
 # As many samples as a sweep can have, and as many lines between them.
@@ -39,16 +39,28 @@ DERIVATIVES = (".velocity", ".acceleration")
 SAME_GRID = 1e-12
 SIGNS = re.compile(r"\s*#\s*signs:\s*(\w+)")
 
+CITATION = "a text that says where the true values come from: author, title, page or address"
+DIGEST = "sha256:"
+
 Convert: TypeAlias = Callable[[float], float]
 """From the unit of a file to SI."""
 
 
 class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs in order)."""
+    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs in order), and their source.
+
+    Attributes:
+        citation: where the true values come from; without, agreement with them validates nothing.
+        digest: of the file; one of another content is refused.
+    """
 
     file: Annotated[str, Meta(min_length=1, description="the name of a CSV file beside the case file")] | None = None
     columns: Annotated[list[str], Meta(min_length=2, description="a list of column names, the driver first")] | None = None
     rows: Annotated[list[list[float]], Meta(min_length=1, description="a list of rows of numbers")] | None = None
+    citation: Annotated[str, Meta(pattern=r"\S", description=CITATION)] | None = None
+    digest: (
+        Annotated[str, Meta(pattern=f"^{DIGEST}[0-9a-f]{{64}}$", description=f'"{DIGEST}" and 64 hexadecimal digits')] | None
+    ) = None
 
 
 @dataclass(frozen=True)
@@ -112,6 +124,26 @@ def read_reference(
         for output in outputs
         if output.name in column
     }
+
+
+def read_origin(case_file: Path, keys: ReferenceKeys) -> Origin:
+    """Where the true values come from, of a reference that has been read.
+
+    Raises:
+        CaseError: the file has another digest than the one given, or there is no file to have one.
+    """
+    citation = (keys.citation or "").strip()
+    if keys.file is None:
+        if keys.digest is not None:
+            problem = "found a digest beside rows, expected one of a file; remove it, for the rows are in the case file"
+            raise fault(case_file, "reference.digest", problem)
+        return Origin(citation)
+    file = _beside(case_file, keys.file)
+    found = sha256(file)
+    if keys.digest not in (None, DIGEST + found):
+        problem = f"found {shown(keys.digest)}, but {keys.file} has {DIGEST}{found}, expected the same"
+        raise fault(case_file, "reference.digest", f"{problem}; get the file that was meant, or give its digest")
+    return Origin(citation, keys.file, found, own=keys.file.endswith(".json"))
 
 
 def _in_si(column: Sequence[float], unit: str, units: Mapping[str, Convert]) -> Array:

@@ -21,7 +21,7 @@ from .caveats import COMPARED, caveats
 from .figures import Figure, Style
 from .measures import Effort, Past
 from .views import CaseView, Judged, Material, case_view, judged, worst
-from .wording import TRUTHS, against, engine_name, known, number, output_label, product, suspects, unread_count
+from .wording import TRUTHS, against, engine_name, known, number, output_label, product, suspects, unread_count, unsound
 
 NOT_RUN = (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
@@ -188,7 +188,7 @@ def searched(case: CaseView) -> str:
 def validation(record: Record) -> str:
     """What may be called validated, if anything."""
     if not record.validated:
-        return ""
+        return unsound(record) and f"{unsound(record)}: not validated"
     standards = {deviation.against for errors in record.errors.values() for _, deviation in errors.items()}
     whole = standards == {record.truth} and all(len(errors.items()) == len(QUANTITIES) for errors in record.errors.values())
     return "validated" if whole else "validated, positions only"

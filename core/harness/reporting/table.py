@@ -14,7 +14,7 @@ from ...trajectory import QUANTITIES
 from .. import printing
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
-from .wording import against, motion_unit, notes, signs, suspects, unread
+from .wording import against, motion_unit, notes, signs, suspects, unread, unsound
 
 COLOURS = {Outcome.PASS: "green", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
 LENGTH = "m"
@@ -68,7 +68,8 @@ def print_messages(results: Results, console: Console) -> None:
 
 def truth(record: Record) -> str:
     """What a record was judged by; the word for more than agreement is kept for truths from elsewhere that were met."""
-    return against(record.truth) + (" (validated)" if record.validated else "")
+    said = "validated" if record.validated else unsound(record)
+    return against(record.truth) + (f" ({said})" if said else "")
 
 
 def _error(record: Record, quantity: str) -> Text:

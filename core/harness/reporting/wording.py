@@ -58,6 +58,13 @@ def suspects(results: Results) -> list[tuple[str, str]]:
     return [(case, each.message) for case, each in results.suspects.items()]
 
 
+def unsound(record: Record) -> str:
+    """Why the reference cannot validate though its kind could; empty where it can, or never could."""
+    if not Truth(record.truth).validates or record.evidence is None or record.evidence.sound:
+        return ""
+    return "kincheck's own" if record.evidence.own else "uncited"
+
+
 def unread(run: Mapping[str, Any]) -> str:
     """Which cases could not be read, by the circumstances of a run; empty where all could."""
     names = run.get("unread", {})
