@@ -218,6 +218,7 @@ class Case:
         truth: the kind of the reference; consensus_only where there is none.
         reference: true values by output name, on the grid of the sweep.
         origin: of the reference; without, it comes from where the case does.
+        length_unit, angle_unit: of the numbers in the file that it was read from, by their names in `units`.
     """
 
     name: str
@@ -228,6 +229,8 @@ class Case:
     outputs: tuple[Quantity, ...]
     reference: Mapping[str, Series] = field(default_factory=dict[str, Series])
     origin: Origin | None = None
+    length_unit: str = "m"
+    angle_unit: str = "rad"
 
     @property
     def points(self) -> tuple[str, ...]:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from ..errors import Phrase
 from .case import Case
+from .sizes import size_notes
+from .units import LENGTHS
 
 
 def notes(case: Case) -> list[str]:
-    """Return the notes on a case: on lengths of rods, and on the source of its reference."""
-    return [*(note for joint in case.mechanism.joints for note in joint.notes), *_reference_notes(case)]
+    """Return the notes on a case: on lengths of rods, on sizes, and on the source of its reference; in the units of its file."""
+    written = LENGTHS[case.length_unit].written
+    joints = [note for joint in case.mechanism.joints for note in joint.notes]
+    said = [note.within(written) if isinstance(note, Phrase) else note for note in joints]
+    return [*said, *size_notes(case), *_reference_notes(case)]
 
 
 def _reference_notes(case: Case) -> list[str]:

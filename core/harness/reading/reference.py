@@ -29,6 +29,7 @@ from ...errors import remedy
 from ...trajectory import Array
 from ..case import PER_TRAVEL, Origin, Quantity, Series
 from ..references import read, series
+from ..units import Unit, plain
 from .document import LARGEST, decimal, fault, read_text, sha256, shown
 
 LARGEST_FILE = 64_000_000
@@ -65,7 +66,11 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class _Samples:
-    """Columns by name, rows with the place to name in messages, the key of all of them, and the convention that a comment names."""
+    """Columns by name, rows with the place to name in messages, the key of all of them, and the convention that a comment names.
+
+    Attributes:
+        lines: of a file of its own, for messages.
+    """
 
     file: Path
     header: str
@@ -73,6 +78,17 @@ class _Samples:
     rows: Sequence[tuple[str, Sequence[float]]]
     key: str = ""
     signs: str = ""
+    lines: Sequence[str] = ()
+
+    def driver_value(self, k: int) -> str:
+        """The driver value of a row as it is written."""
+        where, row = self.rows[k]
+        line = self.lines[int(where.removeprefix("line ")) - 1] if self.lines else ""
+        cell = line.partition(",")[0].strip().strip('"').strip()
+        with suppress(ValueError):  # inline, or of several lines
+            if decimal(cell) == row[0]:
+                return cell
+        return plain(row[0])
 
 
 def is_derivative(name: str) -> bool:
@@ -83,7 +99,7 @@ def is_derivative(name: str) -> bool:
 def read_reference(
     case_file: Path,
     keys: ReferenceKeys,
-    driver: Convert,
+    driver: Unit,
     units: Mapping[str, Convert],
     values: Array,
     outputs: Sequence[Quantity],
@@ -92,7 +108,7 @@ def read_reference(
     """True values by output name, SI.
 
     Args:
-        driver: from the unit of the driver to SI.
+        driver: the unit of the driver in the file.
         units: from the file's units to SI, by the unit there: m, rad and 1.
         values: the grid of the sweep [m or rad], shape (n,).
         outputs: those of the case.
@@ -109,7 +125,7 @@ def read_reference(
     samples = _inline(case_file, keys, outputs) if keys.file is None else _from_csv(case_file, keys)
     names = list(samples.columns[1:])
     _check_columns(samples, names, [*by_name])
-    _check_grid(samples, [driver(row[0]) for _, row in samples.rows], values)
+    _check_grid(samples, driver, values)
     if keys.file is not None:
         _check_signs(samples, convention if any(by_name[name].signs for name in names if name in by_name) else "")
     column = {name: [row[k] for _, row in samples.rows] for k, name in enumerate(names, start=1)}
@@ -188,7 +204,7 @@ def _from_csv(case_file: Path, keys: ReferenceKeys) -> _Samples:
         for cells in filter(None, reader):
             where = f"line {reader.line_num}"
             if samples is None:
-                samples = _Samples(file, where, [cell.strip() for cell in cells], rows, signs=signs)
+                samples = _Samples(file, where, [cell.strip() for cell in cells], rows, signs=signs, lines=lines)
                 continue
             _check_width(samples, where, len(cells))
             # numbers at once: the cells of a large file as texts would take many times its size
@@ -267,13 +283,13 @@ def _check_columns(samples: _Samples, names: Sequence[str], outputs: Sequence[st
             raise fault(samples.file, samples.header, problem)
 
 
-def _check_grid(samples: _Samples, found: Sequence[float], values: Array) -> None:
+def _check_grid(samples: _Samples, driver: Unit, values: Array) -> None:
     allowed = SAME_GRID * float(np.max(np.abs(values)))
     advice = "give a row for each sample of the sweep, driver values to 13 digits or more"
-    for k, ((where, _), here, there) in enumerate(zip(samples.rows, found, values.tolist(), strict=False)):
-        if abs(here - there) > allowed:
-            problem = f"driver value {here!r} of sample {k}, expected {there!r} as in the sweep (SI); {advice}"
-            raise fault(samples.file, where, problem)
-    if len(found) != len(values):
-        problem = f"found {len(found)} rows, expected {len(values)}, the steps of the sweep; {advice}"
+    for k, ((where, row), there) in enumerate(zip(samples.rows, values.tolist(), strict=False)):
+        if abs(driver(row[0]) - there) > allowed:
+            found = f"driver value {samples.driver_value(k)} {driver.name} of sample {k}"
+            raise fault(samples.file, where, f"{found}, expected {driver.written(there)} as in the sweep; {advice}")
+    if len(samples.rows) != len(values):
+        problem = f"found {len(samples.rows)} rows, expected {len(values)}, the steps of the sweep; {advice}"
         raise fault(samples.file, samples.key, problem)
