@@ -133,7 +133,6 @@ def test_few_samples_tell_nothing(taken):
     case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[taken]))
     p, v, a = exact(case)
     case = replace(case, reference={"y": Series(p[:, 1].copy(), v[:, 1].copy(), a[:, 1].copy())})
-    assert all(record.validated for record in run([case], OWN, tol=1e-12).records if record.outcome is Outcome.PASS)
     assert not any(record.evidence.own for record in run([case], OWN, tol=1e-12).records)
 
 
