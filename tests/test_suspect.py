@@ -42,7 +42,7 @@ CHANGES = {
     "times 1000": lambda name, x, _: every(x, lambda a: a / 1000.0),
     "times pi/180": lambda name, x, _: every(x, lambda a: a * 180.0 / math.pi),
     "times 25.4": lambda name, x, _: every(x, lambda a: a / 25.4),
-    "times -1000": lambda name, x, _: every(x, lambda a: -a / 1000.0),
+    "with the other sign and times 1000": lambda name, x, _: every(x, lambda a: -a / 1000.0),
     "minus 0.7 m": lambda name, x, _: Series(x.position + 0.7, x.velocity, x.acceleration),
     "shifted by one sample": lambda name, x, _: every(x, lambda a: np.roll(a, 1)[[1, *range(1, len(a))]]),
     "taken as that of output": lambda name, x, all_: all_["y" if name == "x" else "x"],
@@ -139,7 +139,7 @@ def words(values, reference, others=None):
 @pytest.mark.parametrize("name", FACTORS)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_every_factor_is_found_with_either_sign(name, sign):
-    assert words(WAVY, sign * WAVY / FACTORS[name]) == [f"times {'-' if sign < 0 else ''}{name}"]
+    assert words(WAVY, sign * WAVY / FACTORS[name]) == [f"{'with the other sign and ' if sign < 0 else ''}times {name}"]
 
 
 def test_pairs_are_tried_where_nothing_alone_fits():

@@ -95,7 +95,7 @@ def _single(held: Held, reference: Array, others: Mapping[str, Held], offsets: b
 
 
 def _pairs(held: Held, reference: Array, others: Mapping[str, Held], offsets: bool) -> Iterator[Slip]:
-    both = [(f"times -{name}", _times(-factor)) for name, factor in FACTORS.items()]
+    both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
     yield from _fitting(held, reference, both, "", constant=True)
     for words, change in _scales():
         changed = change(reference)

@@ -9,11 +9,12 @@ import numpy as np
 
 from ..errors import shortened
 from ..trajectory import PER_TIME, QUANTITIES, Array
-from .case import Case
+from .case import TIME, Case
 from .compare import deviation, pace
 from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
 from .slips import Held, Slip, slips
+from .units import ANGLES, LENGTHS, SECOND, Unit
 
 # A sentence that explains more outputs than these is not read; further ones are counted.
 MOST_EXPLAINED = 12
@@ -82,10 +83,18 @@ def _engines(engines: Sequence[str], agreed: float, worst: _Off) -> str:
 
 def _difference(case: Case, worst: _Off) -> str:
     step = worst.deviation.worst_step
-    at = f"sample {step} ({case.sweep.driver} = {float(case.sweep.values[step]):.9g})"
+    at = f"sample {step} ({case.sweep.driver} = {_unit(case).written(float(case.sweep.values[step]))})"
     off = f"{_number(worst.deviation.max_abs)} {worst.held.unit}"
     held = f"{QUANTITIES[worst.order]}, tolerance {_number(worst.deviation.tolerance)} {worst.held.unit}"
     return f"the reference differs by {off} at {at} of output {worst.output} ({held})"
+
+
+def _unit(case: Case) -> Unit:
+    """The unit of what is swept, in the file of the case."""
+    if case.sweep.driver == TIME:
+        return SECOND
+    turns = case.mechanism.driver(case.sweep.driver).turns
+    return ANGLES[case.angle_unit] if turns else LENGTHS[case.length_unit]
 
 
 def _reasons(explanations: Sequence[Explanation], left: Sequence[str]) -> str:
@@ -166,14 +175,16 @@ def _explained(case: Case, beat: float, record: Record, off: Sequence[_Off]) -> 
             all_slips = slips(each.held, each.reference, others, offsets=each.order == 0)
             fitting[each] = {slip.change: slip for slip in all_slips}
         common = [words for words in next(iter(fitting.values())) if all(words in fits for fits in fitting.values())]
+        unexplained: list[str] = []
         for quantities, changes in [([*fitting], common)] if common else [([each], [*fits]) for each, fits in fitting.items()]:
             orders = sorted(each.order for each in quantities)
             if not changes:
-                left.append(f"{name} ({', '.join(QUANTITIES[order] for order in orders)})")
+                unexplained += [QUANTITIES[order] for order in orders]
                 continue
             first = min(quantities, key=lambda each: each.order)
             key = ", or ".join(changes), tuple(QUANTITIES[order] for order in orders)
             found.setdefault(key, []).append((name, first.held.unit, fitting[first][changes[0]]))
+        left += [f"{name} ({', '.join(unexplained)})"] if unexplained else []
     left += names[MOST_EXPLAINED:]
     return [_explanation(*key, members) for key, members in found.items()], left
 

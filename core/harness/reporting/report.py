@@ -188,7 +188,7 @@ def searched(case: CaseView) -> str:
 def validation(record: Record) -> str:
     """What may be called validated, if anything."""
     if not record.validated:
-        return unsound(record) and f"{unsound(record)}: not validated"
+        return f"{said}: not validated" if record.outcome is Outcome.PASS and (said := unsound(record)) else ""
     standards = {deviation.against for errors in record.errors.values() for _, deviation in errors.items()}
     whole = standards == {record.truth} and all(len(errors.items()) == len(QUANTITIES) for errors in record.errors.values())
     return "validated" if whole else "validated, positions only"
