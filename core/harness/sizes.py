@@ -30,10 +30,11 @@ _TAKEN_FOR: dict[tuple[str, bool], str] = {
 
 @dataclass(frozen=True)
 class Range:
-    """Sizes that are probable [SI]."""
+    """Sizes that are probable [SI], and of what, where that is not said elsewhere."""
 
     least: float
     most: float
+    what: str = ""
 
     def improbable(self, size: float, unit: Unit) -> str:
         """Return the size in its unit, what was expected, and what it may be; empty where it is probable."""
@@ -43,11 +44,11 @@ class Range:
         if not math.isfinite(self.most):
             expected += " or more"
         taken = _TAKEN_FOR.get((unit.name, size < self.least), "numbers of another unit")
-        return f"{unit.written(size)}, expected {expected}: {taken}?"
+        return f"{unit.written(size)}, expected {self.what}{expected}: {taken}?"
 
 
 MECHANISMS = Range(5e-3, 100.0)
-SUSPENSIONS = Range(0.03, 10.0)
+SUSPENSIONS = Range(0.03, 10.0, "a suspension of ")
 """Those of model cars and of haulage trucks; a unit taken for another is a thousandfold mistake, or forty at least."""
 # Of the mechanism's size: strokes are some hundredths to some times as long.
 STROKES = Range(5e-4, 20.0)

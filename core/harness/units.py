@@ -35,15 +35,11 @@ class Unit:
         """
         for number in among:
             if self.convert(number) == value:
-                return self.quoted(number)
+                return f"{number!r} {self.name}"
         number = value / self.size
         decimals = (float(f"{number:.{digits}g}") for digits in range(1, DIGITS + 1))
         exact = next((each for each in decimals if self.convert(each) == value), None)
-        return f"{number:.{ROUNDED}g} {self.name}" if exact is None else self.quoted(exact)
-
-    def quoted(self, number: float) -> str:
-        """Return a number of the file with the unit."""
-        return f"{plain(number)} {self.name}"
+        return f"{number:.{ROUNDED}g} {self.name}" if exact is None else f"{plain(exact)} {self.name}"
 
 
 def plain(number: float) -> str:

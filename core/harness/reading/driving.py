@@ -51,7 +51,7 @@ def read_sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Unit, a
     """The sweep with the motions of all other drivers, and what makes SI of what is swept."""
     sweep = typed(file, "sweep", keys.sweep, SweepKeys)
     moved = {name: value["motion"] for name, value in keys.drivers.items() if value.get("motion") is not None}
-    _check(file, sweep, "driver" in keys.sweep, keys.drivers, moved)
+    _check(file, sweep, keys.sweep, keys.drivers, moved)
     motions = {name: _motion(file, mechanism, name, value, length, angle) for name, value in moved.items()}
     convert, design = SECOND, 0.0
     if sweep.driver != TIME:
@@ -64,15 +64,15 @@ def read_sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Unit, a
     return found, convert
 
 
-def _check(file: Path, sweep: SweepKeys, named: bool, drivers: Mapping[str, Any], moved: Mapping[str, Any]) -> None:
+def _check(file: Path, sweep: SweepKeys, written: Mapping[str, Any], drivers: Mapping[str, Any], moved: Mapping[str, Any]) -> None:
     """Refuse a sweep that contradicts itself or the motions."""
     if sweep.driver == TIME:
         if not moved:
-            found = f"found {shown(TIME)}" if named else "missing"
+            found = f"found {shown(TIME)}" if "driver" in written else "missing"
             problem = f"{found}, and no driver has a motion, expected something that moves"
             raise fault(file, "sweep.driver", f"{problem}; name the driver to sweep, or add [drivers.NAME.motion]")
         if sweep.rate is not None:
-            problem = f"found {plain(sweep.rate)} in a sweep of time, expected none, for the motions have rates of their own"
+            problem = f"found {written['rate']!r} in a sweep of time, expected none, for the motions have rates of their own"
             raise fault(file, "sweep.rate", f"{problem}; remove it, or name the driver to sweep")
     elif sweep.driver not in drivers:
         known = [*drivers, TIME]
@@ -84,10 +84,10 @@ def _check(file: Path, sweep: SweepKeys, named: bool, drivers: Mapping[str, Any]
     if sweep.rate == 0.0:
         raise fault(file, "sweep.rate", "found 0, expected driver units per second; give 1 to differentiate by the driver's value")
     if sweep.start == sweep.stop and sweep.steps > 1:
-        problem = f"found the start {plain(sweep.start)} again with {sweep.steps} steps, expected another value"
+        problem = f"found the start {written['start']!r} again with {sweep.steps} steps, expected another value"
         raise fault(file, "sweep.stop", f"{problem}; give steps = 1 for a single sample")
     if sweep.start != sweep.stop and sweep.steps == 1:
-        found = f"found 1 with start {plain(sweep.start)} and stop {plain(sweep.stop)}"
+        found = f"found 1 with start {written['start']!r} and stop {written['stop']!r}"
         problem = f"{found}, expected 2 or more samples, both ends among them"
         raise fault(file, "sweep.steps", f"{problem}; give more, or stop = start for a single sample")
 
@@ -116,7 +116,7 @@ def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
     slack = ROUNDED_TIME * max(abs(low), abs(high))
     if low < first - slack or high > last + slack:
         found = f"found values from {plain(first)} to {plain(last)} s"
-        problem = f"{found}, expected them for the whole sweep, {SECOND.written(low)} to {SECOND.written(high)}"
+        problem = f"{found}, expected them for the whole sweep, {low:.9g} to {high:.9g} s"
         raise fault(file, key, f"{problem}; add values, or shorten the sweep")
     with np.errstate(all="ignore"):
         finite = np.isfinite(motion.at(times)).all()

@@ -29,7 +29,7 @@ from ...errors import remedy
 from ...trajectory import Array
 from ..case import PER_TRAVEL, Origin, Quantity, Series
 from ..references import read, series
-from ..units import Unit, plain
+from ..units import Unit
 from .document import LARGEST, decimal, fault, read_text, sha256, shown
 
 LARGEST_FILE = 64_000_000
@@ -57,7 +57,7 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
 
     file: Annotated[str, Meta(min_length=1, description="the name of a CSV file beside the case file")] | None = None
     columns: Annotated[list[str], Meta(min_length=2, description="a list of column names, the driver first")] | None = None
-    rows: Annotated[list[list[float]], Meta(min_length=1, description="a list of rows of numbers")] | None = None
+    rows: Annotated[list[list[int | float]], Meta(min_length=1, description="a list of rows of numbers")] | None = None
     citation: Annotated[str, Meta(pattern=r"\S", description=CITATION)] | None = None
     digest: (
         Annotated[str, Meta(pattern=f"^{DIGEST}[0-9a-f]{{64}}$", description=f'"{DIGEST}" and 64 hexadecimal digits')] | None
@@ -88,7 +88,7 @@ class _Samples:
         with suppress(ValueError):  # inline, or of several lines
             if decimal(cell) == row[0]:
                 return cell
-        return plain(row[0])
+        return repr(row[0])
 
 
 def is_derivative(name: str) -> bool:

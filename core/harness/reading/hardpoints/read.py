@@ -139,7 +139,7 @@ def _require_left_and_upright(
             raise fault(
                 table.file,
                 named[front],
-                f"found {written(front, 0)}, not in front of {named[rear]} with {written(rear, 0)}, expected it there; {advice}",
+                f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it in front of that; {advice}",
             )
     high, low = (at[role][2] for role in (template.upper, template.lower))
     if high <= low:
@@ -147,7 +147,7 @@ def _require_left_and_upright(
             table.file,
             named[template.upper],
             f"found {written(template.upper, 2)}, not above {named[template.lower]} with {written(template.lower, 2)}, "
-            f"expected it there; {advice}",
+            f"expected it above; {advice}",
         )
 
 

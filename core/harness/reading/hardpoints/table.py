@@ -10,7 +10,7 @@ from pathlib import Path
 from ....errors import remedy
 from ....mechanism import Vector
 from ...sizes import SUSPENSIONS
-from ...units import LENGTHS, Unit
+from ...units import LENGTHS, Unit, plain
 from ..document import decimal, fault, shown, usable
 
 _UNIT_NAMES: Mapping[str, str] = {"meter": "m", "metre": "m", "in": "inch", "ft": "foot"}
@@ -96,7 +96,7 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
 def coordinate(table: HardpointTable, name: str, k: int, units: str | None, axes: str | None) -> str:
     """The coordinate of a point that became its x, y or z (0, 1, 2), as the file has it: "y = 750 mm"."""
     column = next(column for column, (axis, _) in enumerate(_axes(table, axes)) if axis == k)
-    return f"{'xyz'[column]} = {unit_of(table, units).quoted(table.points[name].position[column])}"
+    return f"{'xyz'[column]} = {plain(table.points[name].position[column])} {unit_of(table, units).name}"
 
 
 def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str | None) -> None:
