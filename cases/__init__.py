@@ -7,6 +7,7 @@ there the function VARIANT where it has one, else `motion`.
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import CaseError
-from ..core.harness.case import Case, Output, Series, Truth
+from ..core.harness.case import Case, Origin, Output, Series, Truth
 from ..core.harness.reading.casefile import load_case
 from ..core.harness.reading.document import remedy
 from .jet import Jet, Motion
@@ -57,7 +58,14 @@ def with_closed_form(case: Case, motion: Callable[..., Motion]) -> Case:
     design = motion(*(Jet(zero, zero, zero) for zero in np.zeros((len(drivers), 1))))
     coordinates = [output for output in case.outputs if isinstance(output, Output)]
     reference = {output.name: _series(output, moving, design) for output in coordinates}
-    return replace(case, truth=Truth.CLOSED_FORM, reference=reference)
+    origin = Origin(f"{_title(motion)}; {case.source}")
+    return replace(case, truth=Truth.CLOSED_FORM, reference=reference, origin=origin)
+
+
+def _title(motion: Callable[..., Motion]) -> str:
+    """What the module of a closed form says of it, in one line, and where it is."""
+    first, *_ = (sys.modules[motion.__module__].__doc__ or "").strip().splitlines()
+    return f"{' '.join(first.split()).rstrip('.')} ({motion.__module__})"
 
 
 def _series(output: Output, moving: Motion, design: Motion) -> Series:

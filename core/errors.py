@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 
 LONGEST_NAME = 200
@@ -16,15 +16,35 @@ class KincheckError(Exception):
     """Base of all errors that kincheck raises on purpose."""
 
 
+class Phrase:
+    """A text with lengths in it, which a reader of files can write in the unit of the file; as a text it has metres.
+
+    Args:
+        parts: texts, and lengths as numbers [m].
+    """
+
+    def __init__(self, *parts: str | float) -> None:
+        self.parts = parts
+
+    def __str__(self) -> str:
+        return self.within(lambda length: f"{length:.10g} m")
+
+    def within(self, written: Callable[[float], str]) -> str:
+        """Return the text with the lengths as a function writes them."""
+        return "".join(part if isinstance(part, str) else written(part) for part in self.parts)
+
+
 class MechanismError(KincheckError, ValueError):
     """The description of a mechanism does not make sense.
 
     Attributes:
+        phrase: the message.
         key: of a case file, what is to blame there ("joints.pivot.bodies"); empty where that is not known.
     """
 
-    def __init__(self, message: str, key: str = "") -> None:
-        super().__init__(message)
+    def __init__(self, message: str | Phrase, key: str = "") -> None:
+        super().__init__(str(message))
+        self.phrase = message if isinstance(message, Phrase) else Phrase(message)
         self.key = key
 
 

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any, TypeAlias
 
 from .drivers import Driver, JointDriver, PointCoordinate
-from .errors import MechanismError, unknown
+from .errors import MechanismError, Phrase, unknown
 from .given import held, require_finite, triple
 from .joints.base import Joint, Kind, unit
 from .joints.coupler import Coupler
@@ -152,8 +152,11 @@ class Mechanism:
                 )
             if (off := gap(joint)) > HOLDS:
                 raise MechanismError(
-                    f"{who}, and at the design position it is off by {off:.3g} m; correct its length, free one of them or "
-                    "remove the joint",
+                    Phrase(
+                        f"{who}, and at the design position it is off by ",
+                        float(f"{off:.3g}"),
+                        "; correct its length, free one of them or remove the joint",
+                    ),
                     f"joints.{joint.name}",
                 )
 

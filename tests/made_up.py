@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import msgspec
+from kincheck.core.harness.evidence import Evidence
 from kincheck.core.harness.record import Deviation, Deviations, Outcome, OutputSeries, Record, Results, Seconds
 
 STROKE = {"name": "stroke", "type": "point_coordinate", "point": "wheel_center", "direction": [0.0, 0.0, 1.0]}
@@ -68,6 +69,7 @@ def record(case: str, truth: str, engine: str, error: float, grid: list[float], 
         samples=len(grid),
         seconds=Seconds(build=0.125, first=0.25, warm=0.0625),
         us_per_step=12.5,
+        evidence=None if truth == "consensus_only" else Evidence(citation="A. Uthor: Struts", sha256=64 * "a", of="strut.csv"),
     )
     return msgspec.structs.replace(made, **changes)
 

@@ -116,7 +116,7 @@ BROKEN = {
     ),
     "rows off the grid": (
         ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [0.02, 1], [0.1, 1]]\n[outputs.tip_x]"),
-        ["reference.rows[1]", "0.02", "sample 1", "expected 0.0"],
+        ["reference.rows[1]", "0.02", "sample 1", "expected 0 m"],
     ),
 }
 

@@ -95,7 +95,7 @@ def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(tmp_p
     assert results.run["cases"]["rod"]["notes"] == [note] * told
     assert (f"note: rod: {note}\n" in capsys.readouterr().out) is told
     assert ("Note: rod: joint 'rod'" in (tmp_path / "rod.md").read_text()) is told
-    assert ("Geometry of rod" in dict(caveats(results))) is told
+    assert ("Note on rod" in dict(caveats(results))) is told
     suite = ET.fromstring(to_junit(results)).find("testsuite")
     assert suite is not None
     assert suite.findtext("system-out") == (f"note: {note}" if told else None)

@@ -110,7 +110,7 @@ TABLE_FAULTS = {
     "mirrored": (
         (),
         Supplied(WISHBONE, "mm", "rearward,left,up"),
-        ["wheel_center", "y = -0.76 m", "expected the left side", "--axes"],
+        ["wheel_center", "y = -760", "expected the left side", "--axes"],
     ),
     "backwards": ((), Supplied(WISHBONE, "mm", "forward,right,up"), ["uca_front", "uca_rear", "in front of that", "--axes"]),
     "upside down": ((), Supplied(WISHBONE, "mm", "rearward,right,down"), ["uca_outer", "lca_outer", "expected it above"]),

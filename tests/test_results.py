@@ -25,7 +25,7 @@ def test_json_has_the_keys_of_the_schema_and_every_digit():
     )
     text = to_json(results)
     read = json.loads(text)
-    assert list(read) == ["schema", "run", "records", "references", "scenes"]
+    assert list(read) == ["schema", "run", "records", "references", "scenes", "suspects"]
     assert read["schema"] == "kincheck-results/1"
     assert {"kincheck", "python", "numpy", "engines", "platform", "processor", "started", "tol", "command"} <= set(read["run"])
     assert read["run"]["engines"] == {"fake": "1.2", "partial": "1.2", "missing": None}

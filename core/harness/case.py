@@ -201,6 +201,23 @@ class Series:
     possible: bool = field(default=True, kw_only=True)
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Where the reference of a case comes from, and which one it is.
+
+    Attributes:
+        citation: author, title, page or address; empty where nobody says.
+        file: name of the file that holds the reference; empty where none does.
+        sha256: digest of that file.
+        own: kincheck has made it.
+    """
+
+    citation: str
+    file: str = ""
+    sha256: str = ""
+    own: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """All that an engine needs to solve it and the harness needs to judge it. SI units throughout.
@@ -208,6 +225,8 @@ class Case:
     Attributes:
         truth: the kind of the reference; consensus_only where there is none.
         reference: true values by output name, on the grid of the sweep.
+        origin: of the reference; without, it comes from where the case does.
+        length_unit, angle_unit: of the numbers in the file that it was read from, by their names in `units`.
     """
 
     name: str
@@ -217,16 +236,14 @@ class Case:
     sweep: Sweep
     outputs: tuple[Quantity, ...]
     reference: Mapping[str, Series] = field(default_factory=dict[str, Series])
+    origin: Origin | None = None
+    length_unit: str = "m"
+    angle_unit: str = "rad"
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points that outputs read; the motion of no other is needed."""
         return tuple(dict.fromkeys(point for output in self.outputs for point in output.points))
-
-    @property
-    def notes(self) -> list[str]:
-        """What a reader of results should know of the joints' geometry; see `Joint.notes`."""
-        return [note for joint in self.mechanism.joints for note in joint.notes]
 
     @property
     def signs(self) -> str:

@@ -19,7 +19,10 @@ from ..motions import Absolute, Motion
 from ..version import VERSION
 from .case import TIME, Case, Truth
 from .compare import as_numbers
+from .evidence import IDENTICAL
+from .notes import notes
 from .record import OutputSeries, Record, Results
+from .suspect import suspect
 from .waiting import waited
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -43,9 +46,25 @@ def results(
         plan: the pairs that there were to be, of a run that does not have them all.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
-    return Results(
-        run=known | {"engines": versions(records), **missing(plan, records)}, records=list(records), references=references(cases)
+    known["cases"] = _with_identical(
+        known["cases"], records, [case.name for case in cases if not (case.origin and case.origin.own)]
     )
+    suspects = {case.name: found for case in cases if (found := suspect(case, records))}
+    return Results(
+        run=known | {"engines": versions(records), **missing(plan, records)},
+        records=list(records),
+        references=references(cases),
+        suspects=suspects,
+    )
+
+
+def _with_identical(cases: Mapping[str, Any], records: Sequence[Record], of_others: Sequence[str]) -> dict[str, Any]:
+    """The facts of the cases, with a note on each whose reference has turned out to be native's own result."""
+    own = {record.case for record in records if record.evidence and record.evidence.own and record.case in of_others}
+    return {
+        name: {**facts, "notes": [*dict.fromkeys((*facts["notes"], IDENTICAL))]} if name in own else facts
+        for name, facts in cases.items()
+    }
 
 
 def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, command: str) -> dict[str, Any]:
@@ -154,7 +173,7 @@ def _facts(case: Case) -> dict[str, Any]:
         "driver": swept,
         "motions": {name: _driver(case, name) | {"motion": _motion(motion)} for name, motion in sweep.motions.items()},
         "signs": case.signs,
-        "notes": case.notes,
+        "notes": notes(case),
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
     }
 

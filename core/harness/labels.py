@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from ..trajectory import PER_TIME, QUANTITIES
 from .case import PER_TRAVEL, Truth
-from .record import Record
+from .record import Record, Results
 
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
@@ -51,6 +51,18 @@ def signs(run: Mapping[str, Any]) -> list[str]:
 def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Cases and what is to be known of their geometry, by the circumstances of a run."""
     return [(case, note) for case, facts in run.get("cases", {}).items() for note in facts.get("notes", ())]
+
+
+def suspects(results: Results) -> list[tuple[str, str]]:
+    """Cases whose reference is to be suspected, and why."""
+    return [(case, each.message) for case, each in results.suspects.items()]
+
+
+def unsound(record: Record) -> str:
+    """Why the reference cannot validate though its kind could; empty where it can, or never could."""
+    if not Truth(record.truth).validates or record.evidence is None or record.evidence.sound:
+        return ""
+    return "kincheck's own" if record.evidence.own else "uncited"
 
 
 def unread(run: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ import msgspec
 
 from ..trajectory import QUANTITIES
 from .case import Truth
+from .evidence import Evidence, Suspect
 
 
 class Outcome(StrEnum):
@@ -138,6 +139,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: how many samples were reached, out of how many.
         us_per_step: warm solve by sample [us]; null unless all samples were reached.
+        evidence: of the reference that it was judged against; null where there is none, and in records of before.
         reasons: why a number is null, by its key: residual_max, rank, dof, iterations, us_per_step. Records of before have none.
     """
 
@@ -163,15 +165,18 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     us_per_step: float | None = None
     reasons: dict[str, str] = {}
     details: dict[str, Any] = {}
+    evidence: Evidence | None = None
 
     @property
     def validated(self) -> bool:
-        """Whether it passed, and every output was judged against a truth that nobody here made."""
+        """Whether it passed, and every output was judged against a truth that nobody here made and whose source is cited."""
         judged = [deviations.position for deviations in self.errors.values()]
         return (
             self.outcome is Outcome.PASS
             and bool(judged)
             and Truth(self.truth).validates
+            and self.evidence is not None
+            and self.evidence.sound
             and all(each is not None and each.against == self.truth for each in judged)
         )
 
@@ -246,6 +251,7 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
         records: one per (case, engine) pair.
         references: the true values of each case that has any, by case and output.
         scenes: the mechanism of each case, by case; a run made without them has none.
+        suspects: cases whose engines agree with each other and not with the reference, by name.
     """
 
     schema: Literal["kincheck-results/1"] = "kincheck-results/1"
@@ -253,6 +259,12 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
     records: list[Record]
     references: dict[str, dict[str, OutputSeries]] = {}
     scenes: dict[str, Scene] = {}
+    suspects: dict[str, Suspect] = {}
+
+    def blames_reference(self, record: Record) -> bool:
+        """Whether a failure is told by what is said of its case's reference, and not by its own message."""
+        whole = record.solved == record.samples and not any(each.lost for each in record.errors.values())
+        return record.case in self.suspects and record.outcome is Outcome.FAIL and whole
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:

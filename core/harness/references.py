@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 
 from ..trajectory import QUANTITIES, Array
-from .case import Case, Quantity, Series, Truth
-from .reading.document import fault, read_text, shown
+from .case import Case, Origin, Quantity, Series, Truth
+from .reading.document import fault, read_text, sha256, shown
 
 LARGEST_FILE = 256_000_000
 # Twelve digits of a driver value, as for reference tables: what is off by less moves no output by as much as a tolerance.
@@ -170,5 +170,6 @@ def judged_by(cases: Sequence[Case], files: Sequence[Path], unused: list[str] | 
             continue
         case = found[proved.case]
         truth = series(file, proved, case.sweep.values, case.outputs)
-        found[case.name] = replace(case, truth=Truth.IN_HOUSE_ORACLE, reference=truth)
+        origin = Origin(f"proved by kincheck {proved.kincheck}", file.name, sha256(file), own=True)
+        found[case.name] = replace(case, truth=Truth.IN_HOUSE_ORACLE, reference=truth, origin=origin)
     return list(found.values())

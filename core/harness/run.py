@@ -13,10 +13,11 @@ import msgspec
 
 from ..errors import CaseError
 from .attempt import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
-from .case import Case
+from .case import Case, Truth
 from .circumstances import results, truth_of
 from .compare import as_numbers
 from .engine import Engine
+from .evidence import Evidence, evidence
 from .record import Deviations, Outcome, Record, Results, Seconds
 from .standard import NATIVE, Standard, has_everything, standard_of
 from .verdict import Verdict, judged, promised
@@ -151,7 +152,8 @@ def _standard_known(
     case: Case, engines: Sequence[Engine], baseline: Engine | None, made: Mapping[tuple[str, str, str], Record]
 ) -> Standard | None:
     """What to compare with, if it is known before anything is solved."""
-    if has_everything(case):
+    # of data of others it has to be known whether they are native's own
+    if has_everything(case) and case.truth is not Truth.THIRD_PARTY_DATA:
         return Standard({})
     native = next((engine for engine in engines if engine.name == NATIVE), None)
     if native is not None:
@@ -171,7 +173,9 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
         tol = promised(engine, pair.tol) if residuals else math.inf
         try:
             verdict = judged(case, result, native, tol)
-            return _answered(case, engine, facts, result, attempt.seconds or Seconds(), verdict)
+            found = result.outputs if engine.name == NATIVE else native.outputs
+            own = evidence(case, found)
+            return _answered(case, engine, facts, result, attempt.seconds or Seconds(), verdict, own)
         except Exception as error:  # a reference that does not fit, for one
             result = Failure(Outcome.ERROR, said(error))
     nothing = Deviations(position=None, velocity=None, acceleration=None, reason=f"{result.outcome}: {result.message}")
@@ -182,13 +186,16 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
         outcome=result.outcome,
         message=result.message,
         errors={output.name: nothing for output in case.outputs},
+        evidence=evidence(case, native.outputs),
         seconds=attempt.seconds,
         reasons=dict.fromkeys(UNTOLD, f"{result.outcome}: see message"),
         details={"printed": result.printed} if result.printed else {},
     )
 
 
-def _answered(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: Seconds, verdict: Verdict) -> Record:
+def _answered(
+    case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: Seconds, verdict: Verdict, own: Evidence | None
+) -> Record:
     """Return the record of an answer."""
     solved, samples = answer.solved, len(case.sweep.values)
     details = dict(answer.details)
@@ -216,6 +223,7 @@ def _answered(case: Case, engine: Engine, facts: Facts, answer: Answer, seconds:
         samples=samples,
         seconds=msgspec.structs.replace(seconds, compare=verdict.seconds),
         details=details,
+        evidence=own,
     )
 
 

@@ -16,7 +16,7 @@ from inspect import get_annotations
 from typing import Any, ClassVar, Self
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
-from ..errors import MechanismError
+from ..errors import MechanismError, Phrase
 from ..given import held, plain, require_direction, require_finite, triple
 from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
@@ -209,7 +209,7 @@ class Joint(ABC):
         return other
 
     @property
-    def notes(self) -> Sequence[str]:
+    def notes(self) -> Sequence[str | Phrase]:
         """What a reader of results should know of its geometry: where it can be meant, and yet be a mistake."""
         return ()
 

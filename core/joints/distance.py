@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from .. import primitives as p
 from ..algebra import root, vec
-from ..errors import MechanismError
+from ..errors import MechanismError, Phrase
 from .base import Attachment, Joint, length, positions
 
 # A length that differs from the design distance by less, relatively, moves no output beyond its tolerance, unless one is given.
@@ -30,8 +30,13 @@ class Distance(Joint):
             raise MechanismError(f"{self}: the points coincide at design, expected two places; use a spherical joint")
         if not self.rod_length > 0.0:
             raise MechanismError(
-                f"{self}: length is {self.rod_length:.10g} m, expected a positive one; the points are "
-                f"{self.design_distance:.10g} m apart at design, which is the length where none is given"
+                Phrase(
+                    f"{self}: length is ",
+                    self.rod_length,
+                    ", expected a positive one; the points are ",
+                    self.design_distance,
+                    " apart at design, which is the length where none is given",
+                )
             )
 
     @property
@@ -45,12 +50,12 @@ class Distance(Joint):
         return self.design_distance if self.length is None else self.length
 
     @property
-    def notes(self) -> Sequence[str]:
+    def notes(self) -> Sequence[str | Phrase]:
         found, apart = self.rod_length, self.design_distance
         if abs(found - apart) <= NOTED * apart:
             return ()
         how = "assembled from there, so the design position is another than the given one"
-        return (f"{self}: length {found:.10g} m, points {apart:.10g} m apart at design: {how}",)
+        return (Phrase(f"{self}: length ", found, ", points ", apart, f" apart at design: {how}"),)
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P_i, P_j = (vec(point) for point in self.points)

@@ -237,13 +237,14 @@ def _solved(options: argparse.Namespace, plan: _Plan) -> tuple[Results, list[str
 def _explained(cases: Sequence[Case]) -> Iterator[str]:
     """What the native engine computes for each case, or why nothing, and what is to be known of its geometry."""
     from ..explain import explain
+    from ..notes import notes
 
     for case in cases:
         try:
             yield from explain(case)
         except SolveError as error:  # of this case alone: its records are there, and say it too
             yield f"{case.name}: nothing is computed: {error}"
-        yield from (f"  note: {note}" for note in case.notes)
+        yield from (f"  note: {note}" for note in notes(case))
 
 
 def _return_cases(options: argparse.Namespace, house: House) -> None:

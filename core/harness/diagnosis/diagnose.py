@@ -12,6 +12,7 @@ from ...analysis.equations.geometry import places
 from ...errors import SolveError, shortened
 from ..case import MARKER, ORDERS, Case
 from ..explain import explain
+from ..notes import notes
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
 SCHEMA = "kincheck-explain/1"
@@ -125,7 +126,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         schema=SCHEMA,
         case=case.name,
         findings=findings,
-        notes=case.notes,
+        notes=notes(case),
         freedom=freedom,
         components=ranks.components,
         redundant=ranks.dependencies,

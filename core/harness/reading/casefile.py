@@ -12,10 +12,11 @@ from ...errors import remedy
 from ...joints import Coupler, Joint, Kind
 from ...mechanism import Body, Mechanism, Point, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, Truth, size
+from ..units import ANGLES, LENGTHS, Unit
 from .coordinates import AXES, with_all_coordinates
 from .document import as_table, class_of, explained, fault, join, parse, read_text, shown, typed
 from .driving import read_drivers, read_sweep
-from .reference import Convert, ReferenceKeys, is_derivative, read_reference
+from .reference import Convert, ReferenceKeys, is_derivative, read_origin, read_reference
 from .schema import (
     COORDINATE,
     SCHEMA,
@@ -38,9 +39,6 @@ LARGEST_FILE = 4_000_000
 MOST_PARTS = 60_000
 _PARTS = ("bodies", "joints", "points", "drivers", "outputs")
 
-LENGTHS: Mapping[str, Convert] = {"m": float, "mm": lambda x: x / 1000.0}
-ANGLES: Mapping[str, Convert] = {"rad": float, "deg": math.radians}
-
 
 def load_case(path: str | Path) -> Case:
     """The case in a file, in SI units. Without a [reference] it is consensus_only, whatever it claims.
@@ -62,7 +60,8 @@ def load_case(path: str | Path) -> Case:
     mechanism = _mechanism(file, keys, length)
     sweep, driver_unit = read_sweep(file, keys, mechanism, length, angle)
     by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float}
-    case = _with_outputs(file, keys, Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()), by_unit)
+    case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    case = _with_outputs(file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit)
     if keys.reference is None:
         return case
     if keys.truth in (None, Truth.CONSENSUS_ONLY):
@@ -72,7 +71,7 @@ def load_case(path: str | Path) -> Case:
     columns = typed(file, "reference", keys.reference, ReferenceKeys)
     convention = "" if keys.suspension is None else str(as_table(file, "suspension", keys.suspension)["convention"])
     series = read_reference(file, columns, driver_unit, by_unit, sweep.values, case.outputs, convention)
-    return replace(case, truth=keys.truth, reference=series)
+    return replace(case, truth=keys.truth, reference=series, origin=read_origin(file, columns))
 
 
 def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:
@@ -90,7 +89,7 @@ def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:
             return value
 
 
-def _mechanism(file: Path, keys: CaseKeys, length: Convert) -> Mechanism:
+def _mechanism(file: Path, keys: CaseKeys, length: Unit) -> Mechanism:
     bodies: list[Body] = []
     for name, value in keys.bodies.items():
         body = typed(file, key := join("bodies", name), value, BodyKeys)
@@ -104,15 +103,15 @@ def _mechanism(file: Path, keys: CaseKeys, length: Convert) -> Mechanism:
     joints = [each for each in joined if isinstance(each, Joint)]
     couplers = [each for each in joined if isinstance(each, Coupler)]
     drivers = read_drivers(file, keys.drivers)
-    with explained(file):
+    with explained(file, "", length):
         return Mechanism(keys.name, bodies, joints, points, drivers, couplers)
 
 
-def _joint(file: Path, key: str, name: str, value: object, length: Convert) -> Joint | Coupler:
+def _joint(file: Path, key: str, name: str, value: object, length: Unit) -> Joint | Coupler:
     cls = class_of(file, key, "joint", value, Joint.registry | Coupler.registry)
     keys: Any = typed(file, key, value, joint_keys(cls))
     given = {each.name: _scaled(kind_of(each), getattr(keys, each.name), length) for each in own_fields(cls)}
-    with explained(file, key):
+    with explained(file, key, length, value):
         return cls(name, keys.joints, **given) if issubclass(cls, Coupler) else cls(name, *keys.bodies, **given)
 
 
@@ -122,7 +121,7 @@ def _unit(direction: Vector) -> Vector:
     return x / length, y / length, z / length
 
 
-def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Convert]) -> Case:
+def _with_outputs(file: Path, keys: CaseKeys, case: Case, length: Unit, units: Mapping[str, Convert]) -> Case:
     """The case with its outputs, and with the points that they need beyond those of the file."""
     mechanism = case.mechanism
     if not keys.points:
@@ -132,7 +131,7 @@ def _with_outputs(file: Path, keys: CaseKeys, case: Case, units: Mapping[str, Co
         return replace(case, outputs=outputs) if outputs else with_all_coordinates(case)
     from . import suspension  # many classes, and few cases have a wheel
 
-    table = suspension.read_suspension(file, keys.suspension, mechanism, units["m"], units["rad"])
+    table = suspension.read_suspension(file, keys.suspension, mechanism, length, units["rad"])
     outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=suspension.with_markers(mechanism, outputs), outputs=outputs)
     return replace(case, outputs=suspension.with_slopes(outputs, size(case))) if table.per_travel else case

@@ -5,13 +5,14 @@ Nothing is evaluated or imported from a file. Every message says: file, key, wha
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -20,6 +21,7 @@ from typing import Annotated, Any, TypeAlias, TypeVar, cast, get_args, get_origi
 import msgspec
 
 from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar
+from ..units import METRE, Unit
 from ..visible import visible
 
 # Numbers are squared and multiplied on the way: within these bounds that neither overflows nor underflows.
@@ -53,12 +55,29 @@ def fault(file: Path, key: str, problem: str) -> CaseError:
 
 
 @contextmanager
-def explained(file: Path, key: str = "") -> Generator[None]:
-    """What a description refuses becomes an error of the file, at the key that it names, or else at the one given."""
+def explained(file: Path, key: str = "", length: Unit = METRE, given: object = None) -> Generator[None]:
+    """What a description refuses becomes an error of the file, at the key that it names, or else at the one given.
+
+    Args:
+        length: the file's unit; the message has lengths in it, and as the file has them.
+        given: the table of the file whose numbers the message may be about.
+    """
     try:
         yield
     except MechanismError as error:
-        raise fault(file, error.key or key, str(error)) from None
+        among = [*_numbers(given)]
+        raise fault(file, error.key or key, error.phrase.within(lambda value: length.written(value, among))) from None
+
+
+def _numbers(value: object) -> Iterator[float]:
+    """All numbers in a value of a file."""
+    waiting: list[Any] = [value]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, dict | list | tuple):
+            waiting += cast("dict[str, Any]", each).values() if isinstance(each, dict) else cast("Sequence[Any]", each)
+        elif isinstance(each, int | float):
+            yield each
 
 
 def shown(value: object) -> str:
@@ -104,6 +123,11 @@ def read_text(file: Path, limit: int, why_limit: str) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise fault(file, "", f"byte {error.start} is not UTF-8; save the file as UTF-8") from None
+
+
+def sha256(file: Path) -> str:
+    """The digest of a file that has been read, as `sha256sum` prints it."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def parse(file: Path, text: str) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from ...mechanism import Mechanism
 from ...motions import ROUNDED_TIME, Absolute, Measure, Motion
 from ...trajectory import Array
 from ..case import TIME, Sweep
+from ..units import SECOND, Unit, plain
 from .document import class_of, explained, fault, join, shown, typed
 from .reference import Convert
 from .schema import CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
@@ -44,13 +45,13 @@ def _driver(file: Path, key: str, name: str, value: object) -> Driver:
         return cls(name, **{each.name: keys[each.name] for each in own_fields(cls)})
 
 
-def read_sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Convert, angle: Convert) -> tuple[Sweep, Convert]:
+def read_sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Unit, angle: Unit) -> tuple[Sweep, Unit]:
     """The sweep with the motions of all other drivers, and what makes SI of what is swept."""
     sweep = typed(file, "sweep", keys.sweep, SweepKeys)
     moved = {name: value["motion"] for name, value in keys.drivers.items() if value.get("motion") is not None}
-    _check(file, sweep, "driver" in keys.sweep, keys.drivers, moved)
+    _check(file, sweep, keys.sweep, keys.drivers, moved)
     motions = {name: _motion(file, mechanism, name, value, length, angle) for name, value in moved.items()}
-    convert, design = float, 0.0
+    convert, design = SECOND, 0.0
     if sweep.driver != TIME:
         driver = mechanism.driver(sweep.driver)
         convert, design = _unit(driver, length, angle), mechanism.design_value(sweep.driver)
@@ -61,15 +62,15 @@ def read_sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Convert
     return found, convert
 
 
-def _check(file: Path, sweep: SweepKeys, named: bool, drivers: Mapping[str, Any], moved: Mapping[str, Any]) -> None:
+def _check(file: Path, sweep: SweepKeys, written: Mapping[str, Any], drivers: Mapping[str, Any], moved: Mapping[str, Any]) -> None:
     """Refuse a sweep that contradicts itself or the motions."""
     if sweep.driver == TIME:
         if not moved:
-            found = f"found {shown(TIME)}" if named else "missing"
+            found = f"found {shown(TIME)}" if "driver" in written else "missing"
             problem = f"{found}, and no driver has a motion, expected something that moves"
             raise fault(file, "sweep.driver", f"{problem}; name the driver to sweep, or add [drivers.NAME.motion]")
         if sweep.rate is not None:
-            problem = f"found {sweep.rate!r} in a sweep of time, expected none, for the motions have rates of their own"
+            problem = f"found {written['rate']!r} in a sweep of time, expected none, for the motions have rates of their own"
             raise fault(file, "sweep.rate", f"{problem}; remove it, or name the driver to sweep")
     elif sweep.driver not in drivers:
         known = [*drivers, TIME]
@@ -81,14 +82,15 @@ def _check(file: Path, sweep: SweepKeys, named: bool, drivers: Mapping[str, Any]
     if sweep.rate == 0.0:
         raise fault(file, "sweep.rate", "found 0, expected driver units per second; give 1 to differentiate by the driver's value")
     if sweep.start == sweep.stop and sweep.steps > 1:
-        problem = f"found the start {sweep.start!r} again with {sweep.steps} steps, expected another value"
+        problem = f"found the start {written['start']!r} again with {sweep.steps} steps, expected another value"
         raise fault(file, "sweep.stop", f"{problem}; give steps = 1 for a single sample")
     if sweep.start != sweep.stop and sweep.steps == 1:
-        problem = f"found 1 with start {sweep.start!r} and stop {sweep.stop!r}, expected 2 or more samples, both ends among them"
+        found = f"found 1 with start {written['start']!r} and stop {written['stop']!r}"
+        problem = f"{found}, expected 2 or more samples, both ends among them"
         raise fault(file, "sweep.steps", f"{problem}; give more, or stop = start for a single sample")
 
 
-def _motion(file: Path, mechanism: Mechanism, name: str, value: object, length: Convert, angle: Convert) -> Motion:
+def _motion(file: Path, mechanism: Mechanism, name: str, value: object, length: Unit, angle: Unit) -> Motion:
     key, driver = join(join("drivers", name), "motion"), mechanism.driver(name)
     cls = class_of(file, key, "motion", value, Motion.registry)
     keys = typed(file, key, value, motion_keys(cls))
@@ -111,7 +113,8 @@ def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
     (first, last), low, high = motion.span, float(times.min()), float(times.max())
     slack = ROUNDED_TIME * max(abs(low), abs(high))
     if low < first - slack or high > last + slack:
-        problem = f"found values from {first:.9g} to {last:.9g} s, expected them for the whole sweep, {low:.9g} to {high:.9g} s"
+        found = f"found values from {plain(first)} to {plain(last)} s"
+        problem = f"{found}, expected them for the whole sweep, {low:.9g} to {high:.9g} s"
         raise fault(file, key, f"{problem}; add values, or shorten the sweep")
     with np.errstate(all="ignore"):
         finite = np.isfinite(motion.at(times)).all()
@@ -119,6 +122,6 @@ def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
         raise fault(file, key, "found numbers that overflow within the sweep, expected finite ones; correct them")
 
 
-def _unit(driver: Driver, length: Convert, angle: Convert) -> Convert:
-    """What makes SI of a driver's values."""
+def _unit(driver: Driver, length: Unit, angle: Unit) -> Unit:
+    """The unit of a driver's values in the file."""
     return angle if driver.turns else length

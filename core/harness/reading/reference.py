@@ -27,9 +27,10 @@ from msgspec import Meta
 
 from ...errors import remedy
 from ...trajectory import Array
-from ..case import PER_TRAVEL, Quantity, Series
+from ..case import PER_TRAVEL, Origin, Quantity, Series
 from ..references import read, series
-from .document import LARGEST, decimal, fault, read_text, shown
+from ..units import Unit
+from .document import LARGEST, decimal, fault, read_text, sha256, shown
 
 LARGEST_FILE = 64_000_000
 # As many samples as a sweep can have, and as many lines between them.
@@ -39,21 +40,37 @@ DERIVATIVES = (".velocity", ".acceleration")
 SAME_GRID = 1e-12
 SIGNS = re.compile(r"\s*#\s*signs:\s*(\w+)")
 
+CITATION = "a text that says where the true values come from: author, title, page or address"
+DIGEST = "sha256:"
+
 Convert: TypeAlias = Callable[[float], float]
 """From the unit of a file to SI."""
 
 
 class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs in order)."""
+    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs in order), and their source.
+
+    Attributes:
+        citation: where the true values come from; without, agreement with them validates nothing.
+        digest: of the file; one of another content is refused.
+    """
 
     file: Annotated[str, Meta(min_length=1, description="the name of a CSV file beside the case file")] | None = None
     columns: Annotated[list[str], Meta(min_length=2, description="a list of column names, the driver first")] | None = None
-    rows: Annotated[list[list[float]], Meta(min_length=1, description="a list of rows of numbers")] | None = None
+    rows: Annotated[list[list[int | float]], Meta(min_length=1, description="a list of rows of numbers")] | None = None
+    citation: Annotated[str, Meta(pattern=r"\S", description=CITATION)] | None = None
+    digest: (
+        Annotated[str, Meta(pattern=f"^{DIGEST}[0-9a-f]{{64}}$", description=f'"{DIGEST}" and 64 hexadecimal digits')] | None
+    ) = None
 
 
 @dataclass(frozen=True)
 class _Samples:
-    """Columns by name, rows with the place to name in messages, the key of all of them, and the convention that a comment names."""
+    """Columns by name, rows with the place to name in messages, the key of all of them, and the convention that a comment names.
+
+    Attributes:
+        lines: of a file of its own, for messages.
+    """
 
     file: Path
     header: str
@@ -61,6 +78,17 @@ class _Samples:
     rows: Sequence[tuple[str, Sequence[float]]]
     key: str = ""
     signs: str = ""
+    lines: Sequence[str] = ()
+
+    def driver_value(self, k: int) -> str:
+        """The driver value of a row as it is written."""
+        where, row = self.rows[k]
+        line = self.lines[int(where.removeprefix("line ")) - 1] if self.lines else ""
+        cell = line.partition(",")[0].strip().strip('"').strip()
+        with suppress(ValueError):  # inline, or of several lines
+            if decimal(cell) == row[0]:
+                return cell
+        return repr(row[0])
 
 
 def is_derivative(name: str) -> bool:
@@ -71,7 +99,7 @@ def is_derivative(name: str) -> bool:
 def read_reference(
     case_file: Path,
     keys: ReferenceKeys,
-    driver: Convert,
+    driver: Unit,
     units: Mapping[str, Convert],
     values: Array,
     outputs: Sequence[Quantity],
@@ -80,7 +108,7 @@ def read_reference(
     """True values by output name, SI.
 
     Args:
-        driver: from the unit of the driver to SI.
+        driver: the unit of the driver in the file.
         units: from the file's units to SI, by the unit there: m, rad and 1.
         values: the grid of the sweep [m or rad], shape (n,).
         outputs: those of the case.
@@ -97,7 +125,7 @@ def read_reference(
     samples = _inline(case_file, keys, outputs) if keys.file is None else _from_csv(case_file, keys)
     names = list(samples.columns[1:])
     _check_columns(samples, names, [*by_name])
-    _check_grid(samples, [driver(row[0]) for _, row in samples.rows], values)
+    _check_grid(samples, driver, values)
     if keys.file is not None:
         _check_signs(samples, convention if any(by_name[name].signs for name in names if name in by_name) else "")
     column = {name: [row[k] for _, row in samples.rows] for k, name in enumerate(names, start=1)}
@@ -112,6 +140,26 @@ def read_reference(
         for output in outputs
         if output.name in column
     }
+
+
+def read_origin(case_file: Path, keys: ReferenceKeys) -> Origin:
+    """Where the true values come from, of a reference that has been read.
+
+    Raises:
+        CaseError: the file has another digest than the one given, or there is no file to have one.
+    """
+    citation = (keys.citation or "").strip()
+    if keys.file is None:
+        if keys.digest is not None:
+            problem = "found a digest beside rows, expected one of a file; remove it, for the rows are in the case file"
+            raise fault(case_file, "reference.digest", problem)
+        return Origin(citation)
+    file = _beside(case_file, keys.file)
+    found = sha256(file)
+    if keys.digest not in (None, DIGEST + found):
+        problem = f"found {shown(keys.digest)}, but {keys.file} has {DIGEST}{found}, expected the same"
+        raise fault(case_file, "reference.digest", f"{problem}; get the file that was meant, or give its digest")
+    return Origin(citation, keys.file, found, own=keys.file.endswith(".json"))
 
 
 def _in_si(column: Sequence[float], unit: str, units: Mapping[str, Convert]) -> Array:
@@ -156,7 +204,7 @@ def _from_csv(case_file: Path, keys: ReferenceKeys) -> _Samples:
         for cells in filter(None, reader):
             where = f"line {reader.line_num}"
             if samples is None:
-                samples = _Samples(file, where, [cell.strip() for cell in cells], rows, signs=signs)
+                samples = _Samples(file, where, [cell.strip() for cell in cells], rows, signs=signs, lines=lines)
                 continue
             _check_width(samples, where, len(cells))
             # numbers at once: the cells of a large file as texts would take many times its size
@@ -235,13 +283,13 @@ def _check_columns(samples: _Samples, names: Sequence[str], outputs: Sequence[st
             raise fault(samples.file, samples.header, problem)
 
 
-def _check_grid(samples: _Samples, found: Sequence[float], values: Array) -> None:
+def _check_grid(samples: _Samples, driver: Unit, values: Array) -> None:
     allowed = SAME_GRID * float(np.max(np.abs(values)))
     advice = "give a row for each sample of the sweep, driver values to 13 digits or more"
-    for k, ((where, _), here, there) in enumerate(zip(samples.rows, found, values.tolist(), strict=False)):
-        if abs(here - there) > allowed:
-            problem = f"driver value {here!r} of sample {k}, expected {there!r} as in the sweep (SI); {advice}"
-            raise fault(samples.file, where, problem)
-    if len(found) != len(values):
-        problem = f"found {len(found)} rows, expected {len(values)}, the steps of the sweep; {advice}"
+    for k, ((where, row), there) in enumerate(zip(samples.rows, values.tolist(), strict=False)):
+        if abs(driver(row[0]) - there) > allowed:
+            found = f"driver value {samples.driver_value(k)} {driver.name} of sample {k}"
+            raise fault(samples.file, where, f"{found}, expected {driver.written(there)} as in the sweep; {advice}")
+    if len(samples.rows) != len(values):
+        problem = f"found {len(samples.rows)} rows, expected {len(values)}, the steps of the sweep; {advice}"
         raise fault(samples.file, samples.key, problem)

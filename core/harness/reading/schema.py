@@ -55,6 +55,9 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
                          beside is in its folder or below, links followed: a case file from elsewhere has nothing else opened
                          first column: what is swept, on its grid; others: OUTPUT, OUTPUT.velocity, OUTPUT.acceleration
                          a CSV file of suspension outputs names their convention in a comment: # signs: iso8855
+                         (citation), where the true values come from: author, title, page or address; without, agreement with
+                         them is not called validated, whatever truth says
+                         (digest) = "sha256:...", of the file, as sha256sum prints it: a file of another content is refused
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from ...errors import remedy
 from ...mechanism import Mechanism, Point, Vector
 from ..case import Case, Quantity, size
 from ..suspension import Axle, Convention, PerTravel, Rate, Reaction, Side, SuspensionOutput, Vehicle, own_keys
+from ..units import Unit
 from .document import fault, join, shown, typed
 from .reference import Convert
 from .schema import Flag, Number, Numbers3, Text, ToleranceKeys
@@ -93,7 +94,7 @@ class SuspensionTable:
     per_travel: bool
 
 
-def read_suspension(file: Path, value: object, mechanism: Mechanism, length: Convert, angle: Convert) -> SuspensionTable:
+def read_suspension(file: Path, value: object, mechanism: Mechanism, length: Unit, angle: Convert) -> SuspensionTable:
     """The table in SI.
 
     Raises:
@@ -111,7 +112,7 @@ def read_suspension(file: Path, value: object, mechanism: Mechanism, length: Con
     given |= {name: angle(given[name]) for name in ("static_toe", "static_camber")}
     given |= {"forward": forward, "up": up, "middle": tuple(map(length, keys.center_plane))}
     vehicle = Vehicle(**given)
-    _check_side(file, vehicle, mechanism)
+    _check_side(file, vehicle, mechanism, length)
     return SuspensionTable(vehicle, keys.per_travel)
 
 
@@ -128,7 +129,7 @@ def _check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:
         raise fault(file, key, f"found {shown(name)}, expected a point; {remedy(name, known)}")
 
 
-def _check_side(file: Path, vehicle: Vehicle, mechanism: Mechanism) -> None:
+def _check_side(file: Path, vehicle: Vehicle, mechanism: Mechanism, length: Unit) -> None:
     """What most often goes wrong: hardpoints of one side or of mirrored axes under the name of the other side."""
     point = mechanism.point(vehicle.wheel_center)
     if mechanism.is_fixed(point.body):
@@ -136,7 +137,7 @@ def _check_side(file: Path, vehicle: Vehicle, mechanism: Mechanism) -> None:
         raise fault(file, "suspension.wheel_center", f"{problem}; name the centre of the wheel")
     aside = vehicle.outboard @ (vec(point.position) - vec(vehicle.middle))
     if aside <= 0.0:
-        problem = f"found {shown(str(vehicle.side))}, but {vehicle.wheel_center!r} is {-aside:.6g} m on the other side"
+        problem = f"found {shown(str(vehicle.side))}, but {vehicle.wheel_center!r} is {length.written(-aside)} on the other side"
         expected = "expected the side on which it is, looking forward with up upwards"
         raise fault(
             file, "suspension.side", f"{problem} of the centre plane, {expected}; correct side, forward, up or center_plane"

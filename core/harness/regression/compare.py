@@ -122,11 +122,9 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
                 Kind.LOST, now, f"{output}: {', '.join(gone)} no longer compared: {why}", output=output, motion=gone[0]
             )
     if before.validated and not now.validated and now.outcome is Outcome.PASS:
-        yield finding_of(
-            Kind.LOST,
-            now,
-            f"no longer validated: judged against {now.truth.replace('_', ' ')}, before {before.truth.replace('_', ' ')}",
-        )
+        against, was = (each.truth.replace("_", " ") for each in (now, before))
+        why = f"{against}, before {was}" if against != was else f"{against} whose source is not cited or is kincheck itself"
+        yield finding_of(Kind.LOST, now, f"no longer validated: judged against {why}")
 
 
 def _moved(now: Record, before: Record) -> Iterator[Finding]:

@@ -34,7 +34,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
     if names := cases(lambda record: record.truth == Truth.CONSENSUS_ONLY):
         say(f"Consensus only: {names}", "There is no reference. Engines that agree with the native one may be wrong together.")
     for case, note in notes(results.run):
-        say(f"Geometry of {case}", f"{note[:1].upper()}{note[1:]}.")
+        say(f"Note on {case}", f"{note[:1].upper()}{note[1:]}.")
     for outcome in Outcome:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
         if pairs and outcome not in ANSWERED:

@@ -6,11 +6,13 @@ import re
 from xml.etree import ElementTree
 
 from ..compare import describe
-from ..labels import UNMADE, notes
+from ..labels import UNMADE, notes, suspects
 from ..record import Deviations, Outcome, Record, Results
 
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
+
+SUSPECTED = "suspect the reference rather than the engine: see the suite's output"
 
 
 def to_junit(results: Results) -> bytes:
@@ -27,15 +29,17 @@ def to_junit(results: Results) -> bytes:
         for record in results.records:
             if record.case == case:
                 for output, deviations in record.errors.items():
-                    _test(suite, record, output, deviations)
+                    _test(suite, record, output, deviations, suspected=results.blames_reference(record))
         for name, engine, mode in results.missing:
             if name == case:
                 test = ElementTree.SubElement(
                     suite, "testcase", classname=f"{case}.{engine}.{mode}", name="never made", time="0.000000"
                 )
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
-        if said := [note for named, note in notes(results.run) if named == case]:
-            ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub("\ufffd", "\n".join(f"note: {note}" for note in said))
+        said = [f"note: {note}" for named, note in notes(results.run) if named == case]
+        said += [f"suspect: {why}" for named, why in suspects(results) if named == case]
+        if said:
+            ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub("\ufffd", "\n".join(said))
         for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
             suite.set(count, str(sum(1 for _ in suite.iter(tag))))
     ElementTree.indent(root)
@@ -45,7 +49,7 @@ def to_junit(results: Results) -> bytes:
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def _test(suite: ElementTree.Element, record: Record, output: str, deviations: Deviations) -> None:
+def _test(suite: ElementTree.Element, record: Record, output: str, deviations: Deviations, *, suspected: bool = False) -> None:
     seconds = record.seconds.warm if record.seconds and record.seconds.warm is not None else 0.0
     test = ElementTree.SubElement(
         suite,
@@ -56,6 +60,7 @@ def _test(suite: ElementTree.Element, record: Record, output: str, deviations: D
     )
     verdict, message = _verdict(record, output, deviations)
     if verdict:
+        message += f"; {SUSPECTED}" if suspected else ""
         ElementTree.SubElement(test, verdict, message=message)
 
 

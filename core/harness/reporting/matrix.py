@@ -9,7 +9,7 @@ from rich.text import Text
 
 from ...trajectory import QUANTITIES
 from .. import printing
-from ..labels import against, motion_unit, notes, signs, unread
+from ..labels import against, motion_unit, notes, signs, suspects, unread
 from ..markdown import code, escaped, row
 from ..record import Outcome, Record, Results
 from ..visible import visible
@@ -49,6 +49,7 @@ def to_markdown(results: Results) -> str:
     lines += ["", f"{escaped(_reading(results))}."]
     lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
     lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
+    lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
         escaped(f"{outcome.shown.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()

@@ -16,7 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ...trajectory import QUANTITIES
-from ..labels import TRUTHS, against, engine_name, known, number, output_label, product, unread_count
+from ..labels import TRUTHS, against, engine_name, known, number, output_label, product, suspects, unread_count, unsound
 from ..record import Outcome, Record, Results
 from .caveats import ANSWERED, caveats
 from .figures import Figure, Style
@@ -88,10 +88,19 @@ def render(given: Material, changes: Markup | None = None) -> str:
         .render(
             headline=headline(given.results),
             changes=changes,
-            worst=max(((case, case.worst) for case in cases if case.worst), key=lambda each: each[1].ratio, default=None),
+            worst=max(
+                ((case, case.worst) for case in cases if case.worst and case.name not in given.results.suspects),
+                key=lambda each: each[1].ratio,
+                default=None,
+            ),
             counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
-            problems=_grouped(record for record in records if record.outcome in (Outcome.FAIL, *BROKEN)),
             not_judged=_grouped(record for record in records if record.outcome in NOT_JUDGED),
+            suspects=suspects(given.results),
+            problems=_grouped(
+                record
+                for record in records
+                if record.outcome in (Outcome.FAIL, *BROKEN) and not given.results.blames_reference(record)
+            ),
             circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
             unread=given.results.unread,
             settings=_settings(records),
@@ -158,6 +167,7 @@ def headline(results: Results) -> str:
     said += f", {broken} could not be completed" if broken else ""
     unjudged = _count(records, Outcome.UNJUDGED)
     said += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
+    said += f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
     said += f"; {unread_count(unread)}" if unread else ""
     return said + (f"; the run ended before {missing} more" if missing else "")
 
@@ -196,7 +206,7 @@ def searched(case: CaseView) -> str:
 def validation(record: Record) -> str:
     """What may be called validated, if anything."""
     if not record.validated:
-        return ""
+        return f"{said}: not validated" if record.outcome is Outcome.PASS and (said := unsound(record)) else ""
     standards = {deviation.against for errors in record.errors.values() for _, deviation in errors.items()}
     whole = standards == {record.truth} and all(len(errors.items()) == len(QUANTITIES) for errors in record.errors.values())
     return "validated" if whole else "validated, positions only"

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from ...trajectory import QUANTITIES
 from .. import printing
-from ..labels import against, motion_unit, notes, signs, unread
+from ..labels import against, motion_unit, notes, signs, suspects, unread, unsound
 from ..record import Deviation, Outcome, Record, Results
 from ..visible import visible
 
@@ -53,9 +53,11 @@ def print_signs(run: Mapping[str, Any], console: Console) -> None:
 
 
 def print_messages(results: Results, console: Console) -> None:
-    """Print notes on the cases, every message, and a count of outcomes."""
+    """Print notes on the cases, suspected references, every message, and a count of outcomes."""
     for case, note in notes(results.run):
         console.print(Text(visible(f"note: {case}: {note}")), soft_wrap=True)
+    for case, why in suspects(results):
+        console.print(Text(visible(f"suspect: {case}: {why}"), style="bold"), soft_wrap=True)
     for (engine, outcome, message), cases in messages(results).items():
         console.print(Text(visible(f"{outcome.shown}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
@@ -66,7 +68,8 @@ def print_messages(results: Results, console: Console) -> None:
 
 def truth(record: Record) -> str:
     """What a record was judged by; the word for more than agreement is kept for truths from elsewhere that were met."""
-    return against(record.truth) + (" (validated)" if record.validated else "")
+    said = "validated" if record.validated else unsound(record)
+    return against(record.truth) + (f" ({said})" if said else "")
 
 
 def _error(record: Record, quantity: str) -> Text:
@@ -90,9 +93,9 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
 
 
 def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
-    """Messages, and the cases they are about; a missing engine says so once."""
+    """Messages, and the cases they are about; a missing engine says so once, and a suspected reference in a line of its own."""
     said: dict[tuple[str, Outcome, str], list[str]] = {}
     for record in results.records:
-        if record.message:
+        if record.message and not results.blames_reference(record):
             said.setdefault((record.engine, record.outcome, record.message), []).append(record.case)
     return said

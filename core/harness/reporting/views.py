@@ -8,6 +8,7 @@ from typing import Any
 
 from ...trajectory import QUANTITIES
 from ..case import Truth
+from ..evidence import Evidence
 from ..labels import against, engine_name, motion_unit, number, output_label
 from ..record import Deviation, OutputSeries, Record, Results
 from .axis import Axis, driver_axis
@@ -72,6 +73,7 @@ class CaseView:
     """One case of the page.
 
     Attributes:
+        evidence: of the reference; None where there is none.
         worst: the deviation closest to its tolerance, or beyond it most.
         account: the degrees of freedom, counted as in the paper and by rank.
         scene: the mechanism to be drawn; None where the results have none.
@@ -84,6 +86,7 @@ class CaseView:
     truth: Truth
     source: str
     records: list[Record]
+    evidence: Evidence | None
     axis: Axis
     outputs: list[OutputView]
     worst: Judged | None
@@ -125,6 +128,7 @@ def case_view(given: Material, name: str, anchor: str, styles: Mapping[str, Styl
         truth=Truth(records[0].truth),
         source=" · ".join(filter(None, (facts.get("source", ""), facts.get("signs", "")))),
         records=records,
+        evidence=next((record.evidence for record in records if record.evidence), None),
         axis=axis,
         outputs=outputs,
         worst=worst(deviations),

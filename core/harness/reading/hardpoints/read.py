@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..coordinates import AXES, with_all_coordinates
 from ..document import decimal, explained, fault, shown
 from ..schema import MOST_SAMPLES
 from ..supplied import LEFT_OUT, Supplied
-from .table import HardpointTable, placed, require_size
+from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
 from .templates.base import KNUCKLE, normal
 
@@ -45,10 +46,10 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     points = placed(table, supplied.units, supplied.axes)
     named = _filled(table, template)
     at = {role: points[name] for role, name in named.items()}
-    require_size(table, at)
+    require_size(table, at, supplied.units)
     travel = _travel(file, supplied.travel)
-    _require_left_and_upright(table, template, named, at)
-    with explained(file):
+    _require_left_and_upright(table, template, named, at, supplied)
+    with explained(file, "", unit_of(table, supplied.units)):
         joints = tuple(template.joints(at))
         bodies = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
         watched = [Point(role, KNUCKLE, at[role]) for role in template.watched]
@@ -57,7 +58,8 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x forward, y left, z up{LEFT_OUT}"
     source += _listed(others)
-    return with_all_coordinates(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ()))
+    case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ())
+    return with_all_coordinates(replace(case, length_unit=unit_of(table, supplied.units).name))
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
@@ -117,15 +119,19 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _require_left_and_upright(
-    table: HardpointTable, template: Template, named: Mapping[str, str], at: Mapping[str, Vector]
+    table: HardpointTable, template: Template, named: Mapping[str, str], at: Mapping[str, Vector], supplied: Supplied
 ) -> None:
     """Refuse points that are mirrored or upside down: their axes are others than was said."""
+
+    def written(role: str, k: int) -> str:
+        return coordinate(table, named[role], k, supplied.units, supplied.axes)
+
     advice = "correct --axes" if table.axes is None else "correct the points"
     if at[WHEEL][1] <= 0.0:
         raise fault(
             table.file,
             named[WHEEL],
-            f"is at y = {at[WHEEL][1]:.6g} m, left being positive, expected the left side; {advice}, or give the left points",
+            f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice}, or give the left points",
         )
     for rear in (role for role in at if role.endswith("_rear")):
         front = f"{rear.removesuffix('_rear')}_front"
@@ -133,15 +139,15 @@ def _require_left_and_upright(
             raise fault(
                 table.file,
                 named[front],
-                f"is at x = {at[front][0]:.6g} m, forward being positive, and {named[rear]} at {at[rear][0]:.6g} m, expected it in "
-                f"front of that; {advice}",
+                f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it in front of that; {advice}",
             )
     high, low = (at[role][2] for role in (template.upper, template.lower))
     if high <= low:
         raise fault(
             table.file,
             named[template.upper],
-            f"is at z = {high:.6g} m, up being positive, and {named[template.lower]} at {low:.6g} m, expected it above; {advice}",
+            f"found {written(template.upper, 2)}, not above {named[template.lower]} with {written(template.lower, 2)}, "
+            f"expected it above; {advice}",
         )
 
 

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ....errors import remedy
 from ....mechanism import Vector
+from ...sizes import SUSPENSIONS
+from ...units import LENGTHS, Unit, plain
 from ..document import decimal, fault, shown, usable
 
-UNITS: Mapping[str, Callable[[float], float]] = {
-    "m": float,
-    "mm": lambda x: x / 1000.0,
-    "cm": lambda x: x / 100.0,
-    "inch": lambda x: x * 0.0254,
-    "foot": lambda x: x * 0.3048,
-}
 _UNIT_NAMES: Mapping[str, str] = {"meter": "m", "metre": "m", "in": "inch", "ft": "foot"}
 
 _DIRECTIONS: Mapping[str, tuple[int, float]] = {
@@ -29,9 +24,6 @@ _DIRECTIONS: Mapping[str, tuple[int, float]] = {
     "down": (2, -1.0),
 }
 _NAMED_AXES: Mapping[str, str] = {"iso": "forward,left,up", "sae": "forward,right,down", "adams": "rearward,right,up"}
-
-# Suspensions of model cars and of haulage trucks lie within; a unit taken for another is a thousandfold mistake, or forty at least.
-SMALLEST, LARGEST = 0.03, 10.0
 
 
 @dataclass(frozen=True)
@@ -90,7 +82,7 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
     Raises:
         CaseError: unit or axes are not known, or contradict each other.
     """
-    convert = UNITS[_unit(table, units)]
+    convert = unit_of(table, units)
     places = _axes(table, axes)
     points: dict[str, Vector] = {}
     for name, point in table.points.items():
@@ -101,23 +93,30 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
     return points
 
 
-def require_size(table: HardpointTable, used: Mapping[str, Vector]) -> None:
+def coordinate(table: HardpointTable, name: str, k: int, units: str | None, axes: str | None) -> str:
+    """The coordinate of a point that became its x, y or z (0, 1, 2), as the file has it: "y = 750 mm"."""
+    column = next(column for column, (axis, _) in enumerate(_axes(table, axes)) if axis == k)
+    return f"{'xyz'[column]} = {plain(table.points[name].position[column])} {unit_of(table, units).name}"
+
+
+def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str | None) -> None:
     """Refuse points that are as far apart as those of no suspension: their unit is another one."""
     positions = list(used.values())
     size = max(math.dist(a, b) for a in positions for b in positions)
-    if not SMALLEST <= size <= LARGEST:
-        raise fault(
-            table.file,
-            "",
-            f"the points span {size:.4g} m, expected a suspension of {SMALLEST:g} to {LARGEST:g} m; "
-            "they are in another unit: correct --units, or the unit in the file",
-        )
+    if found := SUSPENSIONS.improbable(size, unit_of(table, units)):
+        problem = f"the points span {found} They are in another unit"
+        raise fault(table.file, "", f"{problem}: correct --units, or the unit in the file")
+
+
+def unit_of(table: HardpointTable, said: str | None) -> Unit:
+    """The unit of the coordinates, which is what makes SI of them."""
+    return LENGTHS[_unit(table, said)]
 
 
 def _unit(table: HardpointTable, said: str | None) -> str:
     written = None if table.unit is None else _unit_name(table.unit)
-    if written is not None and written not in UNITS:
-        raise fault(table.file, "unit", f"found {shown(table.unit)}, expected a length; {remedy(str(table.unit), UNITS)}")
+    if written is not None and written not in LENGTHS:
+        raise fault(table.file, "unit", f"found {shown(table.unit)}, expected a length; {remedy(str(table.unit), LENGTHS)}")
     if said is None:
         if written is None:
             raise fault(
@@ -125,8 +124,8 @@ def _unit(table: HardpointTable, said: str | None) -> str:
             )
         return written
     name = _unit_name(said)
-    if name not in UNITS:
-        raise fault(table.file, "--units", f"found {shown(said)}, expected a length; {remedy(said, UNITS)}")
+    if name not in LENGTHS:
+        raise fault(table.file, "--units", f"found {shown(said)}, expected a length; {remedy(said, LENGTHS)}")
     if written not in (None, name):
         raise fault(table.file, "--units", f"found {said}, but the file is in {written}; leave out --units, or correct the file")
     return name

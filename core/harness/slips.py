@@ -1,0 +1,150 @@
+"""Slips: simple mistakes in a reference, tried on the whole series: sign, unit, offset, order of samples, exchanged columns.
+
+A slip is named only where undoing it brings the reference within the tolerance, and where that says something: a series of zeros
+fits with either sign, a constant one fits after any offset, and two samples prove nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..trajectory import Array
+from .compare import deviation
+
+# Two samples are met by too many changes.
+FEWEST = 3
+# A series whose values, or whose changes, are smaller than so many tolerances is met by too many changes, too.
+MEANINGFUL = 10.0
+OTHER_SIGN = "with the other sign"
+FACTORS: Mapping[str, float] = {
+    "1000": 1e3,
+    "1/1000": 1e-3,
+    "100": 1e2,
+    "1/100": 1e-2,
+    "10": 10.0,
+    "1/10": 0.1,
+    "1e6": 1e6,
+    "1e-6": 1e-6,
+    "180/pi": 180.0 / math.pi,
+    "pi/180": math.pi / 180.0,
+    "25.4": 25.4,
+    "1/25.4": 1.0 / 25.4,
+    "0.0254": 0.0254,
+    "1/0.0254": 1.0 / 0.0254,
+    "0.3048": 0.3048,
+    "1/0.3048": 1.0 / 0.3048,
+    "2": 2.0,
+    "1/2": 0.5,
+}
+"""Between units of length and of angle, percent and parts, half and whole; by their names in messages."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """The values of one output, and what they are held to: atol + rtol * range of what they are compared with."""
+
+    values: Array
+    atol: float
+    rtol: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A change of the reference that makes it fit.
+
+    Attributes:
+        change: in words, after "the reference".
+        difference: the largest one that is left.
+        tolerance: that it is within.
+    """
+
+    change: str
+    difference: float
+    tolerance: float
+
+    @property
+    def ratio(self) -> float:
+        """What is left, in tolerances."""
+        return self.difference / self.tolerance if self.tolerance else 0.0
+
+
+_Change = tuple[str, Callable[[Array], Array]]
+
+
+def slips(held: Held, reference: Array, others: Mapping[str, Held], *, offsets: bool = True) -> list[Slip]:
+    """Return all single changes that make the reference fit, or where there are none, all pairs of changes.
+
+    Args:
+        held: the values that the engines agree on.
+        reference: of the same output, out of tolerance, shape (n,).
+        others: values of the other outputs, by name, which the reference may be of.
+        offsets: whether a constant may be added; to a derivative nobody adds one.
+    """
+    return list(_single(held, reference, others, offsets)) or list(_pairs(held, reference, others, offsets))
+
+
+def _single(held: Held, reference: Array, others: Mapping[str, Held], offsets: bool) -> Iterator[Slip]:
+    yield from _fitting(held, reference, _scales(), "", constant=True)
+    yield from _fitting(held, reference, _moves(held, reference, offsets), "")
+    yield from _exchanged(reference, others, "")
+
+
+def _pairs(held: Held, reference: Array, others: Mapping[str, Held], offsets: bool) -> Iterator[Slip]:
+    both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
+    yield from _fitting(held, reference, both, "", constant=True)
+    for words, change in _scales():
+        changed = change(reference)
+        yield from _fitting(held, changed, _moves(held, changed, offsets), f"{words} and ")
+    yield from _exchanged(-reference, others, f"{OTHER_SIGN} ")
+
+
+def _scales() -> list[_Change]:
+    return [(OTHER_SIGN, _times(-1.0)), *((f"times {name}", _times(factor)) for name, factor in FACTORS.items())]
+
+
+def _times(factor: float) -> Callable[[Array], Array]:
+    return lambda x: factor * x
+
+
+def _moves(held: Held, reference: Array, offsets: bool) -> Iterator[_Change]:
+    off = held.values - reference
+    known = np.isfinite(off)
+    if offsets and known.any():
+        constant = 0.5 * float(off[known].max() + off[known].min())
+        yield f"{'plus' if constant > 0 else 'minus'} {abs(constant):.9g} {held.unit}", lambda x: x + constant
+    yield "with its samples in reversed order", lambda x: x[::-1]
+    gap = np.full(1, np.nan)
+    yield "shifted by one sample, each taken from the next", lambda x: np.concatenate([x[1:], gap])
+    yield "shifted by one sample, each taken from the one before", lambda x: np.concatenate([gap, x[:-1]])
+
+
+def _fitting(
+    held: Held, reference: Array, changes: Iterator[_Change] | list[_Change], before: str, *, constant: bool = False
+) -> Iterator[Slip]:
+    """The changes after which the reference fits.
+
+    Args:
+        constant: whether a constant series says something, unless it is one of zeros.
+    """
+    for words, change in changes:
+        changed = change(reference)
+        both = np.isfinite(held.values) & np.isfinite(changed)
+        if both.sum() < FEWEST:
+            continue
+        off = deviation(held.values, changed, held.atol, held.rtol, "")
+        if off is None or not off.within:
+            continue
+        values = held.values[both]
+        if (np.abs(values).max() if constant else np.ptp(values)) > MEANINGFUL * off.tolerance:
+            yield Slip(before + words, off.max_abs, off.tolerance)
+
+
+def _exchanged(reference: Array, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
+    """The outputs of which the reference is, where it varies."""
+    for name, other in others.items():
+        yield from _fitting(other, reference, [(f"{before}taken as that of output {name}", lambda x: x)], "")

@@ -1,0 +1,201 @@
+"""Suspecting the reference: where all engines of a case agree with each other and not with it, it is the odd one out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import shortened
+from ..trajectory import PER_TIME, QUANTITIES, Array
+from .case import TIME, Case
+from .compare import deviation, pace
+from .evidence import Explanation, Suspect
+from .record import Deviation, Deviations, OutputSeries, Record
+from .slips import Held, Slip, slips
+from .units import ANGLES, LENGTHS, SECOND, Unit
+
+# A sentence that explains more outputs than these is not read; further ones are counted.
+MOST_EXPLAINED = 12
+ADVICE = "suspect the reference, the output's component or a sign"
+UNEXPLAINED = "no sign, unit, offset, exchanged column, reversed or shifted order of samples explains it"
+
+
+@dataclass(frozen=True, eq=False)
+class _Off:
+    """A quantity of an output that is out of tolerance."""
+
+    output: str
+    order: int
+    held: Held
+    reference: Array
+    deviation: Deviation
+
+    @property
+    def ratio(self) -> float:
+        tolerance = self.deviation.tolerance
+        return self.deviation.max_abs / tolerance if tolerance else np.inf
+
+
+def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
+    """Return what there is to be said where the engines agree within tolerance and the reference does not fit; else None.
+
+    One engine alone agrees with nobody: its reference is suspected only where a slip explains all of it.
+    """
+    mine = [record for record in records if record.case == case.name and record.solved]
+    whole = [record for record in mine if record.solved == record.samples]
+    if not case.reference or not any(_against(each, case) for record in mine for each in record.errors.values()):
+        return None
+    if not whole:
+        return None
+    beat = pace(case)
+    agreement = _agreement(case, beat, whole[0], mine)
+    off = sorted(_off(case, beat, whole[0]), key=lambda each: (each.order, -each.ratio))
+    if agreement is None or not off:
+        return None
+    explanations, left = _explained(case, beat, whole[0], off)
+    engines = list(dict.fromkeys(record.engine for record in mine))
+    if len(engines) == 1 and (left or not explanations):
+        return None
+    worst = off[0]
+    agreed = agreement.get((worst.output, worst.order), 0.0)
+    return Suspect(
+        engines=engines,
+        agreement=agreed,
+        output=worst.output,
+        quantity=QUANTITIES[worst.order],
+        sample=worst.deviation.worst_step,
+        difference=worst.deviation.max_abs,
+        tolerance=worst.deviation.tolerance,
+        unit=worst.held.unit,
+        explanations=explanations,
+        unexplained=left,
+        message=f"{_engines(engines, agreed, worst)}; {_difference(case, worst)}: {ADVICE}; {_reasons(explanations, left)}",
+    )
+
+
+def _engines(engines: Sequence[str], agreed: float, worst: _Off) -> str:
+    if len(engines) == 1:
+        return f"{engines[0]} is the only engine that solved it"
+    return f"all {len(engines)} engines agree within {_number(agreed)} {worst.held.unit}"
+
+
+def _difference(case: Case, worst: _Off) -> str:
+    step = worst.deviation.worst_step
+    at = f"sample {step} ({case.sweep.driver} = {_unit(case).written(float(case.sweep.values[step]))})"
+    off = f"{_number(worst.deviation.max_abs)} {worst.held.unit}"
+    held = f"{QUANTITIES[worst.order]}, tolerance {_number(worst.deviation.tolerance)} {worst.held.unit}"
+    return f"the reference differs by {off} at {at} of output {worst.output} ({held})"
+
+
+def _unit(case: Case) -> Unit:
+    """The unit of what is swept, in the file of the case."""
+    if case.sweep.driver == TIME:
+        return SECOND
+    turns = case.mechanism.driver(case.sweep.driver).turns
+    return ANGLES[case.angle_unit] if turns else LENGTHS[case.length_unit]
+
+
+def _reasons(explanations: Sequence[Explanation], left: Sequence[str]) -> str:
+    said = [
+        f"{', '.join(each.outputs)} ({', '.join(each.quantities)}): the reference {each.change} fits within "
+        f"{_number(each.difference)} {each.unit}, tolerance {_number(each.tolerance)} {each.unit}"
+        for each in explanations
+    ]
+    if left:
+        said.append(f"{shortened(left, MOST_EXPLAINED)}: {UNEXPLAINED}")
+    return "; ".join(said)
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def _against(errors: Deviations, case: Case) -> bool:
+    """Whether something of an output is out of tolerance against the reference."""
+    return any(not each.within and each.against == case.truth for _, each in errors.items())
+
+
+def _series(output: OutputSeries, order: int) -> Array | None:
+    values: list[float | None] | None = getattr(output, QUANTITIES[order])
+    return None if values is None else np.array(values, dtype=np.float64)
+
+
+def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held]:
+    """The values of a record by output, and what they are held to."""
+    found: dict[str, Held] = {}
+    for output in case.outputs:
+        if order < output.orders and (values := _series(record.outputs[output.name], order)) is not None:
+            found[output.name] = Held(values, output.atol * beat**order, output.rtol, output.unit + PER_TIME[order])
+    return found
+
+
+def _agreement(case: Case, beat: float, first: Record, records: Sequence[Record]) -> dict[tuple[str, int], float] | None:
+    """The largest difference between the first engine and the others, by output and order; None where one is not within."""
+    largest: dict[tuple[str, int], float] = {}
+    for order in range(len(QUANTITIES)):
+        held = _held(case, beat, first, order)
+        for record in records:
+            for name, other in _held(case, beat, record, order).items():
+                if name not in held:
+                    continue
+                off = deviation(other.values, held[name].values, other.atol, other.rtol, first.engine)
+                if off is None:
+                    continue
+                if not off.within:
+                    return None
+                largest[name, order] = max(off.max_abs, largest.get((name, order), 0.0))
+    return largest
+
+
+def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
+    """What is out of tolerance against the reference."""
+    for order, quantity in enumerate(QUANTITIES):
+        for name, held in _held(case, beat, record, order).items():
+            reference: Array | None = getattr(case.reference.get(name), quantity, None)
+            if reference is None:
+                continue
+            found = deviation(held.values, reference, held.atol, held.rtol, str(case.truth))
+            if found is not None and found.max_abs > found.tolerance:
+                yield _Off(name, order, held, reference, found)
+
+
+def _explained(case: Case, beat: float, record: Record, off: Sequence[_Off]) -> tuple[list[Explanation], list[str]]:
+    """Slips that explain what is out of tolerance, alike ones together, and the outputs that none explains, by name."""
+    every = {order: _held(case, beat, record, order) for order in range(len(QUANTITIES))}
+    units = {output.name: output.unit for output in case.outputs}
+    found: dict[tuple[str, tuple[str, ...]], list[tuple[str, str, Slip]]] = {}
+    left: list[str] = []
+    names = list(dict.fromkeys(each.output for each in off))
+    for name in names[:MOST_EXPLAINED]:
+        fitting: dict[_Off, dict[str, Slip]] = {}
+        for each in (each for each in off if each.output == name):
+            others = {other: held for other, held in every[each.order].items() if other != name and units[other] == units[name]}
+            all_slips = slips(each.held, each.reference, others, offsets=each.order == 0)
+            fitting[each] = {slip.change: slip for slip in all_slips}
+        common = [words for words in next(iter(fitting.values())) if all(words in fits for fits in fitting.values())]
+        unexplained: list[str] = []
+        for quantities, changes in [([*fitting], common)] if common else [([each], [*fits]) for each, fits in fitting.items()]:
+            orders = sorted(each.order for each in quantities)
+            if not changes:
+                unexplained += [QUANTITIES[order] for order in orders]
+                continue
+            first = min(quantities, key=lambda each: each.order)
+            key = ", or ".join(changes), tuple(QUANTITIES[order] for order in orders)
+            found.setdefault(key, []).append((name, first.held.unit, fitting[first][changes[0]]))
+        left += [f"{name} ({', '.join(unexplained)})"] if unexplained else []
+    left += names[MOST_EXPLAINED:]
+    return [_explanation(*key, members) for key, members in found.items()], left
+
+
+def _explanation(change: str, quantities: Sequence[str], members: Sequence[tuple[str, str, Slip]]) -> Explanation:
+    _, unit, worst = max(members, key=lambda each: each[2].ratio)
+    return Explanation(
+        outputs=[name for name, _, _ in members],
+        quantities=list(quantities),
+        change=change,
+        difference=worst.difference,
+        tolerance=worst.tolerance,
+        unit=unit,
+    )

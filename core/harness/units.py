@@ -1,0 +1,58 @@
+"""Units of files: numbers to SI, and back to what the file has, for messages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+# Digits of a decimal that a double holds whatever they are; what needs more was computed, and is rounded.
+DIGITS, ROUNDED = 15, 10
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of length, angle or time; called with a number of it, it gives SI.
+
+    Attributes:
+        size: of one [m, rad or s].
+        convert: a number of it to SI.
+    """
+
+    name: str
+    size: float
+    convert: Callable[[float], float]
+
+    def __call__(self, number: float) -> float:
+        return self.convert(number)
+
+    def written(self, value: float, among: Iterable[float] = ()) -> str:
+        """Return a value in SI as the file has it, with the unit.
+
+        Args:
+            among: numbers of the file; the first of this value is quoted. Else it is the shortest decimal of this value, or if
+                that is long, a rounded one.
+        """
+        for number in among:
+            if self.convert(number) == value:
+                return f"{number!r} {self.name}"
+        number = value / self.size
+        decimals = (float(f"{number:.{digits}g}") for digits in range(1, DIGITS + 1))
+        exact = next((each for each in decimals if self.convert(each) == value), None)
+        return f"{number:.{ROUNDED}g} {self.name}" if exact is None else f"{plain(exact)} {self.name}"
+
+
+def plain(number: float) -> str:
+    """Return a number in the fewest digits that are it; a whole one without a point."""
+    return repr(float(number)).removesuffix(".0")
+
+
+METRE, RADIAN, SECOND = (Unit(name, 1.0, float) for name in ("m", "rad", "s"))
+LENGTHS: Mapping[str, Unit] = {
+    "m": METRE,
+    "mm": Unit("mm", 1e-3, lambda x: x / 1000.0),
+    "cm": Unit("cm", 1e-2, lambda x: x / 100.0),
+    "inch": Unit("inch", 0.0254, lambda x: x * 0.0254),
+    "foot": Unit("foot", 0.3048, lambda x: x * 0.3048),
+}
+ANGLES: Mapping[str, Unit] = {"rad": RADIAN, "deg": Unit("deg", math.pi / 180.0, math.radians)}
