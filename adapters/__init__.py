@@ -12,14 +12,14 @@ ENGINES = {
 """Name on the command line (and of the module) -> class: the engines in projection mode."""
 
 SIMULATIONS = {
-    "mujoco": ("mujoco_steps", "stiff"),
-    "mujoco-default": ("mujoco_steps", "default"),
-    "mujoco-projecting": ("mujoco_steps", "projecting"),
-    "pinocchio": ("pinocchio_dynamics", "Dynamics"),
-    "exudyn": ("exudyn_solvers", "trapezoidal"),
-    "exudyn-alpha": ("exudyn_solvers", "generalized_alpha"),
-    "exudyn-static": ("exudyn_solvers", "static"),
-    "exudyn-static-modified": ("exudyn_solvers", "static_modified"),
+    "mujoco": ("mujoco.steps", "stiff"),
+    "mujoco-default": ("mujoco.steps", "default"),
+    "mujoco-projecting": ("mujoco.steps", "projecting"),
+    "pinocchio": ("pinocchio.dynamics", "Dynamics"),
+    "exudyn": ("exudyn.solvers", "trapezoidal"),
+    "exudyn-alpha": ("exudyn.solvers", "generalized_alpha"),
+    "exudyn-static": ("exudyn.solvers", "static"),
+    "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
 }
 """Name on the command line -> module and what makes the engine: simulate mode. A simulator's bare name is its recommended solver.
 
@@ -40,4 +40,4 @@ WRITERS = ("mjcf", "exudyn", "urdf")
 
 def writer(name: str) -> Any:
     """The function that writes a mechanism in the format of that name; no simulator is needed for it."""
-    return importlib.import_module(f".write_{name}", __name__).write
+    return importlib.import_module(f".writers.{name}", __name__).write

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.analysis.prepare import Solver, prepare
-from ..core.analysis.request import LAST_ITERATION, Request
-from ..core.harness.case import Case
+from ..core.case.case import Case
+from ..core.kinematics.compiled.request import LAST_ITERATION, Request
+from ..core.kinematics.solver_selection import Solver, prepare
 from ..core.program.llvm.compiler import available
 from ..core.trajectory import Trajectory
 from ..core.version import VERSION

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.case.case import Case, Origin, Output, Series, Truth
+from ..core.case.io.case_file import load_case
+from ..core.case.io.document import remedy
 from ..core.errors import CaseError
-from ..core.harness.case import Case, Origin, Output, Series, Truth
-from ..core.harness.reading.casefile import load_case
-from ..core.harness.reading.document import remedy
 from .jet import Jet, Motion
 
 FOLDER = Path(__file__).parent

@@ -6,14 +6,7 @@ from typing import TYPE_CHECKING, Any
 from .version import VERSION
 
 if TYPE_CHECKING:
-    from .analysis.assembly.assemble import assemble
-    from .analysis.assembly.assemblies import find_assemblies
-    from .analysis.designs import solve_designs
-    from .analysis.singular.continuation import trace
-    from .analysis.solve import solve
-    from .drivers import JointAngle, JointDisplacement, PointCoordinate
     from .errors import CaseError, KincheckError, MechanismError, SolveError
-    from .harness.joint_check.check_joint import check_joint
     from .joints import (
         ConstantVelocity,
         Cylindrical,
@@ -35,8 +28,15 @@ if TYPE_CHECKING:
         Translational,
         Universal,
     )
-    from .mechanism import GROUND, Body, Mechanism, Point
-    from .motions import Ramp, Sine, Table
+    from .kinematics.assembly.assemble import assemble
+    from .kinematics.assembly.assembly_modes import find_assemblies
+    from .kinematics.continuation.trace import trace
+    from .kinematics.design_sweep import solve_designs
+    from .kinematics.solve import solve
+    from .mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
+    from .mechanism.mechanism import GROUND, Body, Mechanism, Point
+    from .mechanism.motions import Ramp, Sine, Table
+    from .studies.joint_check.check_joint import check_joint
 
 __version__ = VERSION
 
@@ -84,9 +84,12 @@ __all__ = [
 ]
 
 _ROOMS = (
-    *(".errors", ".mechanism", ".drivers", ".motions", ".joints"),
-    *(f".analysis.{name}" for name in ("solve", "designs", "assembly.assemble", "assembly.assemblies", "singular.continuation")),
-    ".harness.joint_check.check_joint",
+    *(".errors", ".mechanism.mechanism", ".mechanism.drivers", ".mechanism.motions", ".joints"),
+    *(
+        f".kinematics.{name}"
+        for name in ("solve", "design_sweep", "assembly.assemble", "assembly.assembly_modes", "continuation.trace")
+    ),
+    ".studies.joint_check.check_joint",
 )
 
 

@@ -7,10 +7,10 @@ import kincheck.adapters
 import kincheck.cases
 import pytest
 from kincheck.core import Joint
-from kincheck.core.harness import cli
+from kincheck.core.cli import main as cli
 
-from .fakes import Fake, crank
-from .running import forget_recent
+from .support.fakes import Fake, crank
+from .support.running import forget_recent
 
 NATIVE = Fake("native")
 

@@ -26,11 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import Vec3
+from ..case.case import ORDERS, Case, Quantity, Series, size, turning
 from ..errors import CaseError
 from ..jet import Jet
-from ..mechanism import Vector
+from ..mechanism.mechanism import Vector
 from ..trajectory import PER_TIME, QUANTITIES, Array, PointMotion, Trajectory
-from .case import ORDERS, Case, Quantity, Series, size, turning
 from .record import Deviation, Deviations, OutputSeries
 
 NO_VALUE = "has no value at"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from ..case.case import Case
 from ..trajectory import Trajectory
-from .case import Case
 
 
 class Engine(Protocol):

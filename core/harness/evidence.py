@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import msgspec
 import numpy as np
 
+from ..case.case import Case, Origin, Series, Truth
 from ..trajectory import QUANTITIES, Array
-from .case import Case, Origin, Series, Truth
 
 VALUES = "values"
 """What a digest is of where no file holds the reference."""

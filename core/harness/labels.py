@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+from ..case.case import PER_TRAVEL, Truth
 from ..trajectory import PER_TIME, QUANTITIES
-from .case import PER_TRAVEL, Truth
 from .record import Record, Results
 
 TRUTHS = {

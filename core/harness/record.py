@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 import msgspec
 
+from ..case.case import Truth
 from ..trajectory import QUANTITIES
-from .case import Truth
 from .evidence import Evidence, Suspect
 
 

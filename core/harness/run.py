@@ -11,13 +11,13 @@ from typing import Any
 
 import msgspec
 
+from ..case.case import Case, Truth
 from ..errors import CaseError
-from .attempt import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
-from .case import Case, Truth
-from .circumstances import results, truth_of
 from .compare import as_numbers
 from .engine import Engine
 from .evidence import Evidence, evidence
+from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
+from .provenance import results, truth_of
 from .record import Deviations, Outcome, Record, Results, Seconds
 from .standard import NATIVE, Standard, has_everything, standard_of
 from .verdict import Verdict, judged, promised

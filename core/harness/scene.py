@@ -9,13 +9,13 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from ..analysis.prepare import prepare
-from ..analysis.request import Request
+from ..case.case import MARKER, Case
 from ..errors import KincheckError
 from ..joints import Kind
-from ..mechanism import Vector
+from ..kinematics.compiled.request import Request
+from ..kinematics.solver_selection import prepare
+from ..mechanism.mechanism import Vector
 from ..trajectory import Array, BodyMotion
-from .case import MARKER, Case
 from .record import Record, Results, Scene, SceneBody, SceneJoint, ScenePoint
 from .run import NATIVE
 

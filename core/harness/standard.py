@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .case import Case, Series
+from ..case.case import Case, Series
 from .record import OutputSeries, Record
 
 NATIVE = "native"

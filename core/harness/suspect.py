@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..case.case import TIME, Case
+from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
 from ..trajectory import PER_TIME, QUANTITIES, Array
-from .case import TIME, Case
 from .compare import deviation, pace
 from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
 from .slips import Held, Slip, slips
-from .units import ANGLES, LENGTHS, SECOND, Unit
 
 # A sentence that explains more outputs than these is not read; further ones are counted.
 MOST_EXPLAINED = 12

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..case.case import Case
 from ..trajectory import Trajectory
-from .case import Case
 
 
 @dataclass(frozen=True)

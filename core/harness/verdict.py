@@ -10,11 +10,11 @@ from time import perf_counter
 import msgspec
 import numpy as np
 
+from ..case.case import Case, Quantity
 from ..errors import shortened
-from .attempt import Answer
-from .case import Case, Quantity
 from .compare import NO_VALUE, describe, deviations, size
 from .engine import Engine
+from .execution import Answer
 from .record import Deviation, Deviations, Outcome
 from .standard import NATIVE, Standard, known
 

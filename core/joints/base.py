@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Self
 
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
 from ..errors import MechanismError, Phrase
-from ..given import held, plain, require_direction, require_finite, triple
+from ..input_checks import held, plain, require_direction, require_finite, triple
 from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
 from ..primitives import Spherical as SphericalCondition
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
 from ..errors import MechanismError
-from ..given import held, plain, require_finite
+from ..input_checks import held, plain, require_finite
 from .base import Kind, register
 
 NUMBERS = (float, int, "float", "int")

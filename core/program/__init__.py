@@ -1,23 +1,10 @@
 """Programs: equations traced to lists of operations, and what runs them."""
 
 from .elimination import Elimination
-from .executor import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
 from .numpy_executor import NumpyExecutor
+from .plan import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
 from .straight_line import Prepared, Program, program
-from .trace import (
-    NODES,
-    Tape,
-    Traced,
-    absolute,
-    before,
-    cos,
-    groups_behind,
-    maximum,
-    minimum,
-    place_of,
-    sin,
-    where_larger,
-)
+from .tape import NODES, Tape, Traced, absolute, before, cos, groups_behind, maximum, minimum, place_of, sin, where_larger
 
 __all__ = [
     "DONE",

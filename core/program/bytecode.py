@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .lowering import counts, lowered, unrolled
 from .straight_line import Program
-from .trace import Node, operands, place_of
+from .tape import Node, operands, place_of
 
 ARITY = {
     **dict.fromkeys(("copy", "node", "neg", "abs", "sqrt", "sin", "cos"), 1),

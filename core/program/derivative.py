@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 from ..algebra import Scalar
-from .trace import Tape, Traced, cos, operands, sin
+from .tape import Tape, Traced, cos, operands, sin
 
 Gradient: TypeAlias = dict[int, Scalar]
 """Derivatives by the inputs that matter, by place of the input."""

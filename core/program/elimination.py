@@ -17,7 +17,7 @@ from operator import add, mul
 import numpy as np
 
 from ..algebra import Scalar, is_literal_zero
-from .trace import Traced, absolute, maximum, minimum, where_larger
+from .tape import Traced, absolute, maximum, minimum, where_larger
 
 SAFE_LITERAL = 0.5
 # Larger cores are not judged by their comparison matrix.

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from .straight_line import Program
-from .trace import LEAVES, Node, operands
+from .tape import LEAVES, Node, operands
 
 FUSED = frozenset({"fma", "fnma", "fms"})
 """a b + c, c - a b and a b - c, of operands a, b, c."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from .executor import LINE
+from .plan import LINE
 
 BYTES = 8
 """Of a number."""

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from .executor import MARGIN, Parts, Side
 from .numpy_lanes import NumpyLanes
 from .numpy_track import NumpyTrack
-from .trace import NODES
+from .plan import MARGIN, Parts, Side
+from .tape import NODES
 
 
 class NumpyExecutor(NumpyLanes):

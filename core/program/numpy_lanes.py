@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..trajectory import Array
-from .executor import DONE, ITERATIONS, Plan, Table
+from .plan import DONE, ITERATIONS, Plan, Table
 from .straight_line import Program
-from .trace import LEAVES, operands, place_of
+from .tape import LEAVES, operands, place_of
 
 
 def _min(a: Array, b: Array, out: Array) -> None:

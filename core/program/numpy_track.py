@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..trajectory import Array
-from .executor import MARGIN, Side
 from .numpy_lanes import NumpyLanes
+from .plan import MARGIN, Side
 
 
 def _leading(margins: Array) -> int:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..algebra import Scalar
-from .trace import LEAVES, Node, Tape, Traced, operands
+from .tape import LEAVES, Node, Tape, Traced, operands
 
 FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"})
 

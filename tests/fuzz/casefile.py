@@ -1,16 +1,16 @@
 """Case files, TOML and JSON: read, and driven as `kincheck run` asks."""
 
 import kincheck.cases
-from kincheck.core.analysis.structure.driven import require_driven
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.document import fault
+from kincheck.core.case.io.driving import DRIVERS
+from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.errors import KincheckError
-from kincheck.core.harness.reading.casefile import load_case
-from kincheck.core.harness.reading.document import fault
-from kincheck.core.harness.reading.driving import DRIVERS
-from kincheck.core.harness.suspension import SuspensionOutput
 from kincheck.core.joints import Coupler, Joint
-from kincheck.core.motions import Motion
+from kincheck.core.kinematics.structure.driver_count import require_driven
+from kincheck.core.mechanism.motions import Motion
 
-from ..case_texts import BASE, INLINE
+from ..support.case_texts import BASE, INLINE
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_json, changed_toml
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from kincheck.core.harness.reading.files import load
-from kincheck.core.harness.reading.hardpoints.templates import TEMPLATES
-from kincheck.core.harness.reading.supplied import Supplied
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_json, changed_lines

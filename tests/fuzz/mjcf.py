@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-from kincheck.core.harness.reading.files import load
-from kincheck.core.harness.reading.mjcf.attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
-from kincheck.core.harness.reading.supplied import Supplied
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.mjcf.attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
 
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_xml

@@ -6,9 +6,9 @@ from functools import cache
 from pathlib import Path
 
 import kincheck.cases
-from kincheck.core.harness.reading.casefile import load_case
+from kincheck.core.case.io.case_file import load_case
 
-from ..case_texts import BASE, CSV
+from ..support.case_texts import BASE, CSV
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_json, changed_lines
 

@@ -7,16 +7,16 @@ from xml.etree import ElementTree
 
 import kincheck.cases
 import msgspec
-from kincheck.core.harness.reading.results import read_results
 from kincheck.core.harness.record import to_json
-from kincheck.core.harness.reporting.junit import to_junit
-from kincheck.core.harness.reporting.matrix import print_matrix, to_markdown
-from kincheck.core.harness.reporting.report import render
-from kincheck.core.harness.reporting.table import print_table
-from kincheck.core.harness.reporting.views import Material
+from kincheck.core.harness.results_file import read_results
 from kincheck.core.harness.scene import scene
+from kincheck.core.report.junit import to_junit
+from kincheck.core.report.matrix import print_matrix, to_markdown
+from kincheck.core.report.page_model import Material
+from kincheck.core.report.report import render
+from kincheck.core.report.table import print_table
 
-from ..made_up import results
+from ..support.made_up import results
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_json
 

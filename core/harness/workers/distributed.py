@@ -13,10 +13,10 @@ from uuid import uuid4
 
 from ...errors import KincheckError
 from ...version import VERSION
-from ..attempt import Attempt, Attempts, Failure, Pair, Solver, said
+from ..execution import Attempt, Attempts, Failure, Pair, Solver, said
 from ..record import Outcome
-from .frames import pack
-from .limits import Limits
+from ..resource_limits import Limits
+from .messages import pack
 from .worker import Seat
 
 # For a port to answer [s], and as long again for a scheduler behind it: each takes milliseconds, unless packets are lost, which are

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from queue import SimpleQueue
 from threading import Lock, Thread
 
-from ..attempt import Attempt, Attempts, Failure, Pair, Solver, said
+from ..execution import Attempt, Attempts, Failure, Pair, Solver, said
 from ..record import Outcome
-from .frames import pack
-from .limits import Limits
+from ..resource_limits import Limits
+from .messages import pack
 from .worker import Seat
 
 

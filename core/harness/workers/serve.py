@@ -14,10 +14,10 @@ import sys
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-from ..attempt import Attempt, Failure, attempt, said
+from ..execution import Attempt, Failure, attempt, said
 from ..record import Outcome
-from .frames import pack, read, write
-from .limits import restrict
+from ..resource_limits import restrict
+from .messages import pack, read, write
 
 READY = b"ready"
 

@@ -14,11 +14,11 @@ from dataclasses import replace
 from threading import Lock, Thread, Timer
 from typing import IO, BinaryIO, cast
 
-from ..attempt import Attempt, Facts, Failure, bounded
-from ..circumstances import THREADS, readable
+from ..execution import Attempt, Facts, Failure, bounded
+from ..provenance import THREADS, readable
 from ..record import Outcome
-from .frames import pack, read, write
-from .limits import STARTUP, Limits
+from ..resource_limits import STARTUP, Limits
+from .messages import pack, read, write
 from .serve import READY, Setup
 
 COMMAND = "from kincheck.core.harness.workers.serve import serve; serve()"

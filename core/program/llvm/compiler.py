@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..disk_cache import kept
-from . import image
+from . import elf_loader
 
 TRAITS = b"vendor_id", b"cpu family", b"model", b"stepping", b"flags"
 """What the system says of a processor, and LLVM goes by."""
@@ -70,7 +70,7 @@ def emitted(text: str) -> bytes:
     """Machine code of a text: an object file."""
     here = processor()
     # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line code
-    options = {"opt": 1, "reloc": "pic", "codemodel": "small"} if image.possible() else {"opt": 1}
+    options = {"opt": 1, "reloc": "pic", "codemodel": "small"} if elf_loader.possible() else {"opt": 1}
     machine = llvm().Target.from_default_triple().create_target_machine(cpu=here.name, features=here.features, **options)
     return machine.emit_object(llvm().parse_assembly(text))
 
@@ -91,7 +91,7 @@ def _asked() -> bytes:
 
 def _described() -> bytes | None:
     """What the system says of the first processor, and which llvmlite is installed; None where that is not known."""
-    if not image.possible():
+    if not elf_loader.possible():
         return None
     found = importlib.util.find_spec("llvmlite")
     if found is None or found.origin is None:

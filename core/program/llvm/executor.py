@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ...trajectory import Array
-from ..executor import LINE, Parts, Side, Table
 from ..memory import BYTES, address, aligned
-from .follow import MOTION, SIDE
-from .machine_code import LlvmCode
+from ..plan import LINE, Parts, Side, Table
+from .jit import LlvmCode
+from .one_motion import MOTION, SIDE
 
 OUT, FORGET = (MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = SIDE.index("i64 reached")

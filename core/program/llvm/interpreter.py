@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..bytecode import ARITY, KINDS
-from .code import Lines
+from .ir_writer import Lines
 
 MASK = "larger"
 """The operation whose values are true or false: all bits of a number, or none."""

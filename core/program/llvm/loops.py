@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from .code import Lines
+from .ir_writer import Lines
 from .plan import Rows, call, function, over
 
 

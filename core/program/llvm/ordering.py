@@ -11,7 +11,7 @@ from __future__ import annotations
 from heapq import heappop, heappush
 
 from ..straight_line import Program
-from ..trace import LEAVES, operands
+from ..tape import LEAVES, operands
 
 CYCLES = {"/": 24, "sqrt": 32, "larger": 5, "before": 3, "umax": 3, "where": 1, "abs": 1, "neg": 1}
 """After how many cycles a result is there, of vectors of eight on Intel's Golden Cove (uops.info); of all others after four."""

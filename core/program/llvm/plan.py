@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..executor import DONE, ITERATIONS, MARGIN, Plan, shifted
-from .code import Lines
+from ..plan import DONE, ITERATIONS, MARGIN, Plan, shifted
+from .ir_writer import Lines
 
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
 """Slots that loops read and write, by their names in the plan."""

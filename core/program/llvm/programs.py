@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from ..lowering import lowered
 from ..straight_line import Program
-from ..trace import LEAVES, Node, operands, place_of
-from .code import Lines
+from ..tape import LEAVES, Node, operands, place_of
+from .ir_writer import Lines
 from .ordering import ordered
 
 # Values held at once, of 32 registers: LLVM's own schedule moves lines about. With 16, narrower vectors, LLVM does as well alone.

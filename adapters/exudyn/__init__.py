@@ -1,0 +1,1 @@
+"""Exudyn: projection by its constraint rows, and its own solvers."""

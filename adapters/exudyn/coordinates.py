@@ -1,0 +1,93 @@
+"""Drivers and relations as coordinate constraints that Exudyn's own solvers see; private to its adapter.
+
+A generic joint with a moving offset has no rate, so a driven coordinate is a constraint on Exudyn's relative coordinate of two
+bodies, and so are the relations of a screw, a gear, a rack and its pinion. Values of the drivers come from Python, by a table that
+is made before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.joints.base import unit
+from ...core.mechanism.drivers import Driver, JointDriver, PointCoordinate
+from ...core.mechanism.mechanism import GROUND
+from .rows import Rows
+
+
+class DriverTable:
+    """Values and rates of the drivers at every step of a leg; Exudyn asks for them by its time."""
+
+    def __init__(self) -> None:
+        self.per_second, self.rows = 1.0, list[list[list[float]]]()
+
+    def reader(self, order: int, value: int) -> Any:
+        """A user function of Exudyn."""
+
+        def at(mbs: Any, t: float, number: int, offset: float) -> float:
+            return self.rows[order][value][round(t * self.per_second)]
+
+        return at
+
+
+class Coordinates(Rows):
+    """The rows, with drivers and relations that Exudyn's own solvers see.
+
+    Attributes:
+        angles: relative angles, whose turns are counted: which driver's value each is, or None.
+    """
+
+    def __init__(self, mbs: Any, items: Any, case: Case, table: DriverTable) -> None:
+        self.table = table
+        self.angles: list[int | None] = []
+        super().__init__(mbs, items, case.mechanism)
+
+    def relative(self, name: str, freedom: str, value: int | None = None) -> int:
+        """A marker of the coordinate of a joint."""
+        joint: Any = self.mechanism.joint(name)
+        if freedom == "translation":
+            return self.shift(joint.i, joint.j, joint.point, joint.axis)
+        (i, _), (j, _) = (self.bodies[body] for body in joint.bodies)
+        node = self.mbs.AddNode(self.items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1))
+        self.angles.append(value)
+        axis = [*unit(joint.axis)]
+        marker = self.items.MarkerBodiesRelativeRotationCoordinate(bodyNumbers=[i, j], nodeNumber=node, axis0=axis)
+        return self.mbs.AddMarker(marker)
+
+    def shift(self, i: str, j: str, point: Sequence[float], axis: Sequence[float]) -> int:
+        """A marker of the displacement of a point of body j along an axis of body i."""
+        numbers, origins = zip(*(self.bodies[body] for body in (i, j)), strict=True)
+        arms = [np.subtract(point, origin) for origin in origins]
+        marker = self.items.MarkerBodiesRelativeTranslationCoordinate(
+            bodyNumbers=[*numbers], localPosition0=arms[0], localPosition1=arms[1], axis0=[*unit(axis)]
+        )
+        return self.mbs.AddMarker(marker)
+
+    def drive(self, driver: Driver, value: int) -> None:
+        if isinstance(driver, PointCoordinate):
+            point = self.mechanism.point(driver.point)
+            marker = self.shift(GROUND, point.body, point.position, driver.direction)
+        else:
+            assert isinstance(driver, JointDriver)
+            marker = self.relative(driver.joint, driver.freedom, value)
+        still = self.mbs.AddNode(self.items.NodePointGround())
+        rest = self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=still, coordinate=0))
+        self.connect(
+            self.items.ObjectConnectorCoordinate(
+                markerNumbers=[rest, marker],
+                offset=1.0,
+                offsetUserFunction=self.table.reader(0, value),
+                offsetUserFunction_t=self.table.reader(1, value),
+            ),
+            range(1),
+        )
+
+    def relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
+        (one, large), (other, small) = sorted(
+            ((self.relative(joint, freedom), weight) for joint, freedom, weight in terms), key=lambda term: -abs(term[1])
+        )
+        self.connect(self.items.ObjectConnectorCoordinate(markerNumbers=[other, one], factor1=-large / small), range(1))

@@ -1,0 +1,190 @@
+"""Exudyn in projection mode: its absolute rigid-body coordinates, its joints, its constraint residual and Jacobian.
+
+Every moving body has a node of its own with Euler parameters, so a closed loop is no different from a chain. What the joints
+and drivers become is in `exudyn_rows`; a row may follow a driver's value or an unknown besides Exudyn's coordinates.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.errors import SolveError
+from ...core.harness.engine import Floor
+from ...core.trajectory import Array
+from ..shared.compiled_floor import floor_of
+from ..shared.length_scaling import in_own_frame
+from ..shared.projection_engine import ProjectionEngine
+from .rows import JOINTS, NO_ROTATION, Rows, turned
+
+# Largest change of a coordinate per step of the differences of the Jacobian [units of length or -]. Round-off, 1e-16 / 1e-3, and
+# truncation, (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
+DIFFERENCE = 1e-3
+# Central differences of sixth order: h f' = sum of weight * f(k h).
+WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+
+
+class Exudyn(ProjectionEngine):
+    """The engine `exudyn`."""
+
+    name, title, joints = "exudyn", "Exudyn", JOINTS
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """What Exudyn's bodies are, and what its solver evaluates."""
+        return {
+            "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
+            "residual": "ComputeAlgebraicEquations",
+            "jacobian": "ComputeNewtonJacobian, constraint rows",
+            "acceleration": f"Jacobian differentiated along the velocity, sixth order, coordinates changed by {DIFFERENCE:g}",
+        }
+
+    def build(self, case: Case) -> ExudynModel:
+        """Exudyn's system of the case, at the design position."""
+        return ExudynModel(in_own_frame(case))
+
+    def floor(self, case: Case) -> Floor:
+        """Bound it by the static solver's residual and Jacobian; rates take two more Jacobians, which a difference needs."""
+        model = self.build(case)
+        solved = self.solve(model, case, 1e-12)
+        _container, mbs, settings, solver = _least()
+        residual = (lambda: model.solver.ComputeAlgebraicEquations(model.mbs), lambda: solver.ComputeAlgebraicEquations(mbs), 1)
+        own, empty = (
+            partial(s.ComputeNewtonJacobian, m, t)
+            for s, m, t in ((model.solver, model.mbs, model.settings), (solver, mbs, settings))
+        )
+        pose = {"ComputeAlgebraicEquations": residual, "ComputeNewtonJacobian": (own, empty, 1)}
+        return floor_of(self, solved, model.unknowns, pose, {"ComputeNewtonJacobian (rates)": (own, empty, 2)})
+
+
+def _least() -> tuple[Any, Any, Any, Any]:
+    """Container, system, settings and solver of the least that Exudyn takes: one free coordinate."""
+    exu: Any = importlib.import_module("exudyn")
+    items: Any = importlib.import_module("exudyn.itemInterface")
+    exu.config.printToConsole = False
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    mbs.AddObject(items.ObjectMass1D(nodeNumber=mbs.AddNode(items.Node1D()), mass=1.0))
+    mbs.Assemble()
+    settings, solver = exu.SimulationSettings(), exu.MainSolverStatic()
+    settings.solution.file.write = False
+    solver.InitializeSolver(mbs, settings)
+    return container, mbs, settings, solver
+
+
+class ExudynModel:
+    """A `ProjectionModel`; the unknowns: Exudyn's displacements of the node coordinates (position, Euler parameters), then
+    those that rows share (see `exudyn_rows`)."""
+
+    def __init__(self, case: Case) -> None:
+        exu: Any = importlib.import_module("exudyn")
+        exu.config.printToConsole = False  # results are reported by the harness; Exudyn's own banners would mix with them
+        self.container: Any = exu.SystemContainer()  # owns the system and must live as long
+        self.mbs: Any = self.container.AddSystem()
+        rows = Rows(self.mbs, importlib.import_module("exudyn.itemInterface"), case.mechanism)
+        self.mbs.Assemble()
+
+        self.settings: Any = exu.SimulationSettings()
+        self.settings.solution.file.write = False
+        self.solver: Any = exu.MainSolverStatic()
+        if not self.solver.InitializeSolver(self.mbs, self.settings):
+            raise SolveError(f"case {case.name!r}: Exudyn does not initialise its solver: {self.solver.GetErrorString()}")
+        self.state: Any = self.mbs.systemData
+        self.coordinates = int(self.solver.GetODE2size())
+        normalisation = [self.mbs.GetNodeAEIndex(node) for node in rows.nodes]
+        constraints = [self.state.GetObjectLTGAE(row.item)[row.index] for row in rows.rows]
+        # in Exudyn's vector and matrix of the whole system the algebraic rows come after those of the coordinates
+        self.kept = self.coordinates + np.array(constraints + normalisation)
+        self.target = np.array([row.keeps for row in rows.rows] + [0.0] * len(normalisation))
+
+        self.followed = np.zeros((len(self.kept), rows.values))  # rows by values: those of the drivers, then the shared unknowns
+        for each in rows.following:
+            self.followed[each.row, each.value] = each.weight
+        self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
+        self.unknowns = self.coordinates + rows.values - len(case.mechanism.drivers)
+        self.turning = [
+            (row, pair, np.array(self.mbs.GetMarkerParameter(pair[0], "localHT"))) for row, pair in rows.turning.items()
+        ]
+        points = [(rows.bodies[point.body], np.array(point.position)) for point in map(case.mechanism.point, case.points)]
+        self.wanted = [(number, position - origin) for (number, origin), position in points]
+        self.ground = rows.ground
+        kinds = exu.OutputVariableType
+        self.rotation = kinds.RotationMatrix
+        self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
+        self.details = {"rows": len(self.target)}
+        self.reset()
+
+    def reset(self) -> None:
+        self.restore(np.zeros(self.unknowns))
+
+    def save(self) -> Array:
+        return self.x
+
+    def restore(self, saved: Array) -> None:
+        self.x = saved
+        self.state.SetODE2Coordinates(self.q)
+
+    @property
+    def q(self) -> Array:
+        """Exudyn's part of the unknowns."""
+        return self.x[: self.coordinates]
+
+    def move(self, dx: Array) -> None:
+        # Exudyn's Jacobian is exact along the unit sphere of the Euler parameters only: off it, Newton is no longer quadratic.
+        x = self.x + dx
+        q = x[: self.coordinates].reshape(-1, 7)
+        parameters = q[:, 3:] + NO_ROTATION
+        q[:, 3:] = parameters / np.linalg.norm(parameters, axis=1, keepdims=True) - NO_ROTATION
+        self.restore(x)
+
+    def residual(self, c: Array) -> Array:
+        values = self.followed @ np.concatenate([c, self.x[self.coordinates :]])
+        for row, (first, second), frame in self.turning:
+            self.mbs.SetMarkerParameter(first, "localHT", frame @ turned(values[row]))
+            # The frame is there: the row is the sine of the angle still missing. From beyond a quarter turn Newton would go to the
+            # other zero of the sine; a residual that is not finite tells the walk to take a shorter step.
+            values[row] = 0.0 if self._x_axis(first) @ self._x_axis(second) > 0.0 else np.nan
+        self.solver.ComputeAlgebraicEquations(self.mbs)
+        return self.solver.GetSystemResidual()[self.kept] - self.target - values
+
+    def _x_axis(self, marker: int) -> Array:
+        return self.mbs.GetMarkerOutput(marker, self.rotation)[::3]
+
+    def jacobian(self) -> Array:
+        return np.hstack([self._jacobian(), -self.shared])
+
+    def _jacobian(self) -> Array:
+        """Derivative of the rows by Exudyn's coordinates."""
+        # ComputeJacobianAE would add to what is there; this call clears it first
+        self.solver.ComputeNewtonJacobian(self.mbs, self.settings)
+        return self.solver.GetSystemJacobian()[self.kept, : self.coordinates]
+
+    def driver_columns(self) -> Array:
+        return self.driven
+
+    def bias(self, v: Array) -> Array:
+        # The turned frames rest meanwhile: where the rows are met, the terms that their motion would add are all zero.
+        # The step follows the speed, so the accuracy does not depend on the rate of the sweep.
+        v = v[: self.coordinates]
+        h, total = DIFFERENCE / (np.abs(v).max() or 1.0), np.zeros(len(self.kept))
+        for k, weight in WEIGHTS:
+            self.state.SetODE2Coordinates(self.q + k * h * v)
+            total += weight * (self._jacobian() @ v)
+        self.state.SetODE2Coordinates(self.q)
+        return total / h
+
+    def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
+        self.state.SetODE2Coordinates_t(v[: self.coordinates])
+        self.state.SetODE2Coordinates_tt(a[: self.coordinates])
+        return [self._motion(body, arm) for body, arm in self.wanted]
+
+    def _motion(self, body: int, arm: Array) -> tuple[Array, Array, Array]:
+        if body == self.ground:  # Exudyn has no acceleration output there
+            return arm, np.zeros(3), np.zeros(3)
+        position, velocity, acceleration = (self.mbs.GetObjectOutputBody(body, kind, arm) for kind in self.output_types)
+        return position, velocity, acceleration

@@ -1,0 +1,253 @@
+"""Exudyn in simulate mode: its own static and dynamic solvers over a whole leg of the sweep.
+
+Joints are those of projection, drivers and relations those of `exudyn_coordinates`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...core import joints
+from ...core.case.case import Case
+from ...core.joints.base import unit
+from ...core.kinematics.compiled.motion_start import start_of as where_from
+from ...core.trajectory import Array, Trajectory
+from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
+from .coordinates import Coordinates, DriverTable
+from .exudyn import Exudyn, ExudynModel
+
+# Where a row keeps a number other than zero, Exudyn's objects do not; this much is round-off, and below what a residual may be.
+NOTHING = 1e-12
+# Times of equidistant samples differ in their spacing by no more than their round-off, as part of the spacing.
+EQUIDISTANT = 1e-6
+# Of its Newton iteration, relative and absolute: what leaves the constraints at round-off.
+TIGHT = 1e-12
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Exudyn's solver.
+
+    Attributes:
+        kind: "static", a load step a sample, positions only; "trapezoidal", of index 2, so constraints hold for rates and drift for
+            positions; "generalized alpha", of index 3, so constraints hold for positions and rates drift.
+        modified: whether Newton keeps its Jacobian from step to step; a dynamic solver always does, which is its default.
+        tolerance: of Newton, relative and absolute.
+        steps: between samples.
+    """
+
+    name: str
+    kind: str
+    modified: bool = True
+    tolerance: float = TIGHT
+    steps: int = 1
+    mode = "simulate"
+    loop = "simulator"
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Everything that is not as Exudyn has it."""
+        return {
+            "solver": {
+                "static": "SolveStatic",
+                "trapezoidal": "SolveDynamic, TrapezoidalIndex2",
+                "generalized alpha": "SolveDynamic, GeneralizedAlpha, spectral radius 0.6, index 3",
+            }[self.kind],
+            "newton": f"{'modified' if self.modified else 'full'}, relative and absolute tolerance {self.tolerance:g}",
+            "steps per sample": self.steps,
+            "drivers": "coordinate constraints on relative coordinates, values from a table by a Python function",
+            "linear solver": "EXUdense; where rows are redundant, EigenDense that ignores it",
+        }
+
+    def version(self) -> str | None:
+        """Version of Exudyn, or None where it cannot be imported."""
+        return Exudyn().version()
+
+    def unsupported(self, case: Case) -> str | None:
+        """Return the joint, driver or grid of samples that has no counterpart here, or None."""
+        reason = Exudyn().unsupported(case)
+        if reason is not None:
+            return reason
+        for joint in case.mechanism.joints:
+            if isinstance(joint, joints.ConstantVelocity):
+                return f"{joint}: Exudyn's own solvers have no object that ties two products, which the joint needs"
+            kept = _kept(joint)
+            if abs(kept) > NOTHING:
+                return f"{joint} keeps a product at {kept:.3g}, at which Exudyn's own objects keep only zero; make its axes exact"
+        times = case.sweep.path.times
+        if len(times) > 1 and np.ptp(np.diff(times)) > EQUIDISTANT * np.abs(np.diff(times)).max():
+            return "samples are not equidistant in time, and Exudyn's steps are; give the sweep by start, stop and steps"
+        if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
+            return "turns of coupled joints are counted from the design, where this motion does not begin"
+        return None
+
+    def efforts(self) -> Mapping[str, Solver]:
+        """Return the efforts by the tolerance of Newton, or by the number of steps."""
+        if self.kind == "static":
+            return {f"Newton to {tol:g}": replace(self, tolerance=tol) for tol in (1e-2, 1e-4, 1e-8, 1e-12, 1e-14)}
+        return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
+
+    def floor(self, case: Case) -> None:
+        """Return None: its loop is its own."""
+
+    def build(self, case: Case) -> _Solved:
+        """Exudyn's system, and where it sets off."""
+        return _Solved(case, self)
+
+    def solve(self, model: _Solved, case: Case, tol: float) -> Trajectory:
+        """All samples that can be simulated; tol is not Exudyn's, see the settings."""
+        return simulated(case, model.start, model.run, model.details)
+
+
+def trapezoidal() -> Solver:
+    """Time steps, the only ones whose accelerations do not ring."""
+    return Solver("exudyn", "trapezoidal", steps=4)
+
+
+def generalized_alpha() -> Solver:
+    """Time steps that keep the constraints of the positions."""
+    return Solver("exudyn-alpha", "generalized alpha", steps=4)
+
+
+def static() -> Solver:
+    """Load steps, full Newton."""
+    return Solver("exudyn-static", "static", modified=False)
+
+
+def static_modified() -> Solver:
+    """Load steps, modified Newton."""
+    return Solver("exudyn-static-modified", "static")
+
+
+def _kept(joint: joints.Joint) -> float:
+    """What the last row of a joint keeps [m or -]."""
+    if isinstance(joint, joints.Universal | joints.PerpendicularAxes):
+        return unit(joint.axes[0]) @ unit(joint.axes[1])
+    if isinstance(joint, joints.RevoluteSpherical):
+        return float(np.array([*unit(joint.axis)]) @ np.subtract(joint.points[1], joint.points[0]))
+    return 0.0
+
+
+class _Solved:
+    def __init__(self, case: Case, how: Solver) -> None:
+        self.exu: Any = importlib.import_module("exudyn")
+        self.how, self.of = how, ExudynModel(case)
+        self.start = start_of(self.of, case)
+        self.container: Any = self.exu.SystemContainer()
+        mbs = self.mbs = self.container.AddSystem()
+        items: Any = importlib.import_module("exudyn.itemInterface")
+        self.table = DriverTable()
+        rows = Coordinates(mbs, items, case, self.table)
+        self.angles = rows.angles
+        kinds = self.exu.OutputVariableType
+        self.sensors: list[list[int]] = []
+        self.still: dict[int, Array] = {}
+        for k, point in enumerate(map(case.mechanism.point, case.points)):
+            number, origin = rows.bodies[point.body]
+            arm = np.array(point.position) - origin
+            if number == rows.ground:  # Exudyn has no acceleration output there
+                self.still[k] = arm
+            wanted = (kinds.Position,) if how.kind == "static" else (kinds.Position, kinds.Velocity, kinds.Acceleration)
+            make = {"bodyNumber": number, "localPosition": arm, "storeInternal": True, "writeToFile": False}
+            asked = () if k in self.still else wanted
+            self.sensors.append([mbs.AddSensor(items.SensorBody(**make, outputVariableType=kind)) for kind in asked])
+        state = kinds.Coordinates
+        self.nodes = [
+            mbs.AddSensor(items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=state))
+            for node in rows.nodes
+        ]
+        mbs.Assemble()
+        self.settings = self._settings()
+        self.own = ~self.of.shared.any(axis=1)  # rows that follow no unknown beyond Exudyn's coordinates
+        self.details: dict[str, Any] = {"rows": len(rows.rows), "independent_rows": self.start.independent}
+
+    def _settings(self) -> Any:
+        settings = self.exu.SimulationSettings()
+        settings.solution.file.write = False
+        settings.solution.sensors.writePeriod = 1e-9  # at every step
+        types = self.exu.LinearSolverType
+        settings.linearSolver.solverType = types.EXUdense if self.start.independent else types.EigenDense
+        settings.linearSolver.ignoreSingularJacobian = not self.start.independent
+        for each in (settings.staticSolver, settings.timeIntegration):
+            each.verboseMode, each.adaptiveStep = 0, False
+            each.newton.relativeTolerance = each.newton.absoluteTolerance = self.how.tolerance
+            each.newton.useModifiedNewton = self.how.modified
+        alpha = settings.timeIntegration.generalizedAlpha
+        alpha.spectralRadius, alpha.useNewmark, alpha.useIndex2Constraints = 0.6, False, False
+        alpha.computeInitialAccelerations = False  # it would take the drivers, which it knows by their values, for unaccelerated
+        return settings
+
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
+        """The poses of a leg."""
+        steps = self.how.steps
+        n = (len(leg.samples) - 1) * steps
+        # the times of all steps, those of the samples among them as they are
+        times = np.interp(np.arange(n + 1) / steps, np.arange(len(leg.samples)), leg.times)
+        driven = leg.drive(times)
+        if not n:  # its sensors store what solvers go through
+            known = self.start.points.copy()
+            if self.how.kind == "static":
+                known[1:] = np.nan
+            yield SimulatedPose(known, self.start.residual, 0)
+            return
+        self.table.rows = driven.tolist()
+        self.set_off(leg, driven)
+        failed = ""
+        try:
+            self.advance(n, abs(float(times[-1] - times[0])))
+        except RuntimeError as error:  # Exudyn's SolverError; what is stored up to there is good
+            failed = str(error).strip().split("\n")[0]
+        yield from self.poses(driven)
+        if failed:
+            raise SimulationEndedError(f"Exudyn: {failed}")
+
+    def set_off(self, leg: Leg, driven: Array) -> None:
+        """Exudyn's initial values."""
+        state, initial = self.mbs.systemData, self.exu.ConfigurationType.Initial
+        n = self.of.coordinates
+        state.SetODE2Coordinates(self.start.configuration[:n], initial)
+        state.SetODE2Coordinates_t(leg.sign * self.start.v[:n], initial)
+        state.SetODE2Coordinates_tt(self.start.a[:n], initial)
+        if self.angles:
+            state.SetDataCoordinates([0.0 if value is None else driven[0, value, 0] for value in self.angles], initial)
+
+    def advance(self, steps: int, duration: float) -> None:
+        """Let Exudyn go on to the end of the leg."""
+        if self.how.kind == "static":
+            static = self.settings.staticSolver
+            static.numberOfLoadSteps = static.loadStepDuration = steps
+            self.table.per_second = 1.0
+            self.mbs.SolveStatic(self.settings, showHints=False)
+        else:
+            dynamic, solvers = self.settings.timeIntegration, self.exu.DynamicSolverType
+            dynamic.numberOfSteps, dynamic.endTime = steps, duration
+            self.table.per_second = steps / duration
+            solver = solvers.TrapezoidalIndex2 if self.how.kind == "trapezoidal" else solvers.GeneralizedAlpha
+            self.mbs.SolveDynamic(self.settings, solverType=solver, showHints=False)
+
+    def poses(self, driven: Array) -> Iterator[SimulatedPose]:
+        """What Exudyn has stored, sample by sample; the residual is that of the last one, where drift is largest."""
+        steps = self.how.steps
+        stored = [[self.stored(sensor)[::steps] for sensor in sensors] for sensors in self.sensors]
+        state = np.hstack([self.stored(sensor) for sensor in self.nodes])[::steps]
+        last = len(state) - 1
+        self.of.restore(np.concatenate([state[last], np.zeros(self.of.unknowns - self.of.coordinates)]))
+        residual = float(np.abs(self.of.residual(driven[0, :, last * steps])[self.own]).max())
+        points = np.full((3, len(state), len(self.sensors), 3), np.nan)
+        for k, quantities in enumerate(stored):
+            if k in self.still:
+                points[:, :, k] = 0.0
+                points[0, :, k] = self.still[k]
+            for order, values in enumerate(quantities):
+                points[order, :, k] = values
+        for k in range(last + 1):
+            yield SimulatedPose(points[:, k], residual, steps if k else 0)
+
+    def stored(self, sensor: int) -> Array:
+        """All that a sensor has stored, without the times."""
+        return np.array(self.mbs.GetSensorStoredData(sensor))[:, 1:]

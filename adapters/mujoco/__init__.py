@@ -1,0 +1,1 @@
+"""MuJoCo: projection by its kinematics and Jacobians, and its own time stepping."""

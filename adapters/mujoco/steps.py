@@ -1,0 +1,221 @@
+"""MuJoCo in simulate mode: `mj_step`, its constraints as soft as they are set.
+
+A driven coordinate has an armature beside which all that moves is nothing, and is set to its value, rate and force at every sample;
+a driver that is not steady, at every step. Velocities and accelerations are MuJoCo's own, of `mj_forward` at the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.mechanism.motions import Ramp
+from ...core.trajectory import Array, Trajectory
+from ..shared.joint_equivalents import jointed
+from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
+from .mujoco import MuJoCo, MuJoCoModel, mujoco
+
+# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its motion by a billionth.
+ARMATURE = 1e9
+# The impedance range that leaves least softness; MuJoCo clips at it (mjMAXIMP).
+HARD = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+# Time constant of stiff constraints, in steps: the shortest that MuJoCo takes for stable (refsafe), with the smallest gaps.
+TIME_CONSTANT = 2.0
+# Of the projecting variant: its correction is of the length of the gap, whatever the step is [s].
+UNIT_STEP = 1e-3
+# Of its solver, relative: the default, 1e-8, ends the corrections where a gap of a millimetre has come to 1e-10 m.
+TOLERANCE = 1e-15
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """MuJoCo's time stepping: equal steps between the samples.
+
+    Attributes:
+        kind: "default" leaves every setting of MuJoCo as it is; "stiff" has the hardest constraints that are stable and its most
+            accurate integrator; "projecting" sets every velocity to zero before each step, and springs and dampers to close a gap
+            in one step: every step is then a Newton correction in the metric of the masses. It has no velocities.
+        effort: steps between samples; of the default variant, a factor on the number that its own step size asks for.
+    """
+
+    name: str
+    kind: str
+    effort: int
+    mode = "simulate"
+
+    @property
+    def loop(self) -> str:
+        """Steps between samples are one call, unless every velocity has to be cleared."""
+        return "python" if self.kind == "projecting" else "simulator"
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Everything that is not as MuJoCo has it."""
+        own: Mapping[str, Mapping[str, Any]] = {
+            "default": {"timestep": f"at most 0.002 s / {self.effort}"},
+            "stiff": {
+                "integrator": "RK4",
+                "solref": "[2 timestep, 1]",
+                "solimp": list(HARD),
+                "diagexact": True,
+                "steps per sample": self.effort,
+            },
+            "projecting": {
+                "solref": "[-1/timestep^2, -1/timestep], refsafe off",
+                "solimp": list(HARD),
+                "diagexact": True,
+                "tolerance": TOLERANCE,
+                "qvel": "zero before every step",
+                "steps per sample": self.effort,
+            },
+        }
+        shared = {"driven coordinates": f"set at samples, armature {ARMATURE:g}", "rods": "bodies between a cross and a ball"}
+        return {**own[self.kind], **shared, "options": "no gravity, no contact, no autoreset"}
+
+    def version(self) -> str | None:
+        """MuJoCo's version, or None where it cannot be imported."""
+        return MuJoCo().version()
+
+    def unsupported(self, case: Case) -> str | None:
+        """Return the joint or driver that has no counterpart here, or None."""
+        return MuJoCo().unsupported(case)
+
+    def efforts(self) -> Mapping[str, Stepping]:
+        """Return the efforts by the number of steps."""
+        counts = (1, 2, 3, 5, 8) if self.kind == "projecting" else (1, 2, 4, 8, 16)
+        what = "times the default number of steps" if self.kind == "default" else "steps a sample"
+        return {f"{n} {what}": replace(self, effort=n) for n in counts}
+
+    def floor(self, case: Case) -> None:
+        """Return None: its steps are its own."""
+
+    def build(self, case: Case) -> _Steps:
+        """The compiled model, its settings and where it sets off."""
+        return _Steps(mujoco(), case, self)
+
+    def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
+        """All samples that can be simulated, however far the constraints drift; see `Engine.solve`."""
+        with model.warnings():
+            return simulated(case, model.start, model.run, model.of.details)
+
+
+def stiff() -> Stepping:
+    """Time stepping at its most accurate."""
+    return Stepping("mujoco", "stiff", 4)
+
+
+def default() -> Stepping:
+    """Time stepping as it comes."""
+    return Stepping("mujoco-default", "default", 1)
+
+
+def projecting() -> Stepping:
+    """Time stepping made to project."""
+    return Stepping("mujoco-projecting", "projecting", 5)
+
+
+class _Steps:
+    def __init__(self, mj: Any, case: Case, how: Stepping) -> None:
+        case = replace(case, mechanism=jointed(case.mechanism))
+        self.mj, self.how, self.of = mj, how, MuJoCoModel(mj, case)
+        self.start = start_of(self.of, case)
+        m = self.m = self.of.m
+        self.longest = float(m.opt.timestep)
+        self.q, self.v, self.sign = (np.array(each) for each in zip(*self.of.driven, strict=True))
+        m.dof_armature[self.v] = ARMATURE
+        mj.mj_setConst(m, self.of.d)  # what MuJoCo scales the softness by
+        if how.kind == "stiff":
+            m.opt.integrator = mj.mjtIntegrator.mjINT_RK4
+        if how.kind != "default":
+            m.eq_solimp[:] = HARD
+            m.opt.enableflags |= mj.mjtEnableBit.mjENBL_DIAGEXACT  # else softness follows a mean of the masses, not each row's
+        if how.kind == "projecting":
+            m.opt.disableflags |= mj.mjtDisableBit.mjDSBL_REFSAFE
+            m.opt.timestep, m.opt.tolerance = UNIT_STEP, TOLERANCE
+            m.eq_solref[:] = -1.0 / UNIT_STEP**2, -1.0 / UNIT_STEP
+        self.steady = all(isinstance(motion, Ramp) for motion in case.sweep.path.motions.values())
+        self.warned: list[str] = []
+        self.twist = np.zeros(6)  # angular over linear, global axes
+
+    def count(self, gap: float) -> int:
+        """Steps over a gap between samples [s]."""
+        return self.how.effort * (math.ceil(gap / self.longest) if self.how.kind == "default" else 1)
+
+    @contextmanager
+    def warnings(self) -> Generator[None]:
+        """Keep MuJoCo's warnings, which it would write to a file in the working directory."""
+        before = self.mj.get_mju_user_warning()
+        self.mj.set_mju_user_warning(self.warned.append)
+        try:
+            yield
+        finally:
+            self.mj.set_mju_user_warning(before)
+
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
+        """The poses of a leg."""
+        mj, m, d = self.mj, self.m, self.of.d
+        mj.mj_resetData(m, d)
+        d.qpos[:], d.qvel[:] = self.start.configuration, leg.sign * self.start.v
+        self.warned.clear()
+        driven = leg.drive(leg.times)
+        yield self.pose(driven[..., 0], 0)
+        for k, (t, until) in enumerate(pairwise(leg.times.tolist()), start=1):
+            n = self.count(abs(until - t))
+            if self.how.kind == "projecting":
+                self.project(driven[..., k])
+            else:
+                self.step(leg, t, until, n)
+            if self.warned:
+                raise SimulationEndedError(f"MuJoCo warns: {self.warned[0]}")
+            yield self.pose(driven[..., k], n)
+
+    def step(self, leg: Leg, t: float, until: float, n: int) -> None:
+        """Advance from time to time in n steps."""
+        self.m.opt.timestep = h = abs(until - t) / n
+        if self.how.kind == "stiff":
+            self.m.eq_solref[:] = TIME_CONSTANT * h, 1.0
+        if self.steady:
+            self.mj.mj_step(self.m, self.of.d, n)
+            return
+        # a force that changes: as it is amid the step
+        whole, half = (leg.drive(t + (until - t) * (np.arange(n) + part) / n) for part in (0.0, 0.5))
+        for k in range(n):
+            self.set(whole[0, :, k], whole[1, :, k], half[2, :, k])
+            self.mj.mj_step(self.m, self.of.d)
+
+    def project(self, driven: Array) -> None:
+        """Correct the pose for the drivers' values."""
+        for _ in range(self.how.effort):
+            self.of.d.qvel[:] = 0.0
+            self.set(driven[0], 0.0 * driven[1], 0.0 * driven[2])
+            self.mj.mj_step(self.m, self.of.d)
+
+    def set(self, c: Array, c_t: Array, c_tt: Array) -> None:
+        """Put the driven coordinates where they belong."""
+        d = self.of.d
+        d.qpos[self.q], d.qvel[self.v] = self.sign * c, self.sign * c_t
+        d.qfrc_applied[self.v] = ARMATURE * self.sign * c_tt
+
+    def pose(self, driven: Array, steps: int) -> SimulatedPose:
+        """What MuJoCo says of this moment."""
+        mj, m, d = self.mj, self.m, self.of.d
+        self.set(*driven)
+        points = np.full((3, len(self.of.watched), 3), np.nan)
+        if self.how.kind == "projecting":
+            mj.mj_fwdPosition(m, d)
+        else:
+            mj.mj_forward(m, d)
+            mj.mj_rnePostConstraint(m, d)
+            for k, site in enumerate(self.of.watched):
+                for order, rate in ((1, mj.mj_objectVelocity), (2, mj.mj_objectAcceleration)):
+                    rate(m, d, mj.mjtObj.mjOBJ_SITE, site, self.twist, 0)
+                    points[order, k] = self.twist[3:]
+        points[0] = d.site_xpos[self.of.watched]
+        return SimulatedPose(points, float(np.abs(d.efc_pos[: d.ne]).max(initial=0.0)), steps)

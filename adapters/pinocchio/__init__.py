@@ -1,0 +1,1 @@
+"""Pinocchio: projection by its kinematics and Jacobians, and its constrained dynamics."""

@@ -1,0 +1,73 @@
+"""The frame that projection gives a simulator its mechanism in: a unit of length near the mechanism's size, an origin beside it.
+
+Simulators know metres and their origin only. A residual of 1e-12 m is a millionth of a mechanism of a micrometre, and ten thousand
+kilometres from the origin no residual is that small: they stopped there, or went on in another assembly without a word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case, size
+from ...core.joints import Kind
+from ...core.kinematics.formulation.constraints import unit_near
+from ...core.mechanism.mechanism import Vector
+from ...core.trajectory import Array
+
+
+@dataclass(frozen=True)
+class OwnFrame:
+    """A unit of length and an origin.
+
+    Attributes:
+        unit: a power of two, so that nothing is rounded [m].
+        origin: global [m].
+    """
+
+    unit: float
+    origin: Vector
+
+    def there(self, position: Sequence[float]) -> Vector:
+        """A global position [m] in this frame [units]."""
+        x, y, z = ((x - o) / self.unit for x, o in zip(position, self.origin, strict=True))
+        return x, y, z
+
+    def units(self, length: float) -> float:
+        """A length [m] in units."""
+        return length / self.unit
+
+    def back(self, position: Array) -> Array:
+        """Positions in this frame [units], shape (..., 3), as global ones [m]."""
+        return self.unit * position + np.array(self.origin)
+
+
+GLOBAL = OwnFrame(1.0, (0.0, 0.0, 0.0))
+
+
+def own_frame(case: Case) -> OwnFrame:
+    """The frame of a case; about the global origin where the mechanism's middle is within half a unit of it along every axis."""
+    mechanism, unit = case.mechanism, unit_near(size(case))
+    positions = [at for joint in mechanism.joints for at in joint.points_on()] + [point.position for point in mechanism.points]
+    # a multiple of the unit: what is on such a grid is moved without being rounded
+    x, y, z = (unit * round(0.5 * (min(axis) + max(axis)) / unit) for axis in zip(*positions, strict=True))
+    return OwnFrame(unit, (x, y, z))
+
+
+def in_own_frame(case: Case) -> Case:
+    """The case, its mechanism in its own frame; what drives it and what is compared stay in SI."""
+    mechanism, frame = case.mechanism, own_frame(case)
+    ways: dict[Kind, Any] = {Kind.POSITION: frame.there, Kind.LENGTH: frame.units}
+    return replace(
+        case,
+        mechanism=replace(
+            mechanism,
+            bodies=[replace(body, origin=frame.there(body.origin)) for body in mechanism.bodies],
+            joints=[joint.changed(**joint.mapped(ways)) for joint in mechanism.joints],
+            points=[replace(point, position=frame.there(point.position)) for point in mechanism.points],
+            couplers=[coupler.scaled(1.0 / frame.unit) for coupler in mechanism.couplers],
+        ),
+    )

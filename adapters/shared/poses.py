@@ -1,0 +1,159 @@
+"""Poses of bodies as displacements from design, and the coordinates that a chain of links has in them.
+
+A displacement takes every point of a body from where it is at design to where it is now, x -> q x + s, in global axes. So a chain
+of links (see `chains`) displaces its second body against its first by the product of its links' displacements, and backwards its
+coordinates are those of the forward chain with other signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, angle_about, cross, quat, vec
+from ...core.joints import Joint
+from ...core.joints.base import triad
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ...core.trajectory import Array, BodyMotion
+from .joint_chains import Link
+
+
+def rotated(q: Quat, a: Vec3) -> Vec3:
+    """The vector a turned by the unit quaternion q."""
+    return (q * Quat(0.0, a) * q.conjugate()).e
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """What has become of a body since design: x -> turn x + shift, global [m]; scalars are of shape (n,), or the same for all."""
+
+    turn: Quat = IDENTITY
+    shift: Vec3 = ZERO
+
+    def of(self, P: Vec3) -> Vec3:
+        """Where a point of the body is now, from where it is at design."""
+        return rotated(self.turn, P) + self.shift
+
+    def relative_to(self, other: Displacement) -> Displacement:
+        """This displacement as a body with the other one sees it: what follows the other to make this one's."""
+        back = other.turn.conjugate()
+        return Displacement(back * self.turn, rotated(back, self.shift - other.shift))
+
+    def then_about(self, axis: Vec3, P: Vec3, angle: Scalar) -> Displacement:
+        """What a hinge adds that this displacement carries along; its unit axis and a point on it are those at design."""
+        turn = self.turn * about(axis, angle)
+        return Displacement(turn, self.of(P) - rotated(turn, P))
+
+
+def frame_along(axis: Sequence[float], column: int) -> Array:
+    """A right-handed frame that has the axis, made a unit vector, in this column; shape (3, 3)."""
+    return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
+
+
+def middle(mechanism: Mechanism, body: Body) -> Array:
+    """The mean of a body's joint points, or its origin where it has none; global at design [m], shape (3,)."""
+    points = [at for joint in mechanism.joints if body.name in joint.bodies for at in joint.points_on(body.name)]
+    return np.mean(points, axis=0) if points else np.array(body.origin)
+
+
+def attitude(body: Body) -> Quat:
+    """The rotation of a body's frame at design, body -> global."""
+    return quat(body.euler_parameters)
+
+
+def displacements(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> dict[str, Displacement]:
+    """Return the displacement of every body, fixed ones and the ground included, from the motion of the moving ones."""
+    found = {body.name: Displacement() for body in mechanism.bodies} | {GROUND: Displacement()}
+    for body in mechanism.moving:
+        turn = quat(way[body.name].p.T) * attitude(body).conjugate()
+        found[body.name] = Displacement(turn, vec([*way[body.name].r.T]) - rotated(turn, vec(body.origin)))
+    return found
+
+
+def link_motions(joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]) -> list[tuple[Array, ...]]:
+    """The coordinates of a joint's links: a number each [m or rad], or of a ball, which is the last, Euler parameters; shape (n,).
+
+    Angles are followed from the first sample, which is the design, and so count the turns; between samples they must change by
+    less than half a turn.
+    """
+    if not links:
+        return []
+    moved = placed[joint.j].relative_to(placed[joint.i])
+    point, ball = vec(links[-1].point), links[-1].move == "ball"
+    hinges = [(vec(link.axis), vec(link.point)) for link in links if link.move == "hinge"]
+    if ball:  # of the joints that end in a ball only that on a link has a hinge, which swings the ball
+        angles = [_angle(axis, point - P, moved.of(point) - P) for axis, P in hinges]
+    else:
+        angles = _turns([axis for axis, _ in hinges], moved.turn)
+    angles = [np.unwrap(np.atleast_1d(angle)) for angle in angles]
+    swing = Displacement()
+    for (axis, P), angle in zip(hinges, angles, strict=True):
+        swing = swing.then_about(axis, P, angle)
+    # what slides is carried by slides only, and so moves along its design axes
+    apart = moved.of(point) - swing.of(point)
+    turning = iter(angles)
+    found: list[tuple[Array, ...]] = []
+    for link in links:
+        match link.move:
+            case "slide":
+                found.append((np.atleast_1d(vec(link.axis) @ apart),))
+            case "hinge":
+                found.append((next(turning),))
+            case "ball":
+                found.append(tuple(map(np.atleast_1d, swing.turn.conjugate() * moved.turn)))
+    return found
+
+
+def link_coordinates(joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]) -> list[tuple[float, ...]]:
+    """The same at the end of the way."""
+    return [tuple(float(each[-1]) for each in coordinate) for coordinate in link_motions(joint, links, placed)]
+
+
+def backwards(link: Link, value: tuple[float, ...]) -> tuple[float, ...]:
+    """The coordinate of the same link where the second body of a chain carries the first."""
+    if link.move != "ball":
+        return (-value[0],)
+    e0, *e = value
+    return e0, *(-each for each in e)
+
+
+def about(axis: Vec3, angle: Scalar) -> Quat:
+    """The turn about a unit axis [rad]."""
+    return Quat(np.cos(0.5 * angle), np.sin(0.5 * angle) * axis)
+
+
+def _turns(axes: Sequence[Vec3], q: Quat) -> list[Array]:
+    """The angles of hinges, one after the other, that make up the rotation q."""
+    match axes:
+        case []:
+            return []
+        case [a]:
+            return [angle_about(a, q)]
+        case [a, b]:  # the second turns nothing that is along it, so the first alone takes b where q does
+            first = _angle(a, b, rotated(q, b))
+            rest = about(a, -first) * q
+            return [first, angle_about(b, rest)]
+        case [n, m, _, _]:  # bends alike, N(x) M(2y) N(x): its Euler parameters are cos x cos y, along n sin x cos y, along m sin y
+            x, y = np.arctan2(n @ q.e, q.e0), np.arcsin(np.clip(m @ q.e, -1.0, 1.0))
+            return [x, y, y, x]
+        case _:
+            raise NotImplementedError(f"a chain of {len(axes)} hinges: give its angles here")
+
+
+def _angle(axis: Vec3, a: Vec3, b: Vec3) -> Array:
+    """From a to b about the unit axis."""
+    across = a - (axis @ a) * axis
+    return np.arctan2(cross(axis, across) @ b, across @ b)
+
+
+def local(body: Body, P: Sequence[float]) -> Vector:
+    """A point, global at design, in the frame of a body [m]."""
+    return direction(body, [*(vec(P) - vec(body.origin))])
+
+
+def direction(body: Body, a: Sequence[float]) -> Vector:
+    """A vector, global at design, in the axes of a body."""
+    x, y, z = rotated(attitude(body).conjugate(), vec(a))
+    return x, y, z

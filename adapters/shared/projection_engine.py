@@ -1,0 +1,82 @@
+"""What the engines in projection mode have in common: all but what they are called, what they know, and the model they make."""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from ...core.case.case import Case
+from ...core.harness.engine import Floor
+from ...core.joints import Joint
+from ...core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
+from ...core.trajectory import Trajectory
+from .length_scaling import own_frame
+from .projection import EFFORTS, solve_by_projection, without_counterpart
+from .projection_model import ProjectionModel
+
+DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
+
+
+@dataclass(frozen=True)
+class ProjectionEngine(ABC):
+    """An engine (see `Engine`) that makes a `ProjectionModel`, and the Newton walk solves it.
+
+    Attributes:
+        corrections: Newton steps after the predictor, whatever residual they leave; None: as many as it takes.
+        name: as on the command line, and of the simulator's Python package.
+        title: as in a sentence.
+        joints: types that have a counterpart.
+    """
+
+    corrections: int | None = None
+    name: ClassVar[str]
+    title: ClassVar[str]
+    joints: ClassVar[Collection[type[Joint]]]
+    mode = "projection"
+    loop = "python"
+
+    @property
+    @abstractmethod
+    def described(self) -> Mapping[str, Any]:
+        """What of the simulator is used, and how."""
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What is solved and how."""
+        solver = "numpy LU where the rows are square and of full rank at design, else least squares"
+        steps = {} if self.corrections is None else {"newton_steps": self.corrections}
+        return {**self.described, "linear solver": solver, **steps}
+
+    def version(self) -> str | None:
+        """The simulator's version, or None where it cannot be imported."""
+        try:
+            return self.version_of(importlib.import_module(self.name))
+        except (Exception, SystemExit):  # a broken binary raises what its loader likes; to the harness it all means "not here"
+            return None
+
+    def version_of(self, simulator: Any) -> str | None:
+        """Return the version of the imported package; None where it is another package of that name."""
+        return str(simulator.__version__)
+
+    def unsupported(self, case: Case) -> str | None:
+        """Return the joint or driver that has no counterpart here, or None."""
+        return without_counterpart(case, self.title, self.joints, DRIVERS)
+
+    @abstractmethod
+    def build(self, case: Case) -> ProjectionModel:
+        """The simulator's model of the case in its own frame, at the design position."""
+
+    def solve(self, model: ProjectionModel, case: Case, tol: float) -> Trajectory:
+        """All samples; see `Engine.solve`."""
+        return solve_by_projection(model, case, tol, model.details, self.corrections, own_frame(case))
+
+    def efforts(self) -> Mapping[str, Self]:
+        """Return the efforts by the number of Newton steps."""
+        return {label: type(self)(corrections) for label, corrections in EFFORTS.items()}
+
+    @abstractmethod
+    def floor(self, case: Case) -> Floor:
+        """What its compiled code alone needs for a sample."""

@@ -1,0 +1,58 @@
+"""What the projection mode asks of a simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from ...core.trajectory import Array
+
+
+class ProjectionModel(Protocol):
+    """A simulator's kinematics: unknowns x (its tree or body coordinates), rows for closures and drivers.
+
+    Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of the current configuration.
+    `residual` updates whatever the other methods read.
+
+    Attributes:
+        details: what a record says of it.
+    """
+
+    @property
+    def details(self) -> Mapping[str, Any]: ...
+
+    def reset(self) -> None:
+        """Go back to the design configuration."""
+        ...
+
+    def save(self) -> Any:
+        """A copy of the configuration."""
+        ...
+
+    def restore(self, saved: Any) -> None:
+        """Go back to a saved configuration."""
+        ...
+
+    def move(self, dx: Array) -> None:
+        """Advance the configuration by dx, shape (unknowns,)."""
+        ...
+
+    def residual(self, c: Array) -> Array:
+        """All rows with the drivers at c, in the mechanism's order, from their design values, shape (rows,)."""
+        ...
+
+    def jacobian(self) -> Array:
+        """Derivative of the rows by dx, shape (rows, unknowns); a copy, or valid until the next call."""
+        ...
+
+    def driver_columns(self) -> Array:
+        """Derivative of the rows by c, negated: J v = driver_columns c_t, shape (rows, drivers)."""
+        ...
+
+    def bias(self, v: Array) -> Array:
+        """Jdot v of all rows, shape (rows,)."""
+        ...
+
+    def points(self, v: Array, a: Array) -> Sequence[tuple[Array, Array, Array]]:
+        """Position, velocity and acceleration of each of case.points, in order, global axes."""
+        ...

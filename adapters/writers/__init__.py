@@ -1,0 +1,1 @@
+"""Writers: a mechanism in the format of a simulator, one format a file."""

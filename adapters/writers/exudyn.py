@@ -1,0 +1,270 @@
+"""A mechanism as a Python script that builds it in Exudyn, of Exudyn's own objects only. Exudyn is not needed to write it.
+
+A moving body is a rigid-body node with Euler parameters, at the origin that the case gives it and parallel to the global axes at
+design, because Exudyn measures the angle of a joint from where its bodies are parallel. Joints are Exudyn's, mostly generic ones.
+What Exudyn has none for is spelled out with further bodies: a constant-velocity joint is four hinges of which two by two turn
+alike, and a cross whose axes a table has rounded off the right angle is a body on two hinges, because a generic joint would set
+them upright. Coordinates tied to one another are measured by relative markers. (Rows that follow further unknowns of a Newton
+loop, as in the adapter of Exudyn, are no objects of Exudyn.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+
+from ...core import joints as j
+from ...core.algebra import vec
+from ...core.errors import KincheckError
+from ...core.joints.base import unit
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism
+from ...core.trajectory import Array, BodyMotion
+from ..shared.joint_chains import CHAINS, dependence, relations
+from ..shared.loop_closures import ends_of
+from ..shared.poses import Displacement, displacements, frame_along, link_coordinates, link_motions
+
+# Round-off of a right angle between unit vectors; a generic joint leaves as much as a residual.
+RIGHT_ANGLE = 1e-15
+
+BEGINNING = '''\
+"""A mechanism in Exudyn, written by kincheck. Lengths are in m, angles in rad.
+
+Masses and inertias stand in for missing ones. Drivers are not part of the model: the initial coordinates are consistent with the
+driver values below. All bodies are parallel to the global axes at design, in their reference coordinates, from which the state of
+Exudyn is measured; `frames` has the Euler parameters of the bodies' own axes in these.
+"""
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import *
+
+SC = exu.SystemContainer()
+mbs = SC.AddSystem()
+ground = mbs.AddObject(ObjectGround())
+nodes, bodies, frames, joints, coordinates, points = {}, {}, {}, {}, {}, {}
+
+
+def body(name, position, initial, frame):
+    frames[name], reference = frame, [*position, 1, 0, 0, 0]
+    nodes[name] = mbs.AddNode(NodeRigidBodyEP(name=name, referenceCoordinates=reference, initialCoordinates=initial))
+    rigid = ObjectRigidBody(name=name, mass=1, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=nodes[name])
+    bodies[name] = mbs.AddObject(rigid)
+
+
+def marker(name, position, rotation=np.eye(3)):
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = rotation, position
+    return mbs.AddMarker(MarkerBodyRigid(bodyNumber=bodies[name], localHT=frame))
+
+
+def joint(name, kind, first, second, **options):
+    item = kind(markerNumbers=[marker(*first), marker(*second)], **options)
+    joints.setdefault(name, []).append(mbs.AddObject(item))
+
+
+def translation(name, first, second, axis):
+    """The displacement of the second point against the first along an axis of the first body."""
+    (one, at), (two, there) = first, second
+    measured = dict(bodyNumbers=[bodies[one], bodies[two]], localPosition0=at, localPosition1=there, axis0=axis)
+    coordinates[name] = mbs.AddMarker(MarkerBodiesRelativeTranslationCoordinate(**measured))
+
+
+def rotation(name, first, second, axis, initial):
+    """The turn of the second body against the first; a node keeps it, so that it counts the turns."""
+    (one, at), (two, there) = first, second
+    turns = mbs.AddNode(NodeGenericData(numberOfDataCoordinates=1, initialCoordinates=[initial]))
+    measured = dict(bodyNumbers=[bodies[one], bodies[two]], localPosition0=at, localPosition1=there, axis0=axis)
+    coordinates[name] = mbs.AddMarker(MarkerBodiesRelativeRotationCoordinate(nodeNumber=turns, **measured))
+
+
+def relation(name, one, other, factor):
+    """One coordinate is the factor times the other."""
+    markers = [coordinates[one], coordinates[other]]
+    joints.setdefault(name, []).append(mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers, factor1=factor)))
+
+
+'''
+END = "\nmbs.Assemble()\n"
+
+GENERIC: Mapping[type[j.Joint], tuple[int, Sequence[int]]] = {
+    j.Cylindrical: (2, (1, 1, 0, 1, 1, 0)),
+    j.Screw: (2, (1, 1, 0, 1, 1, 0)),  # and its relation
+    j.InPlane: (0, (1, 0, 0, 0, 0, 0)),
+    j.Inline: (2, (1, 1, 0, 0, 0, 0)),
+    j.ParallelAxes: (2, (0, 0, 0, 1, 1, 0)),
+    j.Planar: (2, (0, 0, 1, 1, 1, 0)),
+}
+"""Joints about one axis as generic joints: which axis of the frame is the joint's, and what is constrained: x, y, z, about them."""
+
+
+def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]) -> Mapping[str, str]:
+    """A .py file; see `Writer`. Initial coordinates are the end of the way.
+
+    Raises:
+        KincheckError: a joint has no counterpart in Exudyn.
+    """
+    for joint in mechanism.joints:
+        if type(joint) not in CHAINS and type(joint) is not j.Distance:
+            raise KincheckError(f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints instead")
+    return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
+
+
+class _Script:
+    """The lines that differ from script to script."""
+
+    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
+        self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
+        self.lines: list[str] = []
+        self.measured = set[str]()
+
+    def text(self, start: Mapping[str, float]) -> str:
+        """The script."""
+        self.lines.append(f"drivers = {dict(start)!r}")
+        fixed = [GROUND, *(body.name for body in self.mechanism.bodies if body.fixed)]
+        self.lines.append(f"bodies |= dict.fromkeys({fixed!r}, ground)")
+        for body in self.mechanism.moving:
+            turn = np.array([float(each[-1]) for each in self.placed[body.name].turn])
+            moved = [*(self.way[body.name].r[-1] - body.origin), *(turn - (1.0, 0.0, 0.0, 0.0))]
+            self.call("body", body.name, body.origin, moved, body.euler_parameters)
+        for joint in self.mechanism.joints:
+            self.joint(joint)
+            for relation in relations(joint):
+                self.relate(joint.name, relation)
+        for coupler in self.mechanism.couplers:
+            self.relate(coupler.name, coupler.terms)
+        for point in self.mechanism.points:
+            self.lines.append(f"points[{point.name!r}] = bodies[{point.body!r}], {self.arm(point.body, point.position)}")
+        return BEGINNING + "\n".join(self.lines) + "\n" + END
+
+    def call(self, function: str, *values: Any, **options: Any) -> None:
+        """A call, as a line."""
+        texts = [*map(_text, values), *(f"{name}={_text(value)}" for name, value in options.items())]
+        self.lines.append(f"{function}({', '.join(texts)})")
+
+    def arm(self, body: str, P: Sequence[float]) -> _Code:
+        """A point of a body, global at design, as Exudyn wants it; fixed bodies are Exudyn's ground."""
+        origin = (0.0, 0.0, 0.0) if self.mechanism.is_fixed(body) else self.mechanism.body(body).origin
+        return _Code(_text([*(vec(P) - vec(origin))]))
+
+    def marker(self, body: str, P: Sequence[float], axes: Array | None = None) -> _Code:
+        """A frame on a body, global at design; the columns are its axes, the global ones if none are given."""
+        return _Code(f"({', '.join([repr(body), self.arm(body, P), *([] if axes is None else [_text(axes)])])})")
+
+    def add(
+        self, joint: j.Joint, kind: str, axes: Array | None = None, *, ends: Any = None, second: Array | None = None, **options: Any
+    ) -> None:
+        """An object of Exudyn between the two bodies of a joint, its frames alike unless another is given for the second."""
+        P_i, P_j = ends or ends_of(self.mechanism, joint)
+        markers = self.marker(joint.i, P_i, axes), self.marker(joint.j, P_j, axes if second is None else second)
+        self.call("joint", joint.name, _Code(kind), *markers, **options)
+
+    def generic(self, joint: j.Joint, constrained: Sequence[int], axes: Array | None = None, **options: Any) -> None:
+        """A generic joint that constrains these of x, y, z and the turns about them."""
+        self.add(joint, "ObjectJointGeneric", axes, constrainedAxes=[*constrained], **options)
+
+    def joint(self, joint: j.Joint) -> None:
+        """A joint as objects of Exudyn."""
+        match joint:
+            case j.Spherical():
+                self.add(joint, "ObjectJointSpherical")
+            case j.Revolute():
+                self.add(joint, "ObjectJointRevoluteZ", frame_along(joint.axis, 2))
+            case j.Translational():
+                self.add(joint, "ObjectJointPrismaticX", frame_along(joint.axis, 0))
+            case j.Universal() | j.PerpendicularAxes():
+                point = int(isinstance(joint, j.Universal))
+                first, second = frame_along(joint.axes[0], 0), frame_along(joint.axes[1], 1)
+                self.generic(joint, (point, point, point, 0, 0, 1), first, second=second)
+            case j.Fixed():
+                self.generic(joint, (1, 1, 1, 1, 1, 1))
+            case j.OrientationLock():
+                self.generic(joint, (0, 0, 0, 1, 1, 1))
+            case j.Distance():
+                self.add(joint, "ObjectConnectorDistance", distance=joint.rod_length)
+            case j.RevoluteSpherical(points=(hinge, ball), axis=axis):
+                # the link keeps its place along the hinge: where its foot is there, the generic joint has nothing to keep apart
+                link = vec(ball) - vec(hinge)
+                self.add(joint, "ObjectConnectorDistance", distance=float(np.hypot.reduce([*link])))
+                foot = [*(vec(hinge) + (unit(axis) @ link) * unit(axis))]
+                self.generic(joint, (1, 0, 0, 0, 0, 0), frame_along(axis, 0), ends=(foot, ball))
+            case _:
+                axis: Sequence[float] = vars(joint)["axis"]
+                column, constrained = GENERIC[type(joint)]
+                self.generic(joint, constrained, frame_along(axis, column))
+
+    def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
+        """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
+        one, other, factor = dependence(((joint, freedom), weight) for joint, freedom, weight in terms)
+        self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
+
+    def coordinate(self, name: str, freedom: str) -> str:
+        """The name of a joint's coordinate, which is measured from now on."""
+        joint: Any = self.mechanism.joint(name)
+        known = f"{name}.{freedom}"
+        if known not in self.measured:
+            self.measured.add(known)
+            ends = (self.marker(body, joint.point) for body in joint.bodies)
+            links = CHAINS[type(joint)](joint, joint.point)
+            values = dict(zip((link.name for link in links), link_coordinates(joint, links, self.placed), strict=True))
+            initial = values[freedom] if freedom == "rotation" else ()
+            self.call(freedom, known, *ends, [*unit(joint.axis)], *initial)
+        return known
+
+
+class _Code(str):
+    """Text that is code already."""
+
+
+def _text(value: Any) -> str:
+    """A value as Python has it, numbers so that they are read back as the same doubles."""
+    if isinstance(value, _Code):
+        return value
+    if isinstance(value, np.ndarray | list | tuple):
+        return f"[{', '.join(map(_text, cast(Sequence[Any], value)))}]"
+    return repr(value) if isinstance(value, str | int) else repr(float(value) + 0.0)
+
+
+def _spelled_out(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> tuple[Mechanism, Mapping[str, BodyMotion]]:
+    """The mechanism and its way with joints that Exudyn lacks as hinges between further bodies."""
+    placed, way = displacements(mechanism, way), dict(way)
+    bodies, joints, couplers = [*mechanism.bodies], list[j.Joint](), [*mechanism.couplers]
+    for joint in mechanism.joints:
+        if not _to_be_spelled_out(joint):
+            joints.append(joint)
+            continue
+        P = ends_of(mechanism, joint)[0]
+        links = CHAINS[type(joint)](joint, P)
+        motions = link_motions(joint, links, placed)
+        hinges = [(link, motion[0]) for link, motion in zip(links, motions, strict=True) if link.move == "hinge"]
+        names, before, swing = [f"{joint.name}.{k}" for k in range(1, len(hinges) + 1)], joint.i, placed[joint.i]
+        for name, (link, angle) in zip(names[:-1], hinges, strict=False):
+            swing = swing.then_about(vec(link.axis), vec(P), angle)
+            bodies.append(Body(name, P))
+            way[name] = _motion(swing, P)
+            joints.append(j.Revolute(name, before, name, P, link.axis))
+            before = name
+        last = hinges[-1][0].axis
+        crossed = isinstance(joint, j.PerpendicularAxes)
+        joints.append(
+            j.ParallelAxes(names[-1], before, joint.j, last) if crossed else j.Revolute(names[-1], before, joint.j, P, last)
+        )
+        by_name = dict(zip((link.name for link, _ in hinges), names, strict=True))
+        for relation in relations(joint):
+            (_, one, weight), (_, other, opposite) = relation
+            couplers.append(j.Gear(f"{by_name[one]} alike", (by_name[one], by_name[other]), -opposite / weight))
+    return replace(mechanism, bodies=bodies, joints=joints, couplers=couplers, drivers=()), way
+
+
+def _to_be_spelled_out(joint: j.Joint) -> bool:
+    if isinstance(joint, j.Universal | j.PerpendicularAxes):
+        return abs(unit(joint.axes[0]) @ unit(joint.axes[1])) > RIGHT_ANGLE
+    return isinstance(joint, j.ConstantVelocity)
+
+
+def _motion(displacement: Displacement, P: Iterable[float]) -> BodyMotion:
+    """Of a body that is aligned at design with its origin at P."""
+    r, p = (np.column_stack(np.broadcast_arrays(*values)) for values in (displacement.of(vec([*P])), displacement.turn))
+    return BodyMotion(r, p, None, None)

@@ -1,0 +1,162 @@
+"""A mechanism as MJCF, the XML of MuJoCo. MuJoCo is not needed to write it, and its own writer would keep six digits.
+
+A body is a <body> with the frame that the case gives it. A joint is a chain of MuJoCo joints (see `chains`), in the tree or, where
+it closes a loop, on an auxiliary body that an equality ties to the second body; a distance is a tendon of constant length. What
+ties coordinates to one another is a joint equality. Bodies have a unit mass and inertia, for want of any.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from ...core.algebra import vec
+from ...core.errors import KincheckError
+from ...core.joints import Distance, Joint
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism
+from ...core.mechanism.topology import spanning_tree
+from ...core.trajectory import BodyMotion
+from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relations
+from ..shared.loop_closures import ends_of
+from ..shared.poses import attitude, backwards, direction, displacements, link_coordinates, local, rotated
+from .xml_text import document, link_names, numbers
+
+NOTE = (
+    " Written by kincheck. Lengths are in m, angles in rad. Masses, inertias and armatures stand in for missing ones. Drivers are "
+    "not part of the model: the keyframe is consistent with the driver values under custom. "
+)
+
+
+def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]) -> Mapping[str, str]:
+    """An .xml file; see `Writer`. The keyframe "start" is the end of the way.
+
+    Raises:
+        KincheckError: a joint has no counterpart in MJCF, or a name cannot be used there.
+    """
+    for joint in mechanism.joints:
+        if type(joint) not in CHAINS and type(joint) is not Distance:
+            raise KincheckError(f"{joint} has no counterpart in MJCF here; write an equivalent of known joints instead")
+    return {".xml": _Model(mechanism, way).text(start)}
+
+
+class _Model:
+    """The document while it is made."""
+
+    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
+        self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
+        self.root = ET.Element("mujoco", model=mechanism.name)
+        self.root.append(ET.Comment(NOTE))
+        ET.SubElement(self.root, "compiler", angle="radian")
+        ET.SubElement(self.root, "option", gravity="0 0 0")
+        # an inertia of each coordinate alone: hinges in line would leave the mass matrix near to singular
+        ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature="1")
+        self.custom = ET.SubElement(self.root, "custom")
+        self.elements = {GROUND: ET.SubElement(self.root, "worldbody")}
+        self.tendons, self.equalities = ET.SubElement(self.root, "tendon"), ET.SubElement(self.root, "equality")
+        self.frames = {GROUND: Body(GROUND)}  # at design, of all that has an element
+        self.qpos: dict[str, Sequence[float]] = {}
+        self.coordinates: dict[tuple[str, str], str] = {}  # their names, by joint and freedom
+        self.signs: dict[str, float] = {}  # of a joint's coordinates: minus where they move the joint's first body
+        for body in mechanism.bodies:
+            if body.fixed:
+                self.add_body(body, GROUND)
+        tree = spanning_tree(mechanism)
+        for branch in tree.branches:
+            body, joint = mechanism.body(branch.child), branch.joint
+            if joint is None:
+                self.add_free(body)
+            else:
+                forward = joint.j == body.name
+                self.add_body(body, joint.i if forward else joint.j)
+                self.carry(body.name, joint, self.links(joint), 1 if forward else -1)
+        for joint in tree.cut:
+            self.close(joint)
+        for coupler in mechanism.couplers:
+            self.relate((joint, freedom, self.signs[joint] * weight) for joint, freedom, weight in coupler.terms)
+        for point in mechanism.points:
+            self.add_site(point.name, point.body, point.position)
+
+    def text(self, start: Mapping[str, float]) -> str:
+        """The document, with a consistent start."""
+        for driver, value in start.items():
+            ET.SubElement(self.custom, "numeric", name=driver, data=numbers([value]))
+        # MuJoCo numbers its coordinates in the order of the document; the joint among the defaults has no name
+        names = [each.get("name", "") for each in self.root.iter() if each.tag in ("joint", "freejoint")]
+        qpos = numbers(x for name in names for x in self.qpos.get(name, ()))
+        ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="start", qpos=qpos)
+        return document(self.root, (["body"], ["joint", "freejoint"], ["site"], ["spatial"], ["numeric"]), reserved=["world"])
+
+    def add_body(self, frame: Body, parent: str) -> None:
+        """A body on its parent, with that name and frame at design."""
+        carrier = self.frames[parent]
+        turn = attitude(carrier).conjugate() * attitude(frame)
+        at = {"pos": numbers(local(carrier, frame.origin)), "quat": numbers(turn)}
+        self.frames[frame.name] = frame
+        self.elements[frame.name] = ET.SubElement(self.elements[parent], "body", {"name": frame.name, **at})
+        ET.SubElement(self.elements[frame.name], "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+
+    def add_site(self, name: str, body: str, position: Sequence[float], aligned: bool = False) -> str:
+        """A site of a body, parallel to it, or to the global axes at design."""
+        frame = self.frames[body]
+        turned = {"quat": numbers(attitude(frame).conjugate())} if aligned else {}
+        ET.SubElement(self.elements[body], "site", {"name": name, "pos": numbers(local(frame, position)), **turned})
+        return name
+
+    def add_free(self, body: Body) -> None:
+        """A body that no joint carries: its coordinates are its pose."""
+        name, motion = f"{body.name}.free", self.way[body.name]
+        self.add_body(body, GROUND)
+        ET.SubElement(self.elements[body.name], "freejoint", name=name)
+        self.qpos[name] = [*motion.r[-1], *motion.p[-1]]
+
+    def links(self, joint: Joint) -> list[Link]:
+        """A joint's chain, from its first body to its second."""
+        return CHAINS[type(joint)](joint, ends_of(self.mechanism, joint)[0])
+
+    def carry(self, body: str, joint: Joint, links: Sequence[Link], sign: int = 1) -> None:
+        """Let a body move by a joint's links, from the joint's first body on or (sign -1) from its second."""
+        frame, element = self.frames[body], self.elements[body]
+        values = link_coordinates(joint, self.links(joint), self.placed)
+        for name, link, value in [*zip(link_names(joint.name, links), links, values, strict=False)][::sign]:
+            along = {} if link.move == "ball" else {"axis": numbers(direction(frame, link.axis))}
+            at = {"pos": numbers(local(frame, link.point)), **along}
+            ET.SubElement(element, "joint", {"name": name, "type": link.move, **at})
+            self.qpos[name] = value = value if sign > 0 else backwards(link, value)
+            if link.move == "ball":  # in the axes of the body that it carries
+                self.qpos[name] = value[0], *rotated(attitude(frame).conjugate(), vec(value[1:]))
+            self.coordinates[joint.name, link.name] = name
+        self.signs[joint.name] = sign  # it is that of all the joint's coordinates, so their relations need none
+        for relation in relations(joint):
+            self.relate(relation)
+
+    def close(self, joint: Joint) -> None:
+        """Express a joint that closes a loop by an equality."""
+        if isinstance(joint, Distance):
+            sites = self.add_ends(joint.name, joint.bodies, joint.points)
+            tendon = ET.SubElement(self.tendons, "spatial", name=joint.name)
+            for site in sites:
+                ET.SubElement(tendon, "site", site=site)
+            # its length may change by the constant of the polynomial, since design
+            change = numbers([joint.rod_length - joint.design_distance, 0, 0, 0, 0])
+            ET.SubElement(self.equalities, "tendon", tendon1=joint.name, polycoef=change)
+            return
+        links, point, turns = end_of_loop(self.links(joint), ends_of(self.mechanism, joint)[0])
+        carrier = joint.i
+        if links:
+            carrier = f"{joint.name}.auxiliary"
+            self.add_body(replace(self.frames[joint.i], name=carrier), joint.i)
+            self.carry(carrier, joint, links)
+        one, two = self.add_ends(joint.name, (carrier, joint.j), (point, point))
+        ET.SubElement(self.equalities, "connect" if turns else "weld", name=joint.name, site1=one, site2=two)
+
+    def add_ends(self, joint: str, bodies: Sequence[str], points: Sequence[Sequence[float]]) -> list[str]:
+        """A site at either end of what closes a loop."""
+        ends = zip(("first", "second"), bodies, points, strict=True)
+        return [self.add_site(f"{joint}.{which}", body, point, aligned=True) for which, body, point in ends]
+
+    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
+        """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
+        one, other, factor = dependence((self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms)
+        polynomial = numbers([0, factor, 0, 0, 0])
+        ET.SubElement(self.equalities, "joint", joint1=one, joint2=other, polycoef=polynomial)

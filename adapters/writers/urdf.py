@@ -1,0 +1,218 @@
+"""A mechanism as URDF, which knows trees only, and beside it a JSON file of the conditions that close its loops.
+
+Every link is parallel to the global axes at design, so axes and arms are the case's numbers, and has its origin in its joint's
+point. A joint is a chain of URDF's revolute and prismatic joints (see `chains`). URDF has no ball joint; three hinges would lock
+at a quarter turn, so a body that no chain without a ball carries floats, and its joints are conditions (see `closures`). Hinges
+are "revolute", not "continuous", with limits beyond all reach: their coordinate is then the angle itself, which counts turns.
+"""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from ...core.algebra import vec
+from ...core.errors import KincheckError
+from ...core.joints import Fixed, Joint
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ...core.mechanism.topology import spanning_tree
+from ...core.trajectory import BodyMotion
+from ..shared.frame_constraints import Coincident, Condition, Difference, Direction, Dot, Frame, Length
+from ..shared.joint_chains import CHAINS, Link, relations
+from ..shared.loop_closures import CLOSURES, ends_of
+from ..shared.poses import backwards, displacements, link_coordinates
+from .xml_text import document, link_names, numbers
+
+SCHEMA = "kincheck-constraints/1"
+NOTE = (
+    " Written by kincheck. Lengths are in m, angles in rad; nothing has a mass. The tree alone is not the mechanism: the "
+    "constraints in the file beside it close its loops. "
+)
+MEANING = {
+    "coincident": "the points i and j are one (3 equations)",
+    "distance": "the points i and j are `value` apart [m]",
+    "directions": "x . y = value [-], unit vectors",
+    "offset": "x . (point j - point i) = value [m], x a unit vector",
+    "linear": "the sum of weight * coordinate of the joint is zero [m or rad]",
+    "bodies": "the frame of the body in its link at design",
+    "start": "coordinates of joints: m or rad; floating: displacement x, y, z [m] and quaternion x, y, z, w",
+}
+KINDS = {"hinge": "revolute", "slide": "prismatic"}
+FAR = {"lower": "-1e9", "upper": "1e9", "effort": "1e9", "velocity": "1e9"}
+
+
+def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]) -> Mapping[str, str]:
+    """A .urdf file and a .constraints.json beside it, with a consistent start at the end of the way; see `Writer`.
+
+    Points of links are in the link's axes, as in URDF. Coordinates of the start go by the name of the joint, neutral at design.
+
+    Raises:
+        KincheckError: a joint has no counterpart here, or a name cannot be used.
+    """
+    for joint in mechanism.joints:
+        if type(joint) not in CLOSURES:
+            raise KincheckError(f"{joint} has no counterpart in URDF here; write an equivalent of known joints instead")
+    model = _Model(mechanism, way)
+    beside = {
+        "schema": SCHEMA,
+        "mechanism": mechanism.name,
+        "units": {"length": "m", "angle": "rad"},
+        "meaning": MEANING,
+        "constraints": model.constraints,
+        "bodies": {body.name: model.pose(body) for body in mechanism.bodies},
+        "start": {"drivers": dict(start), "coordinates": model.q},
+    }
+    text = document(model.root, (["link"], ["joint"]))
+    return {".urdf": text, ".constraints.json": _json(beside)}
+
+
+def _json(table: Mapping[str, Any]) -> str:
+    """JSON with an entry a line."""
+
+    def lines(value: Any) -> str:
+        if isinstance(value, dict):
+            entries = (
+                f"{json.dumps(key)}: {json.dumps(each, allow_nan=False)}" for key, each in cast(dict[str, Any], value).items()
+            )
+            return "{\n    " + ",\n    ".join(entries) + "\n  }"
+        if isinstance(value, list):
+            return "[\n    " + ",\n    ".join(json.dumps(each, allow_nan=False) for each in cast(list[Any], value)) + "\n  ]"
+        return json.dumps(value)
+
+    return "{\n  " + ",\n  ".join(f"{json.dumps(key)}: {lines(value)}" for key, value in table.items()) + "\n}\n"
+
+
+@dataclass(frozen=True)
+class _End:
+    """A point of a link, in the link's axes [m]; stands in for a frame, of which a condition keeps what it needs."""
+
+    link: str
+    point: list[float]
+
+
+class _Model:
+    """The document, and what goes beside it, while they are made."""
+
+    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
+        self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
+        self.root = ET.Element("robot", name=mechanism.name)
+        self.root.append(ET.Comment(NOTE))
+        self.origin: dict[str, Vector] = {}  # of links, global at design
+        self.q: dict[str, list[float]] = {}
+        self.coordinates: dict[tuple[str, str], tuple[str, float]] = {}  # name and sign, by joint and freedom
+        self.constraints: list[dict[str, Any]] = []
+        self.add_link(GROUND, (0.0, 0.0, 0.0))
+        for body in mechanism.bodies:
+            if body.fixed:
+                self.attach(body.name, GROUND, body.origin, f"{body.name}.fixed")
+        tree = spanning_tree(mechanism)
+        cut = set(tree.cut)
+        for branch in tree.branches:
+            joint, body = branch.joint, mechanism.body(branch.child)
+            if joint is not None and (links := self.links(joint)) is not None:
+                self.carry(body.name, joint, links, 1 if joint.j == body.name else -1)
+                continue
+            self.add_free(body)
+            cut |= {joint} - {None}
+        coupled = {name for coupler in mechanism.couplers for name in coupler.joints}
+        for joint in (each for each in mechanism.joints if each in cut):
+            self.close(joint, on_copy=joint.name in coupled or bool(relations(joint)))
+        for coupler in mechanism.couplers:
+            self.relate(coupler.name, coupler.terms)
+        for point in mechanism.points:
+            self.attach(f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed")
+
+    def links(self, joint: Joint) -> list[Link] | None:
+        """A joint's chain, from its first body to its second; None where it has a ball or is none."""
+        chain = CHAINS.get(type(joint))
+        links = chain and chain(joint, ends_of(self.mechanism, joint)[0])
+        return None if links is None or any(link.move == "ball" for link in links) else links
+
+    def add_link(self, name: str, origin: Vector) -> ET.Element:
+        """A link with its origin there, global at design."""
+        self.origin[name] = origin
+        return ET.SubElement(self.root, "link", name=name)
+
+    def attach(self, link: str, parent: str, origin: Vector, joint: str, kind: str = "fixed") -> ET.Element:
+        """A new link on another one, by one of URDF's joints."""
+        self.add_link(link, origin)
+        element = ET.SubElement(self.root, "joint", name=joint, type=kind)
+        ET.SubElement(element, "parent", link=parent)
+        ET.SubElement(element, "child", link=link)
+        ET.SubElement(element, "origin", xyz=numbers(self.arm(parent, origin)), rpy="0 0 0")
+        return element
+
+    def arm(self, link: str, P: Sequence[float]) -> list[float]:
+        """A point of a link, from its place at design."""
+        return [*(vec(P) - vec(self.origin[link]))]
+
+    def add_free(self, body: Body) -> None:
+        """A body that no chain carries."""
+        name = f"{body.name}.free"
+        self.attach(body.name, GROUND, body.origin, name, "floating")
+        e0, *e = (float(each[-1]) for each in self.placed[body.name].turn)
+        self.q[name] = [*(self.way[body.name].r[-1] - body.origin).tolist(), *e, e0]
+
+    def carry(self, end: str, joint: Joint, links: Sequence[Link], sign: int = 1) -> None:
+        """A chain to a new link, from the joint's first body on or (sign -1) from its second."""
+        at = joint.bodies[sign < 0]
+        values = link_coordinates(joint, links, self.placed)
+        chain = [*zip(link_names(joint.name, links), links, values, strict=True)][::sign]
+        for k, (name, link, value) in enumerate(chain, 1):
+            following = end if k == len(chain) else f"{name}.link"
+            element = self.attach(following, at, link.point, name, KINDS[link.move])
+            ET.SubElement(element, "axis", xyz=numbers(link.axis))
+            ET.SubElement(element, "limit", FAR)
+            self.q[name] = [*(value if sign > 0 else backwards(link, value))]
+            self.coordinates[joint.name, link.name] = name, float(sign)
+            at = following
+        if not chain:
+            self.attach(end, at, ends_of(self.mechanism, joint)[0], joint.name)
+        for relation in relations(joint):
+            self.relate(joint.name, relation)
+
+    def close(self, joint: Joint, on_copy: bool) -> None:
+        """The conditions of a joint that is not in the tree; where its coordinates must count turns, it moves a copy."""
+        (i, j), ends, closing = joint.bodies, ends_of(self.mechanism, joint), CLOSURES[type(joint)]
+        if on_copy:
+            links = self.links(joint)
+            assert links is not None  # joints that have relations or can be coupled have no ball
+            i, closing = f"{joint.name}.copy", CLOSURES[Fixed]
+            self.carry(i, joint, links)
+        frames = [cast(Frame, _End(link, self.arm(link, P))) for link, P in zip((i, j), ends, strict=True)]
+        for condition in closing.conditions(joint, *frames):
+            self.constraints += ({"joint": joint.name, **written} for written in _written(condition))
+
+    def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
+        """Keep the weighted sum of coordinates (joint, freedom, weight) at zero."""
+        found = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
+        self.constraints.append({"joint": name, "kind": "linear", "weights": {one: sign * weight for one, sign, weight in found}})
+
+    def pose(self, body: Body) -> dict[str, Any]:
+        """A body's frame in its link."""
+        return {"link": body.name, "origin": self.arm(body.name, body.origin), "euler_parameters": [*body.euler_parameters]}
+
+
+def _written(condition: Condition) -> Iterator[dict[str, Any]]:
+    """A condition as data."""
+
+    def end(frame: Any) -> dict[str, Any]:
+        return {"link": frame.link, "point": frame.point}
+
+    def along(direction: Direction) -> dict[str, Any]:
+        return {"link": cast(Any, direction.frame).link, "direction": direction.a0.tolist()}
+
+    match condition:
+        case Coincident(Difference(i, j)):
+            yield {"kind": "coincident", "i": end(i), "j": end(j)}
+        case Length(Difference(i, j), length):
+            yield {"kind": "distance", "i": end(i), "j": end(j), "value": length}
+        case Dot(Direction() as x, Direction() as y, value):
+            yield {"kind": "directions", "x": along(x), "y": along(y), "value": value}
+        case Dot(Direction() as x, Difference(i, j), value):
+            yield {"kind": "offset", "x": along(x), "i": end(i), "j": end(j), "value": value}
+        case _:
+            raise NotImplementedError(f"{type(condition).__name__}: give its kind here")

@@ -1,0 +1,1 @@
+"""Cases: a mechanism, its motion, the outputs to compare and their reference."""

@@ -1,0 +1,115 @@
+"""Files written whole or not at all; what cannot be written is told, before the work where that can be seen."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO, TypeAlias
+from uuid import uuid4
+
+from ...errors import KincheckError
+
+Named: TypeAlias = tuple[str, Path | str | None]
+"""An option and the file that it names, "-" for standard output; None where it was not given."""
+
+Content: TypeAlias = bytes | Callable[[Path], object]
+"""What a file is to have, or what writes it to the path that it is given."""
+
+
+def written(path: Path, content: Content) -> list[str]:
+    """Write a file; or why it cannot be."""
+    try:
+        _put(path, content)
+    except OSError as error:
+        return [f"{path}: cannot be written ({error.strerror or error}); what else was asked for is tried"]
+    return []
+
+
+def write_all(contents: Iterable[tuple[Path, Content]]) -> list[str]:
+    """Write files; why some could not be."""
+    return [problem for path, content in contents for problem in written(path, content)]
+
+
+def write(option: str, path: Path, content: Content) -> Any:
+    """Write the file that an option names, and give what writing it gives.
+
+    Raises:
+        KincheckError: it cannot be written.
+    """
+    try:
+        return _put(path, content)
+    except OSError as error:
+        why = error.strerror or error
+        raise KincheckError(
+            f"{option} {path}: cannot be written ({why}); give a file in a folder that exists and is writable"
+        ) from None
+
+
+def _put(path: Path, content: Content) -> Any:
+    with _whole(path) as part:
+        return part.write_bytes(content) if isinstance(content, bytes) else content(part)
+
+
+@contextmanager
+def _whole(path: Path) -> Generator[Path]:
+    """A path to write to, which becomes the file when all is written; until then, and if it fails, what stood there stays."""
+    there, file = path.exists(), path.resolve()  # what a link leads to; a pipe without a name is nowhere
+    if there and not (path.is_file() and os.access(file.parent, os.W_OK)):  # a pipe, a device, or in a folder of others
+        yield path
+        return
+    part = file.with_name(f".{uuid4().hex}.part")  # another run may be writing the same file
+    try:
+        yield part
+        if there:
+            shutil.copymode(file, part)
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]:
+    """What cannot be written of the files that options name, or would be written over by the next.
+
+    Args:
+        history: kept in a file of its own, which is none of these.
+    """
+    found = list[str]()
+    seen = {} if history is None else {history.resolve(): "--history"}
+    for option, name in files:
+        if name in (None, "-"):
+            continue
+        path = Path(name)
+        if path == Path("-"):
+            found.append(f"{option} -: standard output takes the document of --json alone; give a file")
+        elif path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+            found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
+        elif _is_standard_output(path):
+            found.append(f"{option} {path}: found the file that standard output goes to, expected one of its own; give another")
+        elif path.exists() and not path.is_file():
+            continue  # a pipe or a device takes what several have to say
+        elif (other := seen.setdefault(path.resolve(), option)) != option:
+            found.append(f"{option} {path}: found the file of {other}, expected one of its own; give another")
+    return found
+
+
+def _is_standard_output(path: Path) -> bool:
+    """Whether it is the file that standard output is sent to, under any name: one would take the other's place."""
+    try:
+        return path.is_file() and os.path.samestat(path.stat(), os.fstat(1))
+    except OSError:  # closed
+        return False
+
+
+def to_standard_output(encoded: bytes) -> None:
+    """Write a JSON document to standard output: in UTF-8, as it has to be, whatever the encoding of texts is there."""
+    sys.stdout.flush()
+    binary: BinaryIO | None = getattr(sys.stdout, "buffer", None)
+    if binary is None:  # a caller has put something in its place that takes texts alone
+        sys.stdout.write(encoded.decode())
+    else:
+        binary.write(encoded)
+    sys.stdout.flush()

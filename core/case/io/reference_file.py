@@ -1,0 +1,175 @@
+"""The file of a proved reference, schema kincheck-reference/1, and its use as the truth of a case."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from ...trajectory import QUANTITIES, Array
+from ..case import Case, Origin, Quantity, Series, Truth
+from .document import fault, read_text, sha256, shown
+
+LARGEST_FILE = 256_000_000
+# Twelve digits of a driver value, as for reference tables: what is off by less moves no output by as much as a tolerance.
+SAME_GRID = 1e-12
+# Not all that Python takes for a number: not 1_0, not nan.
+_DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)
+
+
+class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
+    """One output, SI, as decimals; null where a sample is not proved or the output is not known there.
+
+    Attributes:
+        signs: the convention of signs and axes; empty where the case's own axes are all there is.
+        radius: proved bounds of |printed - true| for position, velocity and acceleration, the largest over the samples.
+        reason: why there are no numbers, where there are none.
+    """
+
+    position: list[str | None]
+    velocity: list[str | None]
+    acceleration: list[str | None]
+    radius: list[float | None]
+    unit: str
+    signs: str
+    reason: str | None = None
+
+
+class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The proof of a sample, or the reason why there is none.
+
+    Attributes:
+        alone: radius of the box around the native pose that holds exactly one solution [lengths: units of the mechanism's size].
+        contraction: of Krawczyk's operator in that box, below one.
+        branch: a lower bound of all branch tests; none where the equations have no spurious zero.
+        redundant: an upper bound of the rows that are left out, at the solution; none without any.
+        contradicted: left-out rows that are proved not to be zero: the geometry, as rounded, closes only without them.
+        left_out: those rows, where they are others than `Reference.redundant`.
+    """
+
+    proved: bool
+    reason: str | None = None
+    alone: float | None = None
+    contraction: float | None = None
+    branch: float | None = None
+    redundant: float | None = None
+    contradicted: int = 0
+    left_out: list[str] | None = None
+
+
+class Reference(msgspec.Struct, frozen=True, kw_only=True):
+    """A proved reference.
+
+    Attributes:
+        numbers: how the numbers of the case are understood: "double" or "decimal".
+        note: what is proved.
+        digits: all printed numbers are within 10^-digits of the true ones.
+        bits: working precision.
+        rows: the equations solved, as "joint: primitive"; redundant: those left out.
+        driver: values at the samples [m, rad or s], of what is swept first.
+        samples: one for each value.
+        seconds: that the proofs took.
+    """
+
+    schema: Literal["kincheck-reference/1"] = "kincheck-reference/1"
+    case: str
+    kincheck: str
+    numbers: str
+    note: str
+    digits: int
+    bits: int
+    rows: list[str]
+    redundant: list[str]
+    driver: dict[str, list[float]]
+    outputs: dict[str, ProvedSeries]
+    samples: list[Sample]
+    seconds: float
+
+    @property
+    def proved(self) -> int:
+        """How many samples are."""
+        return sum(sample.proved for sample in self.samples)
+
+
+def read(file: Path) -> Reference:
+    """The reference in a file.
+
+    Raises:
+        CaseError: it cannot be read or is none.
+    """
+    text = read_text(file, LARGEST_FILE, "give a file that kincheck reference wrote")
+    try:
+        return msgspec.json.decode(text, type=Reference)
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise fault(file, "", f"found {error}, expected a proved reference; make one with kincheck reference CASE") from None
+
+
+def series(file: Path, found: Reference, values: Array, outputs: Sequence[Quantity]) -> dict[str, Series]:
+    """The doubles nearest to the proved numbers, by output; NaN at samples that are not proved.
+
+    Args:
+        file: that the reference was read from, for messages.
+        values: the grid of the sweep [m, rad or s], shape (n,).
+        outputs: those of the case.
+
+    Raises:
+        CaseError: the grid or the outputs, or their signs, are not those of the case.
+    """
+    grid = np.array(next(iter(found.driver.values())) if found.driver else [])
+    if grid.shape != values.shape or not np.allclose(grid, values, rtol=0.0, atol=SAME_GRID * float(np.abs(values).max())):
+        raise fault(file, "driver", "found other samples than those of the sweep, expected the same; make the reference anew")
+    proved = {name: each for name, each in found.outputs.items() if each.reason is None}
+    for output in outputs:
+        if output.name in proved and (proved[output.name].unit, proved[output.name].signs) != (output.unit, output.signs):
+            problem = "found another unit or convention of signs, expected that of the case; make the reference anew"
+            raise fault(file, f"outputs.{output.name}", problem)
+    names = [output.name for output in outputs if output.name in proved]
+    if not names:
+        raise fault(file, "outputs", f"found {', '.join(proved) or 'none'}, expected outputs of the case; make the reference anew")
+    return {name: _series(file, name, proved[name], len(values)) for name in names}
+
+
+def _series(file: Path, name: str, found: ProvedSeries, count: int) -> Series:
+    columns = {quantity: getattr(found, quantity) for quantity in QUANTITIES}
+    position, *derivatives = (_numbers(file, f"outputs.{name}.{each}", columns[each], count) for each in columns)
+    return Series(position, *(column if np.isfinite(column).any() else None for column in derivatives))
+
+
+def _numbers(file: Path, key: str, column: Sequence[str | None], count: int) -> Array:
+    if len(column) != count:
+        raise fault(file, key, f"found {len(column)} samples, expected {count} as in the sweep; make the reference anew")
+    for k, text in enumerate(column):
+        if text is not None and not (_DECIMAL.fullmatch(text) and math.isfinite(float(text))):
+            raise fault(file, f"{key}[{k}]", f"found {shown(text)}, expected a decimal number; make the reference anew")
+    return np.array([np.nan if text is None else float(text) for text in column])
+
+
+def judged_by(cases: Sequence[Case], files: Sequence[Path], unused: list[str] | None = None) -> list[Case]:
+    """The cases with the proved references in these files as their truth, which makes it an in_house_oracle.
+
+    Args:
+        unused: takes a message on each file that is for a case that is not among these; without, it is an error.
+
+    Raises:
+        CaseError: a file cannot be used, or is for a case that is not among these.
+    """
+    found = {case.name: case for case in cases}
+    for file in files:
+        proved = read(file)
+        if proved.case not in found:
+            stray = fault(file, "case", f"found {proved.case!r}, expected one of the cases to be run: {', '.join(found) or 'none'}")
+            if unused is None:
+                raise stray
+            unused.append(str(stray))
+            continue
+        case = found[proved.case]
+        truth = series(file, proved, case.sweep.values, case.outputs)
+        origin = Origin(f"proved by kincheck {proved.kincheck}", file.name, sha256(file), own=True)
+        found[case.name] = replace(case, truth=Truth.IN_HOUSE_ORACLE, reference=truth, origin=origin)
+    return list(found.values())

@@ -1,0 +1,1 @@
+"""Models in other formats: MJCF files and hardpoint tables, read into cases."""

@@ -1,0 +1,84 @@
+"""Which reader a file is for: by the end of its name, and by what it begins with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..case import Case
+from ..io.case_file import LARGEST_FILE, load_case
+from ..io.document import fault, parse, read_text
+from ..io.reader_options import NOTHING, Supplied
+
+CASE_FILES = (".toml", ".json")
+TABLES = (".csv", ".tsv")
+ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
+MODELS = (".xml", ".mjcf")
+SUFFIXES = (*CASE_FILES, *TABLES, *ADAMS_FILES, *MODELS)
+"""Ends of names that are files, whether they are there or not."""
+
+CASE, CHRONO, ADAMS, TABLE, MODEL = (
+    "case file",
+    "Project Chrono suspension",
+    "Adams/Car hardpoints",
+    "hardpoint table",
+    "MJCF model",
+)
+HARDPOINTS = (CHRONO, ADAMS, TABLE)
+_OPTIONS = {CASE: (), MODEL: ("drive", "hold"), **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel"))}
+
+
+def load(file: Path, supplied: Supplied = NOTHING) -> Case:
+    """The case in a file of any kind that can be read.
+
+    Raises:
+        CaseError: the file cannot be read, does not make sense, or does not say enough; or an option is not for such files.
+    """
+    kind = kind_of(file, supplied)
+    for option in supplied.given:
+        if option not in _OPTIONS[kind]:
+            known = ", ".join(f"--{name}" for name in _OPTIONS[kind]) or "no such option"
+            raise fault(file, f"--{option}", f"found for a {kind}, which takes {known}; leave it out, or name this file by itself")
+    if kind == CASE:
+        return load_case(file)
+    text = _text(file)
+    if not file.stem.isprintable():  # it becomes the name of the case
+        raise fault(file, "", "found a file name with control characters, expected printable ones; rename the file")
+    if kind == MODEL:
+        from .mjcf.read import read_mjcf
+
+        return read_mjcf(file, text, supplied)
+    from .hardpoints.adams import read_adams
+    from .hardpoints.chrono import read_chrono
+    from .hardpoints.plain import read_plain
+    from .hardpoints.read import read_hardpoints
+
+    return read_hardpoints(file, text, {CHRONO: read_chrono, ADAMS: read_adams, TABLE: read_plain}[kind], supplied)
+
+
+def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
+    """What kind of file it is; a file of no known kind is a case file, whose reader says what that needs.
+
+    Raises:
+        CaseError: a file that has to be looked into for it cannot be read.
+    """
+    suffix = file.suffix.lower()
+    if suffix == ".toml":
+        return CASE
+    if suffix == ".json":
+        from .hardpoints.chrono import without_comments
+
+        tables = parse(file, without_comments(_text(file)))
+        return CHRONO if "schema" not in tables and ("Template" in tables or supplied.template) else CASE
+    for kind, suffixes in ((TABLE, TABLES), (ADAMS, ADAMS_FILES), (MODEL, MODELS)):
+        if suffix in suffixes:
+            return kind
+    text = _text(file)
+    if "[HARDPOINT]" in text:
+        return ADAMS
+    if text.lstrip().startswith("<"):
+        return MODEL
+    return TABLE if supplied.template else CASE
+
+
+def _text(file: Path) -> str:
+    return read_text(file, LARGEST_FILE, "hardpoints and mechanisms need far less; take out what is not geometry")

@@ -1,0 +1,170 @@
+"""From a file of hardpoints and a template to a case: the wheel goes up and down, the chassis and the steering stand still."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ....errors import MOST_NAMED, brief, remedy, shortened, similar
+from ....mechanism.drivers import PointCoordinate
+from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ....trajectory import Array
+from ...case import Case, Sweep, Truth
+from ...io.coordinates import AXES, with_all_coordinates
+from ...io.document import decimal, explained, fault, shown
+from ...io.reader_options import LEFT_OUT, Supplied
+from ...io.schema import MOST_SAMPLES
+from .table import HardpointTable, coordinate, placed, require_size, unit_of
+from .templates import TEMPLATES, Template
+from .templates.base import KNUCKLE, normal
+
+Reader = Callable[[Path, str], HardpointTable]
+
+# The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every 2.5 mm.
+TRAVEL, SAMPLES = 0.05, 41
+WHEEL = "wheel_center"
+# Cars have some tens of hardpoints at a corner; names of many more are not searched for those that are missing.
+MOST_POINTS = 10_000
+
+
+def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -> Case:
+    """The case of a suspension: outputs are the coordinates of three points of the knuckle; it is consensus_only.
+
+    Raises:
+        CaseError: the file cannot be read, does not say enough, or does not fill the roles of the template.
+    """
+    table = reader(file, text)
+    if len(table.points) > MOST_POINTS:
+        raise fault(
+            file, "", f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most; take out the others"
+        )
+    template = _template(table, supplied.template)
+    points = placed(table, supplied.units, supplied.axes)
+    named = _filled(table, template)
+    at = {role: points[name] for role, name in named.items()}
+    require_size(table, at, supplied.units)
+    travel = _travel(file, supplied.travel)
+    _require_left_and_upright(table, template, named, at, supplied)
+    with explained(file, "", unit_of(table, supplied.units)):
+        joints = tuple(template.joints(at))
+        bodies = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
+        watched = [Point(role, KNUCKLE, at[role]) for role in template.watched]
+        stroke = PointCoordinate("stroke", WHEEL, AXES["z"])
+        mechanism = Mechanism(file.stem, [Body(name) for name in bodies], joints, watched, [stroke])
+    others = [*(name for name in points if name not in named.values()), *table.left_out]
+    source = f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x forward, y left, z up{LEFT_OUT}"
+    source += _listed(others)
+    case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ())
+    return with_all_coordinates(replace(case, length_unit=unit_of(table, supplied.units).name))
+
+
+def _template(table: HardpointTable, said: str | None) -> Template:
+    known = {normal(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
+    if said is not None and normal(said) not in known:
+        raise fault(table.file, "--template", f"found {shown(said)}, expected a template; {remedy(said, TEMPLATES)}")
+    names = ", ".join(TEMPLATES)
+    if table.template is None:
+        if said is None:
+            raise fault(
+                table.file, "", f"does not say what suspension it is of, expected it from you; add --template, one of {names}"
+            )
+        return known[normal(said)]
+    if normal(table.template) not in known:
+        problem = f"found {shown(table.template)}, expected one of those that there is a template for; known: {names}"
+        raise fault(table.file, "Template", problem)
+    written = known[normal(table.template)]
+    if said is not None and known[normal(said)] is not written:
+        problem = f"found {said}, but the file is of a {table.template}, expected {written.name}; leave out --template"
+        raise fault(table.file, "--template", problem)
+    return written
+
+
+def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
+    """Which point of the file fills each role of the template."""
+    by_normal_name: dict[str, list[str]] = {}
+    for name in table.points:
+        by_normal_name.setdefault(normal(name), []).append(name)
+    filled: dict[str, str] = {}
+    for role in template.roles:
+        found = [name for each in dict.fromkeys(role.names) for name in by_normal_name.get(each, ())]
+        if len(found) > 1:
+            places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
+            raise fault(table.file, role.name, f"found {places}, expected one point; remove what {role.meaning} is not")
+        if found:
+            filled[role.name] = found[0]
+    missing = [role for role in template.roles if role.name not in filled]
+    if not missing:
+        return filled
+    unused = {normal(name): name for name in table.points if name not in filled.values()}
+    lines: list[str] = []
+    for role in missing:
+        close = [near for each in role.names if (near := similar(each, unused, 0.75))]
+        advice = ""
+        if close:
+            name = unused[close[0]]
+            where = table.points[name].where
+            advice = f" (is it {name!r}{'' if where == name else f', {where}'}?)"
+        lines.append(f"{role.name}, {role.meaning}{advice}")
+    problem = f"template {template.name}: missing {'; '.join(lines)}"
+    raise fault(table.file, "", f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names to read: all of those that a file of a suspension has."""
+    return shortened([*map(brief, names)], MOST_NAMED) or "nothing"
+
+
+def _require_left_and_upright(
+    table: HardpointTable, template: Template, named: Mapping[str, str], at: Mapping[str, Vector], supplied: Supplied
+) -> None:
+    """Refuse points that are mirrored or upside down: their axes are others than was said."""
+
+    def written(role: str, k: int) -> str:
+        return coordinate(table, named[role], k, supplied.units, supplied.axes)
+
+    advice = "correct --axes" if table.axes is None else "correct the points"
+    if at[WHEEL][1] <= 0.0:
+        raise fault(
+            table.file,
+            named[WHEEL],
+            f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice}, or give the left points",
+        )
+    for rear in (role for role in at if role.endswith("_rear")):
+        front = f"{rear.removesuffix('_rear')}_front"
+        if front in at and at[front][0] <= at[rear][0]:
+            raise fault(
+                table.file,
+                named[front],
+                f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it in front of that; {advice}",
+            )
+    high, low = (at[role][2] for role in (template.upper, template.lower))
+    if high <= low:
+        raise fault(
+            table.file,
+            named[template.upper],
+            f"found {written(template.upper, 2)}, not above {named[template.lower]} with {written(template.lower, 2)}, "
+            f"expected it above; {advice}",
+        )
+
+
+def _travel(file: Path, said: str | None) -> Array:
+    """Wheel travel [m], down to up."""
+    travel, samples = TRAVEL, SAMPLES
+    if said is not None:
+        try:
+            first, _, last = said.partition(":")
+            travel, samples = decimal(first), int(last or SAMPLES)
+        except ValueError:
+            travel = math.nan
+        if not (0.0 < travel < math.inf and 1 < samples <= MOST_SAMPLES):
+            raise fault(
+                file,
+                "--travel",
+                f"found {shown(said)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of them; say --travel 0.05 for 50 mm "
+                "up and down",
+            )
+    return np.linspace(-travel, travel, samples)

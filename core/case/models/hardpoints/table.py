@@ -1,0 +1,167 @@
+"""A table of hardpoints as its file gives it, and its way to metres in the axes of ISO 8855: x forward, y left, z up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ....errors import remedy
+from ....mechanism.mechanism import Vector
+from ...io.document import decimal, fault, shown, usable
+from ...sizes import SUSPENSIONS
+from ...units import LENGTHS, Unit, plain
+
+_UNIT_NAMES: Mapping[str, str] = {"meter": "m", "metre": "m", "in": "inch", "ft": "foot"}
+
+_DIRECTIONS: Mapping[str, tuple[int, float]] = {
+    "forward": (0, 1.0),
+    "rearward": (0, -1.0),
+    "left": (1, 1.0),
+    "right": (1, -1.0),
+    "up": (2, 1.0),
+    "down": (2, -1.0),
+}
+_NAMED_AXES: Mapping[str, str] = {"iso": "forward,left,up", "sae": "forward,right,down", "adams": "rearward,right,up"}
+
+
+@dataclass(frozen=True)
+class Hardpoint:
+    """Coordinates as the file has them, and where they stand there, for messages."""
+
+    position: Vector
+    where: str
+
+
+@dataclass(frozen=True)
+class HardpointTable:
+    """What a file of hardpoints holds.
+
+    Attributes:
+        tool: whose format it is.
+        points: by the name in the file.
+        unit: of the coordinates, where file or format say so.
+        axes: where x, y and z point, where file or format say so: "forward,left,up".
+        template: the suspension the points belong to, where the file says so.
+        left_out: what else is in the file, and has no meaning for kinematics or for a template.
+    """
+
+    file: Path
+    tool: str
+    points: Mapping[str, Hardpoint]
+    unit: str | None
+    axes: str | None
+    template: str | None = None
+    left_out: Sequence[str] = ()
+
+
+def number(file: Path, where: str, text: object) -> float:
+    """A coordinate.
+
+    Raises:
+        CaseError: not a number that can be worked with.
+    """
+    found = math.nan
+    if isinstance(text, str | int | float) and not isinstance(text, bool):
+        try:
+            found = decimal(text) if isinstance(text, str) else float(text)
+        except (ValueError, OverflowError):
+            found = math.nan
+    if not usable(found):
+        raise fault(file, where, f"found {shown(text)}, expected a coordinate; correct the number")
+    return found
+
+
+def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[str, Vector]:
+    """The points in metres, x forward, y left, z up.
+
+    Args:
+        units, axes: what the user says of them; needed where the file does not say, and not to contradict it.
+
+    Raises:
+        CaseError: unit or axes are not known, or contradict each other.
+    """
+    convert = unit_of(table, units)
+    places = _axes(table, axes)
+    points: dict[str, Vector] = {}
+    for name, point in table.points.items():
+        position = [0.0, 0.0, 0.0]
+        for value, (k, sign) in zip(point.position, places, strict=True):
+            position[k] = sign * convert(value)
+        points[name] = (position[0], position[1], position[2])
+    return points
+
+
+def coordinate(table: HardpointTable, name: str, k: int, units: str | None, axes: str | None) -> str:
+    """The coordinate of a point that became its x, y or z (0, 1, 2), as the file has it: "y = 750 mm"."""
+    column = next(column for column, (axis, _) in enumerate(_axes(table, axes)) if axis == k)
+    return f"{'xyz'[column]} = {plain(table.points[name].position[column])} {unit_of(table, units).name}"
+
+
+def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str | None) -> None:
+    """Refuse points that are as far apart as those of no suspension: their unit is another one."""
+    positions = list(used.values())
+    size = max(math.dist(a, b) for a in positions for b in positions)
+    if found := SUSPENSIONS.improbable(size, unit_of(table, units)):
+        problem = f"the points span {found} They are in another unit"
+        raise fault(table.file, "", f"{problem}: correct --units, or the unit in the file")
+
+
+def unit_of(table: HardpointTable, said: str | None) -> Unit:
+    """The unit of the coordinates, which is what makes SI of them."""
+    return LENGTHS[_unit(table, said)]
+
+
+def _unit(table: HardpointTable, said: str | None) -> str:
+    written = None if table.unit is None else _unit_name(table.unit)
+    if written is not None and written not in LENGTHS:
+        raise fault(table.file, "unit", f"found {shown(table.unit)}, expected a length; {remedy(str(table.unit), LENGTHS)}")
+    if said is None:
+        if written is None:
+            raise fault(
+                table.file, "", "does not say in which unit its coordinates are, expected it from you; add --units mm or --units m"
+            )
+        return written
+    name = _unit_name(said)
+    if name not in LENGTHS:
+        raise fault(table.file, "--units", f"found {shown(said)}, expected a length; {remedy(said, LENGTHS)}")
+    if written not in (None, name):
+        raise fault(table.file, "--units", f"found {said}, but the file is in {written}; leave out --units, or correct the file")
+    return name
+
+
+def _unit_name(text: str) -> str:
+    name = text.strip().lower()
+    return _UNIT_NAMES.get(name, name)
+
+
+def _axes(table: HardpointTable, said: str | None) -> list[tuple[int, float]]:
+    if said is None and table.axes is None:
+        raise fault(
+            table.file,
+            "",
+            "does not say where x, y and z point, expected it from you; add --axes forward,left,up (ISO 8855), "
+            "rearward,right,up (Adams/Car), forward,right,down (SAE J670), or what else they are",
+        )
+    places = None if table.axes is None else _places(table.file, "axes", table.axes)
+    if said is None:
+        assert places is not None
+        return places
+    found = _places(table.file, "--axes", said)
+    if places not in (None, found):
+        raise fault(table.file, "--axes", f"found {said}, but the points of this file are {table.axes}; leave out --axes")
+    return found
+
+
+def _places(file: Path, key: str, text: str) -> list[tuple[int, float]]:
+    words = [word.strip().lower() for word in _NAMED_AXES.get(text.strip().lower(), text).split(",")]
+    places = [_DIRECTIONS[word] for word in words if word in _DIRECTIONS]
+    if len(words) != 3 or sorted(k for k, _ in places) != [0, 1, 2]:
+        raise fault(
+            file,
+            key,
+            f"found {shown(text)}, expected where x, y and z point, one each of forward or rearward, left or right, up or down; "
+            "write them with commas: forward,left,up",
+        )
+    return places

@@ -1,0 +1,41 @@
+"""Double wishbone: two arms, the knuckle between them, a tie rod."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from .....joints import Distance, Joint, Revolute, Spherical
+from .....mechanism.mechanism import GROUND, Vector
+from .base import KNUCKLE, TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER, Role, Template, between
+
+
+def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
+    return (
+        Revolute("uca_pivot", GROUND, "uca", at["uca_rear"], between(at["uca_rear"], at["uca_front"])),
+        Revolute("lca_pivot", GROUND, "lca", at["lca_rear"], between(at["lca_rear"], at["lca_front"])),
+        Spherical("upper_ball", "uca", KNUCKLE, at["uca_outer"]),
+        Spherical("lower_ball", "lca", KNUCKLE, at["lca_outer"]),
+        Distance("tie_rod", GROUND, KNUCKLE, (at["tierod_inner"], at["tierod_outer"])),
+    )
+
+
+def _arm(arm: str, level: str) -> tuple[Role, Role, Role]:
+    chrono, plain = f"{level.capitalize()} Control Arm", f"{level}_arm"
+    return (
+        Role(
+            f"{arm}_front", f"the {level} arm's front pivot on the chassis", (f"{chrono}/Location Chassis Front", f"{plain}_front")
+        ),
+        Role(f"{arm}_rear", f"the {level} arm's rear pivot on the chassis", (f"{chrono}/Location Chassis Back", f"{plain}_rear")),
+        Role(f"{arm}_outer", f"the {level} arm's ball joint on the knuckle", (f"{chrono}/Location Upright", f"{plain}_outer")),
+    )
+
+
+DOUBLE_WISHBONE = Template(
+    "double_wishbone",
+    ("DoubleWishbone",),
+    (*_arm("uca", "upper"), *_arm("lca", "lower"), TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER),
+    _joints,
+    ("wheel_center", "tierod_outer", "lca_outer"),
+    "uca_outer",
+    "lca_outer",
+)

@@ -1,0 +1,120 @@
+"""Elements of an XML file somebody wrote: attributes and lines, no entities, no document types, a bounded depth.
+
+Every element is read once, by taking what it has; attributes that MJCF does not know are refused, because a mistyped one would
+silently fall back to its default.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from ....errors import CaseError, remedy
+from ...io.document import decimal, fault, shown, usable
+
+# Robots are some ten bodies deep; what nests beyond this only exhausts the stack.
+DEEPEST = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """An element: its tag, its attributes, the elements in it, and the line it starts in."""
+
+    file: Path
+    tag: str
+    attributes: Mapping[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list["Element"])
+
+    def __str__(self) -> str:
+        name = self.attributes.get("name")
+        return f"line {self.line}: <{self.tag}>" + (f" {name!r}" if name else "")
+
+    def fault(self, problem: str) -> CaseError:
+        """The error to raise: 'FILE: line N: <TAG> NAME: PROBLEM'."""
+        return fault(self.file, str(self), problem)
+
+    def only(self, *tags: str) -> Iterator[Element]:
+        """The elements of these tags in it."""
+        return (child for child in self.children if child.tag in tags)
+
+    def below(self) -> Iterator[Element]:
+        """All elements in it, at any depth, in order."""
+        for child in self.children:
+            yield child
+            yield from child.below()
+
+    def require_known(self, known: Sequence[str]) -> None:
+        """Refuse attributes that are none of the known ones."""
+        for name in self.attributes:
+            if name not in known:
+                raise self.fault(f"found the attribute {shown(name)}, which MJCF does not have here; {remedy(name, known)}")
+
+    def numbers(self, name: str, counts: Sequence[int], default: Sequence[float] | None = None) -> tuple[float, ...]:
+        """The numbers of an attribute, as many as one of the counts says.
+
+        Raises:
+            CaseError: missing without a default, another number of them, or one that cannot be worked with.
+        """
+        text = self.attributes.get(name)
+        expected = f"{' or '.join(map(str, counts))} numbers"
+        if text is None:
+            if default is None:
+                raise self.fault(f"{name}: missing, expected {expected}; add the attribute")
+            return tuple(default)
+        try:
+            found = tuple(map(decimal, text.split()))
+        except ValueError:
+            found = (math.nan,)
+        if len(found) not in counts or not all(map(usable, found)):
+            raise self.fault(f"{name}: found {shown(text)}, expected {expected}; correct the attribute")
+        return found
+
+    def choice(self, name: str, known: Sequence[str], default: str) -> str:
+        """The value of an attribute that is one of a few words."""
+        found = self.attributes.get(name, default)
+        if found not in known:
+            raise self.fault(f"{name}: found {shown(found)}, expected one of {', '.join(known)}; {remedy(found, known)}")
+        return found
+
+
+def parse_xml(file: Path, text: str) -> Element:
+    """The root element of a text.
+
+    Raises:
+        CaseError: not well-formed, nested too deeply, or with a document type, which MJCF has none of and which may hold entities.
+    """
+    # a declared encoding is not looked up: the text has been decoded, and Python knows encodings that expat cannot take
+    parser = expat.ParserCreate("utf-8")
+    roots: list[Element] = []
+    open_: list[Element] = []
+
+    def start(tag: str, attributes: Mapping[str, str]) -> None:
+        element = Element(file, tag, attributes, parser.CurrentLineNumber)
+        if len(open_) >= DEEPEST:
+            raise element.fault(f"nested more than {DEEPEST} deep, expected the tree of a mechanism; correct the file")
+        for name in (tag, *attributes.values()):
+            if not name.isprintable():
+                raise element.fault(f"found {shown(name)}, expected printable text; remove the control characters")
+        (open_[-1].children if open_ else roots).append(element)
+        open_.append(element)
+
+    def end(_: str) -> None:
+        open_.pop()
+
+    def refuse(*_: object) -> None:
+        line = f"line {parser.CurrentLineNumber}"
+        raise fault(file, line, "found <!DOCTYPE>, expected none: it can hold entities, which are not expanded; remove it")
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(text.encode("utf-8"), True)
+    except expat.ExpatError as error:
+        raise fault(file, f"line {error.lineno}", f"not valid XML: {expat.ErrorString(error.code)}; correct the syntax") from None
+    (root,) = roots
+    return root

@@ -1,0 +1,166 @@
+"""Places and orientations as MJCF has them: quaternions, angles and axes, Euler angles in any sequence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, quat, rotation_less_identity, vec
+from ....mechanism.mechanism import Vector
+from ...io.document import shown
+from .attributes import KNOWN, ORIENTATION
+from .elements import Element
+
+_AXES = {"x": X, "y": Y, "z": Z}
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """How a model writes its angles.
+
+    Attributes:
+        degrees: angles are in degrees, as they are unless the model says otherwise.
+        sequence: three letters, the axes of Euler angles: small ones turn with the body, capital ones stand still.
+        align: the frames of free bodies are moved to their inertia, unless a joint says otherwise.
+    """
+
+    degrees: bool = True
+    sequence: str = "xyz"
+    align: bool = False
+
+    def angle(self, value: float) -> float:
+        """An angle of the file [rad]."""
+        return math.radians(value) if self.degrees else value
+
+
+def read_compiler(root: Element) -> Compiler:
+    """The settings of all <compiler> elements, the last of which counts.
+
+    Raises:
+        CaseError: an unknown setting, or coordinates that MuJoCo does not read any more.
+    """
+    found = Compiler()
+    for element in root.only("compiler"):
+        element.require_known(KNOWN["compiler"])
+        degrees = element.choice("angle", ("degree", "radian"), "degree" if found.degrees else "radian") == "degree"
+        sequence = element.attributes.get("eulerseq", found.sequence)
+        if len(sequence) != 3 or not all(letter.lower() in _AXES for letter in sequence):
+            raise element.fault(f"eulerseq: found {shown(sequence)}, expected three of x, y, z, X, Y, Z; correct it")
+        element.choice("coordinate", ("local",), "local")
+        align = element.choice("alignfree", ("true", "false"), "true" if found.align else "false") == "true"
+        found = Compiler(degrees, sequence, align)
+    return found
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a frame is, and how it is turned, in the frame around it or globally [m, -]."""
+
+    at: Vec3 = ZERO
+    turn: Quat = IDENTITY
+
+    def then(self, inner: Place) -> Place:
+        """A frame given in this one, as this one is given."""
+        return Place(self.point(inner.at), unit_quaternion(self.turn * inner.turn))
+
+    def point(self, p: Vec3) -> Vec3:
+        """A point given in this frame."""
+        return self.at + self.direction(p)
+
+    def direction(self, a: Vec3) -> Vec3:
+        """A direction given in this frame."""
+        return a + rotation_less_identity(self.turn) @ a
+
+    def seen_from(self, outer: Place) -> Place:
+        """This frame as the other one sees it, both given alike."""
+        back = outer.turn.conjugate()
+        return Place(Place(ZERO, back).direction(self.at - outer.at), back * self.turn)
+
+
+HERE = Place()
+
+
+def unit_quaternion(q: Quat) -> Quat:
+    """The quaternion at length one; composing many would let it drift."""
+    length = math.sqrt(sum(e * e for e in q))
+    return Quat(q.e0 / length, (1.0 / length) * q.e)
+
+
+def coordinates(a: Vec3) -> Vector:
+    """A vector as the description of a mechanism has it."""
+    return float(a.x), float(a.y), float(a.z)
+
+
+def read_place(element: Element, compiler: Compiler) -> Place:
+    """The place that an element gives by pos and one kind of orientation.
+
+    Raises:
+        CaseError: several orientations, or one that is none: zero or parallel axes, a zero quaternion.
+    """
+    at = vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0)))
+    given = [name for name in ORIENTATION if name in element.attributes]
+    if len(given) > 1:
+        raise element.fault(f"found {' and '.join(given)}, expected one orientation; remove the others")
+    return Place(at, _orientation(element, given[0], compiler) if given else IDENTITY)
+
+
+def _orientation(element: Element, name: str, compiler: Compiler) -> Quat:
+    numbers = element.numbers(name, ({"quat": 4, "axisangle": 4, "xyaxes": 6}.get(name, 3),))
+    if name == "euler":
+        found = IDENTITY
+        for letter, value in zip(compiler.sequence, numbers, strict=True):
+            one = _about(_AXES[letter.lower()], compiler.angle(value))
+            found = found * one if letter.islower() else one * found
+        return found
+    if name == "quat":
+        _nonzero(element, name, numbers)
+        return unit_quaternion(quat(numbers))
+    if name == "axisangle":
+        return _about(_nonzero(element, name, numbers[:3]), compiler.angle(numbers[3]))
+    if name == "zaxis":
+        return _z_towards(_nonzero(element, name, numbers))
+    x = _nonzero(element, name, numbers[:3])
+    y = vec(numbers[3:])
+    y = _nonzero(element, name, (*(y - (x @ y) * x),))
+    return _of_axes(x, y, cross(x, y))
+
+
+def _nonzero(element: Element, name: str, numbers: Sequence[float]) -> Vec3:
+    """The direction of numbers, length one; of a quaternion, of its last three, which is not used."""
+    length = math.sqrt(sum(each * each for each in numbers))
+    if length < 1e-10:  # as MuJoCo has it: shorter axes point anywhere
+        raise element.fault(f"{name}: found axes of no direction, expected ones that span a frame; correct the attribute")
+    return (1.0 / length) * vec(numbers[-3:])
+
+
+def _about(axis: Vec3, angle: float) -> Quat:
+    return Quat(math.cos(0.5 * angle), math.sin(0.5 * angle) * axis)
+
+
+def _z_towards(axis: Vec3) -> Quat:
+    """The shortest turn of z towards the axis; half a turn about x where the axis is opposite."""
+    normal = cross(Z, axis)
+    sine = math.sqrt(normal @ normal)
+    if sine < 1e-10:
+        return IDENTITY if axis.z > 0.0 else Quat(0.0, X)
+    return _about((1.0 / sine) * normal, math.atan2(sine, axis.z))
+
+
+def _of_axes(x: Vec3, y: Vec3, z: Vec3) -> Quat:
+    """The quaternion of a frame, from the largest of its components (Shepperd's choice), which cannot vanish."""
+    trace = x.x + y.y + z.z
+    squares = (1.0 + trace, 1.0 + 2.0 * x.x - trace, 1.0 + 2.0 * y.y - trace, 1.0 + 2.0 * z.z - trace)
+    k = squares.index(max(squares))
+    scaled = (
+        (squares[0], y.z - z.y, z.x - x.z, x.y - y.x),
+        (y.z - z.y, squares[1], x.y + y.x, z.x + x.z),
+        (z.x - x.z, x.y + y.x, squares[2], y.z + z.y),
+        (x.y - y.x, z.x + x.z, y.z + z.y, squares[3]),
+    )[k]
+    return unit_quaternion(quat(scaled))
+
+
+def joint_axis(element: Element) -> Vec3:
+    """The axis of a joint in its body's frame, length one; z unless given."""
+    return _nonzero(element, "axis", element.numbers("axis", (3,), (0.0, 0.0, 1.0)))

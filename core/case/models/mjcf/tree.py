@@ -1,0 +1,196 @@
+"""The tree of bodies of a model, in the pose qpos0 that its file draws: what moves, on which joints, and what is fixed to what.
+
+A body without a joint is part of the body around it. A body with several joints hangs on a chain of massless ones, a joint each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ....algebra import Vec3, vec
+from ....errors import remedy
+from ....mechanism.mechanism import GROUND
+from ...io.document import shown
+from .attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, WRITE_OUT
+from .classes import MAIN, Classes
+from .elements import Element
+from .frames import HERE, Compiler, Place, joint_axis, read_place
+
+WORLD = "world"
+# Scenes have many bodies, robots and hands at most some tens that move, a joint each; the freedom of all is counted at once, in a
+# time that grows with the cube of their number: some seconds for as many as these.
+MOST_BODIES, MOST_MOVING = 2_000, 150
+
+
+@dataclass(frozen=True)
+class ModelJoint:
+    """A hinge, slide or ball of a model: global at qpos0 [m].
+
+    Attributes:
+        outer, inner: the bodies it joins, of the mechanism; the inner one moves on it.
+        ref: its coordinate in the pose of the file [rad or m].
+    """
+
+    name: str
+    type: str
+    outer: str
+    inner: str
+    point: Vec3
+    axis: Vec3
+    ref: float
+    element: Element
+
+
+@dataclass
+class Tree:
+    """What a model's worldbody holds.
+
+    Attributes:
+        places: of all bodies of the file, global.
+        carriers: by body of the file, the body of the mechanism it belongs to.
+        moving: bodies of the mechanism that move, with their places; the massless ones of chains too.
+        massless: the names of those.
+        free: by name, of the joint or of its body, bodies that no joint holds.
+        sites: by name, the body of the mechanism they are on, and their global places.
+        names: of all bodies of the file that have one.
+        left_out: how many there are of what has no meaning for kinematics, by what it is called.
+    """
+
+    classes: Classes
+    compiler: Compiler
+    places: dict[str, Place] = field(default_factory=lambda: {WORLD: HERE})
+    carriers: dict[str, str] = field(default_factory=lambda: {WORLD: GROUND})
+    moving: dict[str, Place] = field(default_factory=dict[str, Place])
+    massless: set[str] = field(default_factory=set[str])
+    joints: dict[str, ModelJoint] = field(default_factory=dict[str, ModelJoint])
+    free: dict[str, str] = field(default_factory=dict[str, str])
+    sites: dict[str, tuple[str, Place]] = field(default_factory=dict[str, tuple[str, Place]])
+    left_out: dict[str, int] = field(default_factory=dict[str, int])
+    names: set[str] = field(default_factory=set[str])
+
+    def read(self, around: Element, place: Place, body: str, childclass: str) -> None:
+        """What is in a body, or in a frame of it; `place` is that of the body or frame, `body` one of the mechanism.
+
+        Raises:
+            CaseError: an element that is not known or makes bodies, a name given twice, a joint or place that makes no sense.
+        """
+        for element in around.children:
+            if element.tag in MAKE_BODIES:
+                raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")
+            if element.tag not in IN_BODY:
+                raise element.fault(f"unknown in a body; {remedy(element.tag, IN_BODY)}")
+            if element.tag == "body":
+                self._body(element, place, body, childclass)
+            elif element.tag == "frame":
+                if any(element.only("joint", "freejoint")):
+                    raise element.fault(f"holds a joint, expected joints in bodies; {WRITE_OUT}")
+                element.require_known(KNOWN["frame"])
+                self.read(element, place.then(read_place(element, self.compiler)), body, _class(element, childclass))
+            elif element.tag == "site":
+                self._site(self.classes.complete(element, "site", childclass), place, body)
+            elif element.tag not in ("joint", "freejoint"):
+                self.count(f"{element.tag}s" if element.tag != "inertial" else "inertia")
+
+    def count(self, what: str) -> None:
+        """One more of what is left out."""
+        self.left_out[what] = self.left_out.get(what, 0) + 1
+
+    def _body(self, element: Element, around: Place, outer: str, childclass: str) -> None:
+        element.require_known(KNOWN["body"])
+        name = element.attributes.get("name", self._unused(f"body{len(self.places)}"))
+        if name == GROUND:
+            raise element.fault(f"name: found {shown(name)}, which is what does not move in a mechanism; rename the body")
+        if name in self.places:
+            raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the bodies")
+        place = around.then(read_place(element, self.compiler))
+        childclass = _class(element, childclass)
+        elements = list(element.only("joint", "freejoint"))
+        for most, count, what in (
+            (MOST_BODIES, len(self.places), "bodies; take out what does not move"),
+            (MOST_MOVING, len(self.moving) + len(elements), "joints; take out those that are not looked at"),
+        ):
+            if count > most:
+                raise element.fault(f"found more than the {most} that are read, expected fewer {what}")
+        if not elements:
+            carrier = outer
+            if element.attributes.get("mocap") == "true":
+                self.count("mocap bodies, which stand still")
+        else:
+            carrier = name
+            joints = [self.classes.complete(each, "joint", childclass) if each.tag == "joint" else each for each in elements]
+            self._joints(name, joints, place, outer)
+        self.places[name], self.carriers[name] = place, carrier
+        self.read(element, place, carrier, childclass)
+
+    def _joints(self, body: str, elements: list[Element], place: Place, outer: str) -> None:
+        kinds = [self._kind(element) for element in elements]
+        for k, (element, kind) in enumerate(zip(elements, kinds, strict=True)):
+            last = k == len(elements) - 1
+            name = element.attributes.get("name", body if len(elements) == 1 else f"{body}.{k + 1}")
+            if name in self.joints or (kind == "free" and name in self.free):
+                raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the joints")
+            inner = body if last else self._unused(f"{body}.{name}")
+            self.moving[inner] = place
+            if not last:
+                self.massless.add(inner)
+            if kind == "free":
+                if len(elements) > 1 or outer != GROUND:
+                    raise element.fault(
+                        "frees a body that other joints hold, expected a body in worldbody alone; remove one of them"
+                    )
+                self.free |= {name: body, body: body}
+            else:
+                self.joints[name] = self._joint(name, kind, element, place, outer, inner)
+            outer = inner
+
+    def _unused(self, wanted: str) -> str:
+        """A name for a body that the file does not name: none of its own names."""
+        while wanted in self.names:
+            wanted += "'"
+        return wanted
+
+    def _kind(self, element: Element) -> str:
+        element.require_known(KNOWN[element.tag])
+        kind = "free" if element.tag == "freejoint" else element.choice("type", ("hinge", "slide", "ball", "free"), "hinge")
+        align = element.choice("align", ("true", "false", "auto"), "auto")
+        if kind == "free" and (align == "true" or (align == "auto" and self.compiler.align)):
+            raise element.fault(
+                "its body's frame is moved to its inertia (align, or alignfree of <compiler>), where anchors and relpose mean "
+                'something else, expected the frame of the file; set align="false" and give them in that'
+            )
+        return kind
+
+    def _joint(self, name: str, kind: str, element: Element, place: Place, outer: str, inner: str) -> ModelJoint:
+        for attribute, what in DYNAMIC.items():
+            if attribute in element.attributes:
+                self.count(f"{what} of joints")
+        (ref,) = element.numbers("ref", (1,), (0.0,))
+        point = place.point(vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0))))
+        if kind == "hinge":
+            ref = self.compiler.angle(ref)
+        return ModelJoint(name, kind, outer, inner, point, place.direction(joint_axis(element)), ref, element)
+
+    def _site(self, element: Element, place: Place, body: str) -> None:
+        element.require_known(KNOWN["site"])
+        name = element.attributes.get("name")
+        if name is None:
+            return
+        if name in self.sites:
+            raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the sites")
+        if "fromto" in element.attributes:
+            raise element.fault(f"fromto: found a site between two points, expected pos and quat; {WRITE_OUT}")
+        self.sites[name] = body, place.then(read_place(element, self.compiler))
+
+
+def _class(element: Element, childclass: str) -> str:
+    return element.attributes.get("childclass", childclass)
+
+
+def read_tree(root: Element, classes: Classes, compiler: Compiler) -> Tree:
+    """The tree of a model."""
+    tree = Tree(classes, compiler)
+    for world in root.only("worldbody"):
+        world.require_known(KNOWN["worldbody"])
+        tree.names |= {each.attributes["name"] for each in world.below() if each.tag == "body" and "name" in each.attributes}
+        tree.read(world, HERE, GROUND, MAIN)
+    return tree

@@ -1,0 +1,76 @@
+"""The places of a mechanism's geometry as somebody names them: found by name, and with all that is at the same point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from ...errors import remedy
+from ...joints import Kind
+from ...kinematics.formulation.parameters import kinds, places
+from ...mechanism.mechanism import Mechanism
+from ..case import MARKER
+
+# Positions closer than this are one hardpoint [m]: tables are measured to about a micrometre at best.
+SAME = 1e-6
+
+
+class PlaceError(ValueError):
+    """A name is that of no place, or of several; the message says what to write."""
+
+
+class Geometry:
+    """The places of a mechanism.
+
+    Attributes:
+        values: of every place [m or -], the markers' among them.
+        kinds: what each is.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.values = places(mechanism)
+        self.kinds = kinds(mechanism)
+
+    @property
+    def named(self) -> list[str]:
+        """The places that a user knows: all but those of markers."""
+        return [place for place in self.values if not place.startswith(f"points.{MARKER}")]
+
+    def find(self, name: str) -> str:
+        """The place of that name, or the one position of the joint or point of that name.
+
+        Raises:
+            PlaceError: there is none, or more than one.
+        """
+        if name in self.named:
+            return name
+        found = [
+            place
+            for place in self.named
+            if self.kinds[place] is Kind.POSITION
+            and (place.startswith(f"{name}.") or place.partition(".")[2].startswith(f"{name}."))
+        ]
+        if not found:
+            raise PlaceError(f"expected a position, direction or length of the case; {remedy(name, self.named)}")
+        if any(place not in self.together(found[0]) for place in found):
+            raise PlaceError(f"which may be {' or '.join(found)}, expected one place; write it in full")
+        return found[0]
+
+    def together(self, place: str) -> tuple[str, ...]:
+        """The place, and if it is a position, every other that is there at design."""
+        if self.kinds[place] is not Kind.POSITION:
+            return (place,)
+        here = self.values[place]
+        return tuple(
+            each for each in self.named if self.kinds[each] is Kind.POSITION and math.dist(here, self.values[each]) <= SAME
+        )
+
+    def with_markers(self, moved: Iterable[str]) -> tuple[str, ...]:
+        """Places, and those of the markers that stand beside points among them."""
+        found = [*moved]
+        for place in self.values:
+            if place.startswith(f"points.{MARKER}"):
+                center = place.removeprefix(f"points.{MARKER}").removesuffix(".position").rpartition(".")[0]
+                if f"points.{center}.position" in found:
+                    found.append(place)
+        return tuple(found)

@@ -1,0 +1,102 @@
+"""kincheck assemblies: list the ways a mechanism can be put together, and start a simulator in one of them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import KincheckError, unknown
+from . import import_options
+from .export import formats, keep_texts
+from .registry import House, Status, given, whole
+
+if TYPE_CHECKING:
+    from ..studies.assemblies import Survey
+
+# Singular values below this mean that assemblies meet there; sound linkages stay above 1e-2.
+MEETING = 1e-6
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    listing: argparse.ArgumentParser
+    listing = commands.add_parser("assemblies", help="list all assemblies of a mechanism", description=_assemblies.__doc__)
+    listing.set_defaults(do=_assemblies)
+    listing.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    listing.add_argument(
+        "--at",
+        type=float,
+        metavar="VALUE",
+        help="of the swept driver as the sweep has it, in SI units; default: the design position",
+    )
+    listing.add_argument("--samples", type=whole(1), default=200, metavar="N", help="random starts; default %(default)s")
+    listing.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random starts; default %(default)s")
+    listing.add_argument("--json", metavar="FILE", help="write the assemblies with all poses as JSON; - for standard output")
+    listing.add_argument("--export", metavar="FORMAT", help=f"write the mechanism, started in one of them: {formats()}")
+    listing.add_argument("--number", type=whole(1), metavar="K", help="which one to export; default 1, the first of the list")
+    listing.add_argument("--out", type=Path, metavar="FILE", help="of the export; default: CASE.K in this folder")
+    import_options.add_options(listing)
+
+
+def _assemblies(options: argparse.Namespace, house: House) -> int:
+    """List the assemblies that random starts lead to at a driver value, the intended one first.
+
+    Exit status: 0 some are found, 1 none is, 2 the tool could not do its work.
+    """
+    from ..case.io.atomic_files import unwritable
+    from ..report.terminal import write_json
+    from ..studies.assemblies import survey, written
+
+    if options.export is None and (found := given(options, ("number", "out"))):
+        raise KincheckError(
+            f"{found}: found without --export, expected with it, to say what it writes; add --export FORMAT, or leave out"
+        )
+    if problems := unwritable([("--json", options.json), ("--out", options.out)]):
+        raise KincheckError("\n".join(problems))
+    if options.export is not None and options.export not in house.writers:
+        raise KincheckError(unknown("format", options.export, house.writers))
+    case = house.find_case(options.case, import_options.supplied(options))
+    import_options.tell_left_out([case])
+    found = survey(case, options.at, samples=options.samples, seed=options.seed)
+    write_json(found.report(), options.json)
+    _print(found, options.json)
+    if options.export is not None:
+        number: int = options.number or 1
+        texts = written(found, house.writer(options.export), number)
+        keep_texts(texts, f"{case.name}.{number}", options.out, options.json)
+    return Status.WITHIN if found.assemblies.found else Status.DEVIATES
+
+
+def _print(found: Survey, json: str | None) -> None:
+    from ..report.terminal import columns, page
+
+    console, all_of_them = page(json), found.assemblies
+    values = ", ".join(f"{name} = {value:.9g}" for name, value in found.drivers.items())
+    count, starts = len(all_of_them.found), all_of_them.starts
+    console.print(
+        f"{found.case.name} at {values}: {count} assembl{'y' if count == 1 else 'ies'} from {starts} starts (seed {found.seed})",
+        soft_wrap=True,
+    )
+    telling = [
+        name for name in (all_of_them.found[0].signs if count else ()) if len({a.signs[name] for a in all_of_them.found}) > 1
+    ]
+    table = columns(">#", "which", ">distance", ">starts", ">residual", ">smallest sv", "det", *telling)
+    for number, each in enumerate(all_of_them.found, 1):
+        which = "intended" if found.intended(each) else "meets another" if each.smallest < MEETING else "other"
+        signs = [_sign(each.orientation), *(_sign(each.signs[name]) for name in telling)]
+        numbers = f"{each.distance:.4g}", f"{each.starts}", f"{each.residual:.1e}", f"{each.smallest:.3g}"
+        table.add_row(f"{number}", which, *numbers, *signs)
+    console.print(table)
+    if found.reason:
+        console.print(f"no assembly is the intended one: {found.reason}", soft_wrap=True)
+    console.print(
+        f"distance: from {found.ranked_by}, rms over the bodies of turn [rad] and shift [mechanism sizes]; det, joints: signs of "
+        f"the determinant and of triple products, + as at design; residual: of the mechanism's size. {all_of_them.lost} starts did "
+        f"not close, {all_of_them.spurious} ended on spurious zeros. There may be more: raise --samples.",
+        soft_wrap=True,
+    )
+
+
+def _sign(value: int) -> str:
+    return "-0+"[value + 1]

@@ -1,0 +1,133 @@
+"""Results to where they were asked for: standard output, files, a folder."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from ..case.io.atomic_files import Content, Named, to_standard_output, unwritable, write_all
+from ..harness.record import Results, to_json
+
+if TYPE_CHECKING:  # what draws is imported where a report is asked for
+    from ..report.figure_data import Effort, Past
+
+    Trends: TypeAlias = Mapping[str, Sequence[Past]] | None
+    """What the engines made of each case in the runs up to this one; None where that is not known."""
+
+REPORT = ("results.json", "report.html")
+"""The files of a folder of results."""
+
+
+@dataclass(frozen=True)
+class Destinations:
+    """Where results are to go; None where they are not wanted.
+
+    Attributes:
+        out: folder for the results and the report.
+        json: a file, or "-" for standard output, which then has nothing else.
+        junit: a file.
+        markdown: a file, for the matrix of cases and engines.
+        store: a file, for values in bulk.
+    """
+
+    out: Path | None = None
+    json: str | None = None
+    junit: Path | None = None
+    markdown: Path | None = None
+    store: Path | None = None
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Destinations:
+        """Return the destinations that a command's options name."""
+        return cls(**{each.name: getattr(options, each.name, None) for each in fields(cls)})
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there are any."""
+        return any(getattr(self, each.name) is not None for each in fields(self))
+
+    def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
+        """What cannot be written, found before the work and not after it; makes the folder, for files of these names."""
+        found, files = list[str](), list[Named]()
+        if self.out is not None:
+            try:
+                self.out.mkdir(parents=True, exist_ok=True)
+                files += [("--out", self.out / name) for name in names]
+            except OSError as error:
+                found.append(f"--out {self.out}: cannot be made a folder ({error.strerror}); give another one")
+        files += [("--json", self.json), ("--junit", self.junit), ("--markdown", self.markdown), ("--store", self.store)]
+        return found + unwritable(files, history)
+
+
+@contextmanager
+def json_only() -> Generator[None]:
+    """Keep standard output for the JSON: what simulators print meanwhile, from Python or from C, goes to standard error."""
+    import ctypes
+
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        if os.name == "posix":
+            ctypes.CDLL(None).fflush(None)  # C keeps what it prints until it has a bufferful
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def deliver(
+    results: Results,
+    problems: list[str],
+    to: Destinations,
+    *,
+    matrix: bool = False,
+    precision: Mapping[str, Sequence[Effort]] | None = None,
+    history: Callable[[], Trends] | None = None,
+) -> None:
+    """Print the table and write what was asked for; a file that cannot be written does not keep back the others.
+
+    Args:
+        matrix: print a line for each case, and a column for each engine, rather than a line for each pair.
+        precision: error against time at several efforts, by case, for the report.
+        history: reads the trends for the report, after all else is written; None where no history is kept.
+    """
+    from ..report.matrix import print_matrix, to_markdown
+    from ..report.table import print_table
+
+    encoded = to_json(results) if to.out is not None or to.json is not None else b""
+    contents = list[tuple[Path, Content]]()  # several may be for one pipe
+    if to.junit is not None:
+        from ..report.junit import to_junit
+
+        contents.append((to.junit, lambda path: path.write_bytes(to_junit(results))))
+    if to.markdown is not None:
+        contents.append((to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
+    if to.json not in (None, "-"):
+        contents.append((Path(to.json), encoded))
+    if to.out is not None:
+        contents.append((to.out / "results.json", encoded))
+        contents.append((to.out / "report.html", lambda path: _write_page(results, path, precision, history)))
+    problems += write_all(contents)
+    # last: who reads it may have gone
+    (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
+    if to.json == "-":
+        to_standard_output(encoded)
+
+
+def _write_page(
+    results: Results, path: Path, precision: Mapping[str, Sequence[Effort]] | None, history: Callable[[], Trends] | None
+) -> None:
+    """Write the report, without trends where the history has a fault, which it then says."""
+    from ..report.report import WITHOUT_TRENDS, write_report
+
+    past = None if history is None else history()
+    limits = [WITHOUT_TRENDS] if history is not None and past is None else []
+    write_report(results, path, history=past, precision=precision, limits=limits)

@@ -1,0 +1,69 @@
+"""kincheck doctor: what is installed, what is missing and how to get it, and whether the tool works here."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from .registry import House, Status
+from .run import TOL
+
+if TYPE_CHECKING:
+    from .installation import Examination
+
+SAMPLE = "mcpherson_strut"
+"""The case that is solved: the paper's own, with a reference of 17 digits."""
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    doctor: argparse.ArgumentParser
+    doctor = commands.add_parser("doctor", help="what is installed, what is missing, does it work", description=_doctor.__doc__)
+    doctor.set_defaults(do=_doctor)
+    doctor.add_argument("--json", metavar="FILE", help="write the findings as JSON; - for standard output")
+
+
+def _doctor(options: argparse.Namespace, house: House) -> int:
+    """Say what is installed, what is missing and how to get it, and solve a case with the native engine.
+
+    Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
+    """
+    from ..report.terminal import write_json
+    from .installation import examine
+
+    found = examine(house.case(SAMPLE), house.engine("native"), TOL, house.engines)
+    write_json(found, options.json)
+    _print(found, options.json)
+    return Status.WITHIN if found.able else Status.FAILED
+
+
+def _print(found: Examination, json: str | None) -> None:
+    from rich.text import Text
+
+    from ..report.terminal import columns, page
+
+    console = page(json)
+    machine, check = found.machine, found.check
+    console.print(f"kincheck {found.kincheck}, Python {machine.python}, {machine.platform}", soft_wrap=True)
+    console.print(f"{machine.processor}, {machine.processors} processors", soft_wrap=True)
+    table = columns("part", "version", "for", "state")
+    for part in found.parts:
+        state = (
+            Text(f"{part.problem}: {part.remedy}", "bold red" if part.essential else "yellow")
+            if part.problem
+            else Text("ok", "green")
+        )
+        table.add_row(part.name, part.version or "–", part.purpose + " (essential)" * part.essential, state)
+    console.print(table)
+    width = f", {machine.vector_width} doubles at a time" if machine.vector_width else ""
+    console.print(f"programs run by {machine.executor}{width}", soft_wrap=True)
+    state = machine.cache_problem or f"writable, {1e-6 * machine.cache_bytes:.3g} MB now"
+    console.print(
+        f"compiled code is kept in {machine.cache}: {state}", soft_wrap=True, style="yellow" if machine.cache_problem else None
+    )
+    measured = "" if check.error is None else f", largest error {check.error:.1e} of {check.tolerance:.0e} allowed"
+    time = "" if check.us_per_step is None else f", {check.us_per_step:.3g} us per sample, loop: {check.loop}"
+    said = f": {check.message}" if check.message else ""
+    console.print(f"self-check {check.case}: {check.outcome}{measured}{time}{said}", soft_wrap=True)
+    verdict = "can do its work" if found.able else "cannot do its work: see above"
+    console.print(f"kincheck {verdict}", style="bold" if found.able else "bold red")

@@ -1,0 +1,79 @@
+"""kincheck export: write a case's mechanism for a simulator."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..case.io.escape import file_name
+from ..errors import KincheckError, unknown
+from . import import_options
+from .registry import House, Status
+
+FORMATS = {"mjcf": "MuJoCo", "exudyn": "a Python script", "urdf": "Pinocchio"}
+"""The formats that the adapters write, for help texts: those are made before adapters are loaded. A test has them equal."""
+
+
+def formats() -> str:
+    """The formats in words."""
+    *first, last = (f"{name} ({what})" for name, what in FORMATS.items())
+    return f"{', '.join(first)} or {last}"
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    export: argparse.ArgumentParser
+    export = commands.add_parser("export", help="write a mechanism for a simulator", description=_export.__doc__)
+    export.set_defaults(do=_export)
+    export.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    export.add_argument("--to", required=True, metavar="FORMAT", help=formats())
+    export.add_argument("--out", type=Path, metavar="FILE", help="default: the case's name, in this folder")
+    export.add_argument(
+        "--at",
+        type=float,
+        metavar="VALUE",
+        help="start there: a value of the swept driver as the sweep has it, in SI units; default: the design position",
+    )
+    import_options.add_options(export)
+
+
+def _export(options: argparse.Namespace, house: House) -> int:
+    """Write a case's mechanism in a simulator's format, with a consistent start.
+
+    What the format has no place for goes into a second file beside the first: the constraints of a URDF.
+    """
+    from ..case.io.model_writer import written
+
+    if options.to not in house.writers:
+        raise KincheckError(unknown("format", options.to, house.writers))
+    case = house.find_case(options.case, import_options.supplied(options))
+    import_options.tell_left_out([case])
+    keep_texts(written(case, house.writer(options.to), options.at), case.name, options.out)
+    return Status.WITHIN
+
+
+def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None) -> None:
+    """Write texts, given by the endings of their files, beside each other, and print the files' names.
+
+    Args:
+        json: where the JSON is written; "-" for standard output, which then has nothing else.
+
+    Raises:
+        KincheckError: a file cannot be written, would be over the JSON, or without `out` over what is there.
+    """
+    from ..case.io.atomic_files import unwritable, write
+
+    first = next(iter(texts))
+    main: Path = out or Path(file_name(name) + first)
+    files = {main if ending == first else main.with_suffix(ending): text for ending, text in texts.items()}
+    for file in files:
+        if out is None and file.exists():
+            raise KincheckError(f"{file} is there already; name a file with --out to write over it")
+    if json and (problems := unwritable([("--json", json), *(("--out", file) for file in files)])):
+        raise KincheckError("\n".join(problems))
+    for file, text in files.items():
+        write("--out", file, text.encode())
+        print(file, file=sys.stderr if json == "-" else sys.stdout)

@@ -1,0 +1,150 @@
+"""kincheck history: the runs that were kept, and what they say of a case and an engine."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import KincheckError, unknown
+from ..report.progress import complain
+from .registry import House, Status, whole
+from .run import HISTORY
+
+if TYPE_CHECKING:
+    from ..history.queries import History
+    from ..history.store import RunRow, Store
+
+LAST = 20  # runs: what a terminal shows at once
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    history: argparse.ArgumentParser
+    history = commands.add_parser("history", help="list the runs kept, their trends and steps", description=_history.__doc__)
+    history.set_defaults(do=_history)
+    add_history(history, "the history")
+    history.add_argument("--case", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these cases only")
+    history.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these engines only")
+    history.add_argument("--last", type=whole(0), default=LAST, metavar="N", help="the latest N runs; default %(default)s; 0: all")
+    history.add_argument(
+        "--remove", type=whole(1), nargs="+", default=[], metavar="RUN", help="remove these runs, one that is damaged for instance"
+    )
+    history.add_argument("--plot", type=Path, metavar="FILE.html", help="draw errors and times over the runs, as a page")
+    history.add_argument("--export", type=Path, metavar="FILE", help="write all runs as one table: FILE.parquet or FILE.csv")
+
+
+def add_history(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the option that says where the history is."""
+    parser.add_argument(
+        "--history",
+        type=Path,
+        metavar="FILE",
+        default=os.environ.get(HISTORY) or None,
+        help=f"{what}, which kincheck run --history wrote; default: the environment variable {HISTORY}",
+    )
+
+
+def _history(options: argparse.Namespace, house: House) -> int:
+    """List the runs, the latest first; for a case or an engine, its errors and times in them and the steps in these."""
+    from ..case.io.atomic_files import unwritable
+    from ..history.queries import read
+    from ..history.store import Store
+
+    if options.history is None:
+        raise KincheckError(f"history: which file? give --history FILE, or set {HISTORY}")
+    if problems := unwritable([("--plot", options.plot), ("--export", options.export)], options.history):
+        raise KincheckError("\n".join(problems))
+    with Store(Path(options.history), writable=bool(options.remove)) as store:
+        for run in options.remove:
+            store.remove(run)
+            print(f"run {run} is removed")
+        chosen: dict[str, Any] = {"cases": options.case, "engines": options.engine}
+        _check_names(store, **chosen)
+        history = read(store, last=options.last or None, **chosen)
+        if options.case or options.engine:
+            _print_trends(history)
+        else:
+            _print_runs(store, store.runs()[: options.last or None])
+        if options.plot is not None:
+            from ..report.history_plot import write_plot
+
+            write_plot(history, options.plot, title=f"{Path(options.history).name}: errors and times over the runs")
+            print(f"{options.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)} runs")
+        if options.export is not None:
+            from ..history.export import export
+
+            count = export(store, options.export, **chosen)
+            print(f"{options.export}: {count} rows")
+        complain(store.damage)
+        return Status.FAILED if store.damage else Status.WITHIN
+
+
+def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> None:
+    plans = [pair for row in store.runs() for pair in row.plan]
+    for what, place, names in (("case", 0, cases), ("engine", 1, engines)):
+        known = sorted({pair[place] for pair in plans})
+        for name in names:
+            if name not in known:
+                raise KincheckError(f"history {store.path}: {unknown(what, name, known)}")
+
+
+def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
+    from ..report.terminal import columns, page
+
+    table = columns(">run", "started", "status", "outcomes", "engines", "commit", "host", "command")
+    for row in rows:
+        with store.sparing(), store.explained("read", row.id):
+            table.add_row(*_cells(store, row))
+    page(None).print(table)
+    if not rows:
+        print("no runs yet")
+
+
+def _cells(store: Store, row: RunRow) -> list[str]:
+    from ..harness.record import Outcome
+    from ..history.schema import OUTCOME
+
+    found = store.connection.execute(
+        f"SELECT {OUTCOME}, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
+    ).fetchall()
+    counts = Counter(outcome for outcome, _, _ in found)
+    told = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
+    missing = len(row.plan) - len(found)
+    versions = {engine: version for _, engine, version in found if version}
+    git: dict[str, Any] = row.circumstances.get("git") or {}
+    return [
+        str(row.id),
+        row.started[:16].replace("T", " "),
+        row.status,
+        told + (f", {missing} missing" if missing else ""),
+        ", ".join(f"{engine} {version}" for engine, version in versions.items()),
+        str(git.get("commit") or "–")[:10] + ("+" if git.get("changed") else ""),
+        str(row.circumstances.get("host", "–")),
+        row.command,
+    ]
+
+
+def _print_trends(history: History) -> None:
+    from ..harness.labels import number, product
+    from ..history.regression.change_points import steps
+    from ..report.regression_labels import step_says
+    from ..report.terminal import columns, page
+    from ..report.trends import largest_length, run_name
+
+    console = page(None)
+    for (case, engine, mode), entries in history.pairs.items():
+        table = columns("run", "version", "outcome", ">error m", ">us/step", title=f"{case} · {product(engine, mode)}")
+        for entry in entries:
+            row = history.runs[entry.run]
+            error = largest_length(entry, case, row)
+            table.add_row(run_name(row), entry.version or "–", entry.outcome.shown, number(error), number(entry.us_per_step))
+        console.print(table)
+    for step in steps(history):
+        sign = "worse" if step.worse else "better"
+        console.print(f"{sign}: {step.case} · {product(step.engine, step.mode)}: {step_says(step)}", soft_wrap=True)
+    if not history.pairs:
+        print("no runs of these yet")

@@ -1,0 +1,207 @@
+"""What is installed, what is missing and how to get it, and whether the tool can do its work here."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Collection, Mapping, Sequence
+from datetime import UTC, datetime
+
+import msgspec
+
+from ..case.case import Case
+from ..harness.engine import Engine
+from ..harness.engine_versions import PATIENCE
+from ..harness.provenance import circumstances
+from ..harness.record import Outcome, Record
+from ..harness.run import run
+from ..program import disk_cache
+from ..program.llvm import compiler
+from ..report.progress import how_to_install
+
+SCHEMA = "kincheck-doctor/1"
+# Extra of the package -> what it is for, but for those of engines. What the package itself requires is essential.
+PURPOSES = {
+    "fast": "machine code",
+    "proofs": "proved references",
+    "parquet": "history as Parquet",
+    "distributed": "runs on many machines",
+}
+# What is imported of distributions that are not imported by their own name; of a simulator's it is the engine's name.
+MODULES = {"python-flint": "flint", "llvmlite": "llvmlite.binding"}
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+class Part(msgspec.Struct, frozen=True):
+    """Something installed, or not.
+
+    Attributes:
+        version: null where it is not installed.
+        purpose: what it is for.
+        essential: without it the tool can do nothing.
+        problem: why it cannot be used; empty where it can.
+        remedy: how to get it; empty where nothing is to be done.
+    """
+
+    name: str
+    version: str | None
+    purpose: str
+    essential: bool
+    problem: str
+    remedy: str
+
+
+class Machine(msgspec.Struct, frozen=True):
+    """What it runs on. vector_width: doubles that machine code computes at a time; null without it."""
+
+    python: str
+    platform: str
+    processor: str
+    processors: int
+    executor: str
+    vector_width: int | None
+    cache: str
+    cache_bytes: int
+    cache_problem: str
+
+
+class Check(msgspec.Struct, frozen=True):
+    """A case solved here and now; error: the largest against its reference [its output's unit], with the tolerance."""
+
+    case: str
+    outcome: str
+    message: str
+    error: float | None
+    tolerance: float | None
+    us_per_step: float | None
+    loop: str
+
+
+class Examination(msgspec.Struct, frozen=True):
+    """All that was found."""
+
+    schema: str
+    kincheck: str
+    parts: list[Part]
+    machine: Machine
+    check: Check
+
+    @property
+    def able(self) -> bool:
+        """Whether the tool can do its work: nothing essential is missing, and the native engine is right."""
+        return self.check.outcome == Outcome.PASS and not any(part.essential and part.problem for part in self.parts)
+
+
+def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) -> Examination:
+    """Look at the installation, of the engines of these names too, and solve a case with the native engine."""
+    problem = _cache_problem()
+    about = circumstances([], started=datetime.now(UTC), tol=tol, command="kincheck doctor")
+    machine = Machine(
+        about["python"],
+        about["platform"],
+        about["processor"],
+        os.cpu_count() or 1,
+        "machine code" if compiler.available() else "numpy: with llvmlite it is some fifty times faster",
+        compiler.vector_width() if compiler.available() else None,
+        str(disk_cache.folder() or "nowhere"),
+        0 if problem else disk_cache.size(),
+        problem,
+    )
+    return Examination(SCHEMA, about["kincheck"], parts(engines), machine, _check(case, native, tol))
+
+
+def parts(engines: Collection[str]) -> list[Part]:
+    """Everything that kincheck requires or can use, from its own metadata, and a browser.
+
+    Args:
+        engines: by name; an engine's simulator is the extra of that name.
+    """
+    purposes, modules = PURPOSES | dict.fromkeys(engines, "engine"), dict(MODULES)
+    found: list[Part] = []
+    for requirement in importlib.metadata.requires("kincheck") or []:
+        extra = re.search(r"""extra == ['"]([\w-]+)['"]""", requirement)
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
+        group = extra[1] if extra else ""
+        if group in purposes or not extra:
+            if group in engines:
+                modules[name] = group
+            version = _version(name)
+            remedy = how_to_install(group) if group else f"pip install '{requirement.split(';')[0].strip()}'"
+            problem = "not installed" if version is None else ""
+            found.append(Part(name, version, purposes.get(group, "kincheck"), not extra, problem, remedy if problem else ""))
+    browser = next((path for path in map(shutil.which, BROWSERS) if path), None)
+    missing = ("", "") if browser else ("not installed", "apt install chromium")
+    return [*_imported(found, modules), Part("chromium", browser, "tests of the report", False, *missing)]
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
+    """The parts, with what goes wrong when their modules are imported, in processes of their own: a broken library may end one."""
+    running = {
+        part.name: subprocess.Popen(
+            [sys.executable, "-c", f"import {modules.get(part.name, part.name)}"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
+        for part in found
+        if part.version is not None
+    }
+    result: list[Part] = []
+    for part in found:
+        problem = _ended(running[part.name]) if part.name in running else part.problem
+        remedy = part.remedy or (f"pip install --force-reinstall {part.name}" if problem else "")
+        result.append(msgspec.structs.replace(part, problem=problem, remedy=remedy))
+    return result
+
+
+def _ended(importing: subprocess.Popen[str]) -> str:
+    try:
+        said = importing.communicate(timeout=PATIENCE)[1].strip().splitlines()
+    except subprocess.TimeoutExpired:
+        importing.kill()
+        importing.communicate()
+        return f"its import does not end within {PATIENCE:g} s"
+    if importing.returncode == 0:
+        return ""
+    return f"cannot be imported: {said[-1] if said else f'the process ended with status {importing.returncode}'}"
+
+
+def _cache_problem() -> str:
+    """Why compiled code cannot be kept; empty where it can."""
+    folder, remedy = disk_cache.folder(), "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is"
+    if folder is None:
+        return f"the user has no home directory; {remedy}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return ""
+    except OSError as error:
+        return f"{error.strerror}; {remedy}"
+
+
+def _check(case: Case, native: Engine, tol: float) -> Check:
+    (record,) = run([case], [native], tol=tol).records
+    error, tolerance = _largest(record)
+    return Check(case.name, record.outcome, record.message, error, tolerance, record.us_per_step, record.loop)
+
+
+def _largest(record: Record) -> tuple[float | None, float | None]:
+    """The largest error of a position, as a share of its tolerance, and that tolerance."""
+    found = [each.position for each in record.errors.values() if each.position is not None]
+    if not found:
+        return None, None
+    worst = max(found, key=lambda each: each.max_abs / each.tolerance)
+    return worst.max_abs, worst.tolerance

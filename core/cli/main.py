@@ -1,0 +1,121 @@
+"""The command line. The only place that knows adapters and cases; they, and all that is slow to import, are loaded on use."""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import importlib
+import os
+import shlex
+import sys
+import traceback
+from collections.abc import Sequence
+from io import TextIOWrapper
+from typing import TYPE_CHECKING, TextIO
+
+from ..errors import KincheckError
+from ..harness.interrupts import Terminated, listening, status_of, words_of
+from ..version import VERSION
+from . import COMMANDS
+
+if TYPE_CHECKING:
+    from .registry import House
+
+FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
+"""What a standard output that takes no more says: files that an option names have messages of their own."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit status."""
+    interrupt: KeyboardInterrupt | None = None
+    try:
+        with listening() as interrupts:
+            status = _done(sys.argv[1:] if argv is None else list(argv))
+            interrupt = interrupts.held
+    except KeyboardInterrupt as raised:
+        interrupt, status = raised, 0
+    if interrupt is None:
+        return status
+    if status not in (ended := (status_of(KeyboardInterrupt()), status_of(Terminated()))):  # else the command has said it
+        print(f"kincheck: {words_of(interrupt)}", file=sys.stderr)
+    return status if status in ended else status_of(interrupt)
+
+
+def _done(argv: list[str]) -> int:
+    """Return the status of the command that the arguments give."""
+    _be_able_to_print()
+    from ..report.progress import complain
+    from .registry import Status
+
+    try:
+        options = _parser(argv).parse_args(argv, argparse.Namespace(command=shlex.join(["kincheck", *argv])))
+    except SystemExit as end:  # argparse has said why
+        return int(end.code or 0)
+    try:
+        if getattr(options, "joint_type", ()):
+            from ..studies.joint_check.loading import load_joint
+
+            for where in options.joint_type:
+                load_joint(where)
+        return _printed(int(options.do(options, house())))
+    except KincheckError as error:
+        complain(str(error).splitlines())
+    except SystemExit as end:  # an engine's, or a module's that was named: ours come from the parser alone
+        where = traceback.extract_tb(end.__traceback__)[-1]
+        complain([f"{where.filename}, line {where.lineno}, ended the program with status {end.code!r}; mend it, or leave it out"])
+    except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
+        _print_no_more()
+    except OSError as error:
+        if error.errno in FULL and error.filename is None:
+            complain([f"standard output cannot be written ({error.strerror}); files that were asked for are"])
+            _print_no_more()
+        else:
+            traceback.print_exc()
+    except Exception:  # a defect of ours: shown in full, and never taken for a deviation (Python's own status would be 1)
+        traceback.print_exc()
+    return Status.FAILED
+
+
+def _be_able_to_print() -> None:
+    """Print what an encoding lacks as question marks: no finished run shall end at a dash. What is closed has nobody to read it."""
+    for name in ("stdout", "stderr"):
+        stream: TextIO | None = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+        elif isinstance(stream, TextIOWrapper):  # and not what a caller has put in its place
+            stream.reconfigure(errors="replace")
+
+
+def _printed(status: int) -> int:
+    """The status of a command that has come to its end, when all it said is out; that its reader has gone is no failure."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _print_no_more()
+    return status
+
+
+def _print_no_more() -> None:
+    from ..report.terminal import print_no_more
+
+    print_no_more(sys.stdout)
+
+
+def house() -> House:
+    """The engines, cases and writers there are."""
+    from ... import adapters, cases
+    from .registry import House
+
+    writers = adapters.WRITERS, adapters.writer
+    return House(tuple(adapters.ENGINES), adapters.engine, cases.names, cases.load, *writers, tuple(adapters.SIMULATIONS))
+
+
+def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
+    """Of the command that the arguments begin with; of all, where they begin with none: to make each takes a millisecond."""
+    parser = argparse.ArgumentParser(prog="kincheck", description="Cross-validation of the kinematics of multibody systems.")
+    parser.add_argument("--version", action="version", version=f"kincheck {VERSION}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    named = [name for name in COMMANDS if argv and argv[0] == name.replace("_", "-")]
+    for name in named or COMMANDS:
+        importlib.import_module(f".{name}", __package__).add(commands)
+    return parser

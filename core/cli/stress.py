@@ -1,0 +1,148 @@
+"""kincheck stress: situations that break kinematic solvers, and whether any answer is wrong without saying so."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import KincheckError, unknown
+from .registry import House, Status, given, whole
+from .run import MODES, TOL, positive
+
+if TYPE_CHECKING:
+    from ..harness.engine import Engine
+    from ..studies.stress.families import Family
+    from ..studies.stress.results import Stress
+
+SAMPLES = 2000
+FILES = ("stress.json", "stress.html", "stress.md")
+OF_FAMILIES = ("family", "samples", "seed", "no_proofs")
+"""Options of what is made up."""
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    stress: argparse.ArgumentParser
+    stress = commands.add_parser("stress", help="nasty mechanisms: is any answer silently wrong?", description=_stress.__doc__)
+    stress.set_defaults(do=_stress)
+    stress.add_argument("--family", nargs="+", action="extend", default=[], metavar="NAME", help="default: all families")
+    stress.add_argument("--list", action="store_true", help="list the families")
+    stress.add_argument("--samples", type=whole(1), metavar="N", help=f"over all families; default {SAMPLES}")
+    stress.add_argument("--seed", type=whole(0), metavar="S", help="of the random mechanisms; default 0")
+    stress.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native")
+    stress.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
+    stress.add_argument(
+        "--out", type=Path, metavar="DIR", help="write the tables there, and the smallest bad cases, reduced, as case files"
+    )
+    stress.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    stress.add_argument("--no-proofs", action="store_true", help="do not prove a share of the truth, which needs python-flint")
+    stress.add_argument(
+        "--replay", nargs="+", action="extend", default=[], type=Path, metavar="FILE", help="judge case files instead"
+    )
+    stress.add_argument(
+        "--tol", type=positive, metavar="X", help=f"of replayed files: largest constraint residual; default {TOL:g}"
+    )
+
+
+def _stress(options: argparse.Namespace, house: House) -> int:
+    """Drive engines through random mechanisms that break kinematic solvers, and judge every sample.
+
+    Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool could not do its work, or an
+    engine supports none of the samples.
+    """
+    from ..case.io.atomic_files import write
+    from ..report.sections import deliver
+    from ..studies.stress.families import Family
+    from ..studies.stress.report import idle, markdown, report
+    from ..studies.stress.verdicts import BAD
+    from . import destinations as delivery
+
+    if options.list:
+        if found := given(options, [name for name in vars(options) if name not in ("list", "command", "do")]):
+            raise KincheckError(f"--list runs nothing; leave out {found}")
+        width = max(map(len, Family.registry))
+        for name, family in Family.registry.items():
+            print(f"{name:{width}}  {family.about}")
+        return Status.WITHIN
+    problems: list[str] = []
+    engines = house.find_engines(options.engine or ["native"], problems, options.mode)
+    if options.replay:
+        if options.out or options.json:
+            problems.append("--replay prints what it finds; leave out --out and --json")
+        if found := given(options, OF_FAMILIES):
+            problems.append(f"--replay judges files as they are, which are of no family; leave out {found}")
+        if problems:
+            raise KincheckError("\n".join(problems))
+        return _replay(options, house, engines)
+    if options.tol is not None:
+        problems.append("--tol is for replayed files, and families have tolerances of their own; leave it out, or give --replay")
+    known = Family.registry
+    problems += [unknown("family", name, [*known]) for name in options.family if name not in known]
+    problems += delivery.Destinations.of(options).problems(FILES)
+    if problems:
+        raise KincheckError("\n".join(problems))
+    with delivery.json_only() if options.json == "-" else nullcontext():
+        found = _run(options, [known[name] for name in dict.fromkeys(options.family or known)], engines)
+    made = report(found)
+    deliver(made, found, out=options.out, json=options.json)
+    if options.out is not None:
+        write("--out", options.out / FILES[2], markdown(made).encode())
+    if undone := [*(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()), *idle(found)]:
+        raise KincheckError("\n".join(undone))
+    bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
+    return Status.DEVIATES if bad else Status.WITHIN
+
+
+def _run(options: argparse.Namespace, families: list[Family], engines: list[Engine]) -> Stress:
+    """Run, and reduce and save what is bad."""
+    from msgspec.structs import replace
+
+    from ..studies.stress.reproducers import save
+    from ..studies.stress.run import stress
+
+    def tell(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    found, examples = stress(
+        families,
+        engines,
+        samples=options.samples or SAMPLES,
+        seed=options.seed or 0,
+        command=options.command,
+        prove=not options.no_proofs,
+        tell=tell,
+    )
+    if options.out is not None and examples:
+        found = replace(found, findings=[save(example, options.out) for example in examples])
+    return found
+
+
+def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) -> int:
+    """Judge case files by following their motion from the design."""
+    from ..studies.stress.reproducers import judge
+    from ..studies.stress.verdicts import BAD, Verdict
+
+    bad, examined = False, set[str]()
+    for file in options.replay:
+        case = house.find_case(str(file))
+        for engine in engines:
+            found = judge(case, engine, options.tol or TOL)
+            counts = ", ".join(f"{verdict} {found.counts[verdict]}" for verdict in Verdict if found.counts[verdict])
+            print(f"{file.name}  {engine.name} {engine.mode}: {counts}")
+            if any(found.counts[verdict] for verdict in Verdict if verdict not in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)):
+                examined.add(engine.name)
+            for verdict in BAD:
+                sample = found.first(verdict)
+                if sample is not None:
+                    bad = True
+                    worst = found.worst[0]
+                    off = "" if worst is None else f", positions off by {worst:.2g} of what is round-off"
+                    print(f"  {verdict} first at {case.sweep.driver} = {case.sweep.values[sample]:.9g}{off}")
+            if found.message:
+                print(f"  {found.message}")
+    if idle := [engine.name for engine in engines if engine.name not in examined]:
+        raise KincheckError(f"no sample was examined of {', '.join(idle)}: give another engine or other files")
+    return Status.DEVIATES if bad else Status.WITHIN

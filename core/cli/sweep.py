@@ -1,0 +1,288 @@
+"""kincheck sweep: solve many variants of a case's design and see what they make of its outputs."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from ..errors import KincheckError, unknown
+from ..harness.interrupts import hold, status_of, words_of
+from ..report.progress import complain, lacking, uncompared
+from ..version import VERSION
+from . import execution_options, import_options
+from .registry import House, Status, whole
+from .run import TOL, positive
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..harness.engine import Engine
+    from ..harness.execution import Solver
+    from ..studies.tolerance.part_file import Part
+    from ..studies.tolerance.results import SweepResults
+    from ..studies.tolerance.study import Study
+    from ..studies.tolerance.sweep import Progress
+
+# Seconds between lines of progress where they do not overwrite each other.
+EVERY = 10.0
+
+PART = "sweep.part"
+"""File of the finished part of a sweep, in the folder of its results until it has come to its end."""
+
+FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    sweep: argparse.ArgumentParser
+    sweep = commands.add_parser("sweep", help="solve many variants of a design", description=_sweep.__doc__)
+    sweep.set_defaults(do=_sweep)
+    sweep.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    sweep.add_argument("--vary", type=Path, required=True, metavar="FILE", help="what varies, and by how much (kincheck-vary/1)")
+    sweep.add_argument("--samples", type=whole(1), metavar="N", help="variants that are drawn")
+    sweep.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the draws; default %(default)s")
+    sweep.add_argument("--output", nargs="+", action="extend", default=[], metavar="NAME", help="only these outputs; default: all")
+    sweep.add_argument(
+        "--order", type=int, choices=(0, 1, 2), default=0, help="derivatives of the outputs by time too; default %(default)s"
+    )
+    sweep.add_argument("--tol", type=positive, default=TOL, metavar="X", help=f"largest constraint residual; default {TOL:g}")
+    sweep.add_argument("--jobs", type=whole(1), metavar="N", help="threads; default: half the processors")
+    sweep.add_argument("--scheduler", metavar="ADDRESS", help="solve on the workers of this dask.distributed scheduler instead")
+    sweep.add_argument(
+        "--check",
+        metavar="ENGINE[:SHARE]",
+        help="rebuild a share of the variants as cases of their own, at least one, and solve them with this engine; default 0.01",
+    )
+    sweep.add_argument(
+        "--replay",
+        type=whole(0),
+        nargs="+",
+        metavar="INDEX",
+        help="solve only these variants of the seed, each as a case of its own, as kincheck run does; with --check its engine too",
+    )
+    sweep.add_argument("--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
+    sweep.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    sweep.add_argument(
+        "--resume",
+        action="store_true",
+        help=f"go on from the finished part of the same sweep, which is {PART} in the folder of --out",
+    )
+    import_options.add_options(sweep)
+
+
+def _sweep(options: argparse.Namespace, house: House) -> int:
+    """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its outputs over them.
+
+    Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the work could not be done. A sweep
+    that is interrupted writes what it has, and ends with 130.
+    """
+    from ..case.variation.variation_file import read_variation
+    from ..studies.tolerance.study import Study
+    from ..studies.tolerance.sweep import how_many
+    from .destinations import Destinations
+
+    problems: list[str] = []
+    names = ("results.json", "report.html") if options.replay else FILES
+    problems += Destinations.of(options).problems(names)
+    if options.scheduler is not None and options.jobs is not None:
+        problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
+    if options.replay and options.samples is not None:
+        problems.append("--replay: a variant is known by seed and index; leave out --samples")
+    if options.replay and (options.store or options.scheduler):
+        problems.append("--replay solves here, and stores nothing; leave out --store and --scheduler")
+    if options.resume and (options.out is None or options.replay):
+        problems.append("--resume goes on from a folder of results: give --out DIR, and leave out --replay")
+    engine, share = _check(options, house, problems)
+    case = _only(house.find_case(options.case, import_options.supplied(options)), options.output, problems)
+    import_options.tell_left_out([case])
+    problems = problems or execution_options.unreachable(options)
+    if problems:
+        raise KincheckError("\n".join(problems))
+    variation = read_variation(options.vary, case)
+    samples = variation.count or 0 if options.replay else how_many(variation, options.samples)
+    study = Study(case, variation, samples, options.seed, options.order, options.tol)
+    if options.replay:
+        return _replay(options, house, study, engine)
+    with ExitStack() as stack:
+        part = None if options.out is None else stack.enter_context(_part(options))
+        stops: list[KeyboardInterrupt | KincheckError] = []
+        results = _solve(options, study, engine, share, part, stops)
+        hold()
+        problems += _deliver(options, results) + (part.problems if part is not None else [])
+    for reason in stops:
+        why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
+        goes_on = "--resume goes on from there" if part is not None else "with --out DIR it can be taken up with --resume"
+        problems.append(f"{why}: {results.samples} of {results.asked} variants are solved; {goes_on}")
+    complain(problems)
+    if stops and isinstance(stops[0], KeyboardInterrupt):
+        return status_of(stops[0])
+    if problems:
+        return Status.FAILED
+    if part is not None:
+        part.remove()
+    return Status.DEVIATES if results.unsolved or results.deviating else Status.WITHIN
+
+
+def _check(options: argparse.Namespace, house: House, problems: list[str]) -> tuple[Engine | None, float]:
+    """The engine to check with, and the share of the variants."""
+    if options.check is None:
+        return None, 0.0
+    name, _, text = options.check.partition(":")
+    try:
+        share = float(text) if text else 0.01
+    except ValueError:
+        share = math.nan
+    if not 0.0 < share <= 1.0:
+        problems.append(f"--check {options.check}: found the share {text!r}, expected a part of one such as 0.01; correct it")
+    engines = house.find_engines([name], problems)
+    return (engines[0] if engines else None), share
+
+
+def _only(case: Case, names: list[str], problems: list[str]) -> Case:
+    """The case with the named outputs only; all of them unless some are named."""
+    there = [output.name for output in case.outputs]
+    problems += [unknown("output", name, there) for name in names if name not in there]
+    return replace(case, outputs=tuple(output for output in case.outputs if output.name in names)) if names else case
+
+
+def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
+    """Where an engine solves checked variants: in processes of its own, unless it is ours."""
+    from ..harness.execution import here
+    from ..harness.resource_limits import Limits, default_jobs
+    from ..harness.run import NATIVE
+    from ..harness.workers.distributed import on_cluster
+    from ..harness.workers.pool import in_workers
+
+    if options.scheduler is not None:
+        return on_cluster(options.scheduler, Limits())
+    return here if engine.name == NATIVE else in_workers(options.jobs or default_jobs(), Limits())
+
+
+def _part(options: argparse.Namespace) -> Part:
+    """The file of the finished part, with what its numbers depend on besides the study."""
+    import numpy as np
+
+    from ..harness.provenance import processor
+    from ..program.llvm.compiler import available
+    from ..studies.joint_check.loading import sources
+    from ..studies.tolerance.part_file import Part
+
+    facts = {"kincheck": VERSION, "numpy": np.__version__, "llvm": available(), "processor": processor()}
+    return Part(options.out / PART, facts | {"joints": sources(options.joint_type)}, resume=options.resume)
+
+
+def _solve(
+    options: argparse.Namespace,
+    study: Study,
+    engine: Engine | None,
+    share: float,
+    part: Part | None,
+    stops: list[KeyboardInterrupt | KincheckError],
+) -> SweepResults:
+    from ..harness.resource_limits import default_jobs
+    from ..studies.tolerance.chunk_execution import on_cluster
+    from ..studies.tolerance.sweep import Check, sweep_designs
+    from ..studies.tolerance.tables import ParquetStore
+
+    tell = Teller()
+    check = None
+    if engine is not None:
+        check = Check(engine, share, _solver(options, engine), options.tol, tell.checked)
+    with ExitStack() as stack:
+        stack.callback(tell.end)
+        store = None if options.store is None else stack.enter_context(ParquetStore(options.store, study))
+        return sweep_designs(
+            study.case,
+            study.variation,
+            samples=options.samples,
+            seed=options.seed,
+            order=options.order,
+            tol=options.tol,
+            jobs=options.jobs or default_jobs(),
+            source=None if options.scheduler is None else on_cluster(options.scheduler),
+            check=check,
+            store=store,
+            progress=tell.solved,
+            command=options.command,
+            part=part,
+            stopped=stops.append,
+        )
+
+
+def _replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
+    """Solve single variants as a run does: its table, its report, its status."""
+    from ..harness import run as running
+    from . import destinations as delivery
+
+    for index in options.replay:
+        if study.samples and index >= study.samples:
+            raise KincheckError(f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1}; give one of them")
+    native = house.engine(running.NATIVE)
+    engines = [native] if engine is None or engine.name == running.NATIVE else [native, engine]
+    cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
+    results = running.run(cases, engines, tol=options.tol, command=options.command, solver=_solver(options, engines[-1]))
+    problems: list[str] = []
+    delivery.deliver(results, problems, delivery.Destinations.of(options))
+    if engine is not None:
+        problems += lacking(results, [], [engine.name]) + uncompared(results)
+    complain(problems)
+    if problems:
+        return Status.FAILED
+    return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
+
+
+def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
+    """Print the table and write what was asked for; why some of it could not be written."""
+    from ..case.io.atomic_files import to_standard_output, write_all
+    from ..harness.record import to_json
+    from ..studies.tolerance.page import page
+    from ..studies.tolerance.tables import envelope_csv, gradient_csv, print_sweep
+
+    encoded = to_json(results)
+    contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
+    if options.out is not None:
+        texts = (encoded, page(results).encode(), envelope_csv(results).encode(), gradient_csv(results).encode())
+        contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
+    problems = write_all(contents)  # before anything is printed: who reads it may have gone
+    print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
+    if options.json == "-":
+        to_standard_output(encoded)
+    return problems
+
+
+class Teller:
+    """Tells on standard error how far a sweep is: one line that changes on a terminal, now and then a line elsewhere."""
+
+    def __init__(self) -> None:
+        self.terminal = sys.stderr.isatty()
+        self.told = perf_counter()
+
+    def solved(self, progress: Progress) -> None:
+        """Told after every chunk."""
+        rate = progress.solved / progress.seconds
+        left = (progress.total - progress.done) / rate
+        part = f"[{progress.done}/{progress.total}] {100 * progress.done / progress.total:.0f} %"
+        line = f"{part}, {rate:.3g} variants/s, {left:.0f} s left"
+        self._tell(line + (f", {progress.unsolved} unsolved" if progress.unsolved else ""))
+
+    def checked(self, done: int, total: int) -> None:
+        """Told after every checked variant."""
+        self._tell(f"[{done}/{total}] checked")
+
+    def _tell(self, line: str) -> None:
+        now = perf_counter()
+        if now - self.told < (0.1 if self.terminal else EVERY):
+            return
+        self.told = now
+        print(f"\r\x1b[2K{line}" if self.terminal else line, end="" if self.terminal else "\n", file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        """Leave the line to what comes."""
+        if self.terminal:
+            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,106 @@
+"""kincheck trace: follow a motion by its own length, beyond where a driver locks up."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any
+
+from ..errors import KincheckError, unknown
+from . import import_options
+from .registry import House, Status
+from .run import positive
+
+if TYPE_CHECKING:
+    from ..kinematics.continuation.trace import Curve, Event
+
+LENGTH = 5.0
+"""Default length either way: a few whole turns of the bodies together."""
+WAYS = {1: "growing", -1: "falling"}
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    tracing: argparse.ArgumentParser
+    tracing = commands.add_parser(
+        "trace", help="follow a motion beyond lock-ups; find limit and branch points", description=_trace.__doc__
+    )
+    tracing.set_defaults(do=_trace)
+    tracing.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    tracing.add_argument("--driver", metavar="NAME", help="whose value is an outcome; default: the one that the case sweeps")
+    tracing.add_argument(
+        "--length",
+        type=positive,
+        default=LENGTH,
+        metavar="L",
+        help="either way, in lengths of the mechanism's size and radians; default %(default)s",
+    )
+    tracing.add_argument("--json", metavar="FILE", help="write the curve as JSON; - for standard output")
+    import_options.add_options(tracing)
+
+
+def _trace(options: argparse.Namespace, house: House) -> int:
+    """Follow a case's motion from its design position both ways by its length, and name the singular poses on it.
+
+    A limit point is where the driver's value turns back (lock-up); beyond it the motion goes on with the value going the other way.
+    A branch point is where the joints let the motion go on in more ways than one (bifurcation); it is followed straight on.
+    Exit status: 0 the whole length was traced, or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
+    """
+    from ..case.io.atomic_files import unwritable
+    from ..kinematics.continuation.trace import trace
+    from ..report.terminal import write_json
+
+    case = house.find_case(options.case, import_options.supplied(options))
+    import_options.tell_left_out([case])
+    drivers = [driver.name for driver in case.mechanism.drivers]
+    driver = options.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])
+    if driver not in drivers:
+        raise KincheckError(unknown("driver", driver, drivers))
+    if problems := unwritable([("--json", options.json)]):
+        raise KincheckError("\n".join(problems))
+    curves = [trace(case.mechanism, driver, length=options.length)]
+    if not curves[0].closed:
+        curves.append(trace(case.mechanism, driver, length=options.length, direction=-1))
+    design = case.mechanism.design_value(driver)
+    unit = "rad" if case.mechanism.driver(driver).turns else "m"
+    write_json(_facts(case.name, curves, design, unit), options.json)
+    out = sys.stderr if options.json == "-" else sys.stdout
+    for direction, curve in zip((1, -1), curves, strict=False):
+        print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)
+    return Status.DEVIATES if any(curve.message for curve in curves) else Status.WITHIN
+
+
+def _lines(case: str, curve: Curve, direction: int, design: float, unit: str) -> list[str]:
+    low, high = curve.values.min() + design, curve.values.max() + design
+    end = "back at the design position" if curve.closed else curve.message or "to the length asked for"
+    head = (
+        f"{case}: {curve.driver} first {WAYS[direction]}: {len(curve.arc)} poses over the length {abs(curve.arc[-1]):.6g}, {end}; "
+        f"{curve.driver} from {low:.9g} to {high:.9g} {unit}"
+    )
+    return [head] + [
+        f"  {event.kind} at {curve.driver} = {event.value + design:.9f} {unit} (length {event.arc:.6g}); at the pose nearest to it "
+        f"{event.singularity.words}"
+        for event in curve.events
+    ]
+
+
+def _facts(case: str, curves: list[Curve], design: float, unit: str) -> dict[str, Any]:
+    """All curves as plain data [m, rad]."""
+
+    def event(each: Event) -> dict[str, Any]:
+        place = {"kind": each.kind, "arc": each.arc, "value": each.value + design}
+        return place | {"points": {name: x.tolist() for name, x in each.points.items()}, "nearest_pose": each.singularity.facts}
+
+    found = [
+        {
+            "arc": curve.arc.tolist(),
+            "values": (curve.values + design).tolist(),
+            "smallest_singular_value": curve.sigma.tolist(),
+            "points": {name: x.tolist() for name, x in curve.points.items()},
+            "events": [event(each) for each in curve.events],
+            "closed": curve.closed,
+            "message": curve.message,
+        }
+        for curve in curves
+    ]
+    return {"schema": "kincheck-trace/1", "case": case, "driver": curves[0].driver, "unit": unit, "curves": found}

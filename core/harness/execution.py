@@ -1,0 +1,247 @@
+"""One pair: what an engine makes of a case, as plain data that can be sent between processes. Judging it is done elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ..case.case import Case, Series
+from ..errors import KincheckError
+from ..trajectory import QUANTITIES, Array, Trajectory
+from .compare import output_series
+from .engine import Engine
+from .provenance import plain, readable
+from .record import Outcome, Seconds
+from .resource_limits import memory_limit
+from .scheduler_delay import waited
+
+# Enough solves for a median that one interruption cannot move; slow engines stop after the budget [s], but not between two of
+# which one took so many times as long as the other: in it something was compiled.
+WARM_SOLVES = 5
+WARM_BUDGET = 0.5
+UNLIKE = 2.0
+
+# Of a message, in characters: a page. An engine may put all its data into one.
+LONGEST_MESSAGE = 2000
+
+
+class BadTrajectoryError(KincheckError):
+    """An engine's answer is not what the engine protocol promises."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A case to be solved with an engine.
+
+    Attributes:
+        tol: the largest accepted constraint residual, as for `Engine.solve`.
+        timed: solve again for the time; else the first answer is the answer.
+    """
+
+    case: Case
+    engine: Engine
+    tol: float
+    timed: bool = True
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What an engine says of itself: see `Engine` and `Record`."""
+
+    loop: str
+    settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    version: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What an engine made of a case.
+
+    Attributes:
+        outputs: by name, NaN at samples that were not solved.
+        solved: how many samples were.
+        iterations: sum over the solved samples.
+        residual, message, details: as of the trajectory.
+    """
+
+    outputs: Mapping[str, Series]
+    solved: int
+    iterations: int
+    residual: float
+    message: str
+    details: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no answer, and the end of what the engine printed."""
+
+    outcome: Outcome
+    message: str
+    printed: str = ""
+
+    @property
+    def harmful(self) -> bool:
+        """Whether something broke, after which the process may be in any state."""
+        return self.outcome.bad
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """What became of a pair.
+
+    Attributes:
+        facts: of the engine; None where it went down before it could tell.
+        seconds: of the phases that were passed.
+    """
+
+    facts: Facts | None
+    result: Answer | Failure
+    seconds: Seconds | None = None
+
+
+Attempts: TypeAlias = Generator[tuple[int, Attempt]]
+Solver: TypeAlias = Callable[[Sequence[Pair]], Attempts]
+"""Solves pairs somewhere: gives the index of each and what became of it, once each, in any order."""
+
+
+def here(pairs: Sequence[Pair]) -> Attempts:
+    """The solver of this process: one pair after the other. What kills or blocks an engine, does so to the run."""
+    for index, pair in enumerate(pairs):
+        yield index, attempt(pair)
+
+
+def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) -> Attempt:
+    """Solve a pair. Whatever the engine raises becomes a failure, KeyboardInterrupt excepted.
+
+    Args:
+        tell: told of the engine before it does what may end the process.
+    """
+    case, engine = pair.case, pair.engine
+    seconds = dict[str, float]()
+    facts: Facts | None = None
+
+    def become(result: Answer | Failure) -> Attempt:
+        return Attempt(facts, result, Seconds(**seconds) if seconds else None)
+
+    try:
+        facts = Facts(str(engine.loop), plain(engine.settings))
+        tell(facts)
+        version = engine.version()
+        if version is None:
+            return become(
+                Failure(Outcome.UNAVAILABLE, f"{engine.name} is not installed, or cannot be imported: kincheck doctor says which")
+            )
+        facts = replace(facts, version=bounded(version))
+        tell(facts)
+        reason = engine.unsupported(case)
+        if reason is not None:
+            return become(Failure(Outcome.UNSUPPORTED, bounded(reason)))
+        return become(_solve(pair, seconds))
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # anything a simulator may raise: some end the interpreter where they should raise
+        return become(Failure(Outcome.ERROR, said(error)))
+
+
+def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
+    """Build once, solve, and solve again for the time. The answer kept is the last: the one that was timed."""
+    case, engine = pair.case, pair.engine
+    begin = perf_counter()
+    model = engine.build(case)
+    seconds["build"] = perf_counter() - begin
+
+    def solve() -> tuple[Trajectory, float, float]:
+        before, begin = waited(), perf_counter()
+        trajectory = engine.solve(model, case, pair.tol)
+        seconds = perf_counter() - begin
+        own = seconds - min(waited() - before, seconds)
+        check(case, engine.name, trajectory)
+        return trajectory, seconds, own
+
+    trajectory, seconds["first"], _ = solve()  # may load and compile
+    if pair.timed:
+        trajectory, last, own = solve()
+        warm, undisturbed = [last], [own]
+        while _more(seconds["first"], warm):
+            trajectory, last, own = solve()
+            warm.append(last)
+            undisturbed.append(own)
+        seconds["warm"] = float(np.median(warm))
+        seconds["waited"] = seconds["warm"] - float(np.median(undisturbed))
+    solved = np.asarray(trajectory.solved, dtype=np.bool_)
+    return Answer(
+        outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},
+        solved=int(solved.sum()),
+        iterations=int(np.asarray(trajectory.iterations)[solved].sum()),
+        residual=float(trajectory.residual),
+        message=bounded(trajectory.message),
+        details=plain(trajectory.details),
+    )
+
+
+def _more(first: float, warm: Sequence[float]) -> bool:
+    """Whether to solve again for a time to go by."""
+    unlike = len(warm) < 3 and max(warm) > UNLIKE * min(first, *warm)
+    return len(warm) < WARM_SOLVES and (unlike or sum(warm) + min(warm) <= WARM_BUDGET)
+
+
+def check(case: Case, engine: str, trajectory: Trajectory) -> None:
+    """Hold an answer to the engine protocol.
+
+    Raises:
+        BadTrajectoryError: a point is missing, a shape is wrong, or a sample that is called solved is not finite.
+    """
+    n = len(case.sweep.values)
+    for name in ("solved", "iterations"):
+        _check_shape(f"{engine}: {name}", getattr(trajectory, name), (n,))
+    solved = np.asarray(trajectory.solved, dtype=np.bool_)
+    if solved.any() and not np.isfinite(trajectory.residual):
+        raise BadTrajectoryError(f"{engine}: residual is {trajectory.residual} although {solved.sum()} samples are called solved")
+    for point in case.points:
+        if point not in trajectory.points:
+            raise BadTrajectoryError(f"{engine}: no motion of point {point!r}; found: {', '.join(trajectory.points) or 'none'}")
+        motion = trajectory.points[point]
+        for quantity in QUANTITIES:
+            values: Array | None = getattr(motion, quantity)
+            if values is None and quantity != "position":
+                continue
+            _check_shape(f"{engine}: {quantity} of point {point!r}", values, (n, 3))
+            finite = np.isfinite(np.asarray(values, dtype=np.float64)).all(axis=1)
+            bad = np.flatnonzero(solved & ~finite)
+            if bad.size:
+                raise BadTrajectoryError(
+                    f"{engine}: {quantity} of point {point!r} is {np.asarray(values)[bad[0]].tolist()} at sample {bad[0]} "
+                    f"({case.sweep.driver} = {case.sweep.values[bad[0]]:.9g}), which is called solved; "
+                    f"{bad.size} of {n} samples are so: mark them unsolved and explain, or give finite numbers"
+                )
+
+
+def _check_shape(what: str, values: Any, expected: tuple[int, ...]) -> None:
+    if np.shape(values) != expected:
+        raise BadTrajectoryError(f"{what} has shape {np.shape(values)}, expected {expected}")
+
+
+def said(error: BaseException) -> str:
+    """An exception in words, whatever it carries."""
+    try:
+        text = str(error)
+    except Exception as another:  # its own text is code of the engine too
+        text = f"its text cannot be had ({type(another).__name__})"
+    told = bounded(f"{type(error).__name__}: {text}" if text else type(error).__name__)
+    if isinstance(error, MemoryError) and (limit := memory_limit()):
+        told += f"; this process may have {limit:g} GB, --memory gives it more"
+    return told
+
+
+def bounded(text: Any) -> str:
+    """Text of any origin as a record has it: readable, and not without end."""
+    whole = text if isinstance(text, str) else str(text)
+    if len(whole) > LONGEST_MESSAGE:
+        half = LONGEST_MESSAGE // 2
+        whole = f"{whole[:half]} [... {len(whole) - 2 * half} characters left out ...] {whole[-half:]}"
+    return readable(whole)

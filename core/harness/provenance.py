@@ -1,0 +1,215 @@
+"""The circumstances of a run: what a reader needs to repeat it and to understand its records."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from ..case.case import TIME, Case, Truth
+from ..case.notes import notes
+from ..mechanism.motions import Absolute, Motion
+from ..version import VERSION
+from .compare import as_numbers
+from .evidence import IDENTICAL
+from .record import OutputSeries, Record, Results
+from .scheduler_delay import waited
+from .suspect import suspect
+
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Environment variables by which linear algebra learns how many threads it may use, when numpy is loaded."""
+
+
+def results(
+    cases: Sequence[Case],
+    records: Sequence[Record],
+    *,
+    started: datetime,
+    tol: float,
+    command: str,
+    facts: Mapping[str, Any] | None = None,
+    plan: Sequence[tuple[str, str, str]] = (),
+) -> Results:
+    """The records, with what a reader needs to repeat the run: versions, machine, settings, cases and their references.
+
+    Args:
+        facts: further circumstances; they come before those found here, for a run that began in another process.
+        plan: the pairs that there were to be, of a run that does not have them all.
+    """
+    known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
+    known["cases"] = _with_identical(
+        known["cases"], records, [case.name for case in cases if not (case.origin and case.origin.own)]
+    )
+    suspects = {case.name: found for case in cases if (found := suspect(case, records))}
+    return Results(
+        run=known | {"engines": versions(records), **missing(plan, records)},
+        records=list(records),
+        references=references(cases),
+        suspects=suspects,
+    )
+
+
+def _with_identical(cases: Mapping[str, Any], records: Sequence[Record], of_others: Sequence[str]) -> dict[str, Any]:
+    """The facts of the cases, with a note on each whose reference has turned out to be native's own result."""
+    own = {record.case for record in records if record.evidence and record.evidence.own and record.case in of_others}
+    return {
+        name: {**facts, "notes": [*dict.fromkeys((*facts["notes"], IDENTICAL))]} if name in own else facts
+        for name, facts in cases.items()
+    }
+
+
+def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, command: str) -> dict[str, Any]:
+    """What is known of a run before it begins, as JSON has it."""
+    return plain(
+        {
+            "kincheck": VERSION,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "engines": {},
+            "platform": platform.platform(),
+            "processor": processor(),
+            "host": readable(platform.node()),
+            "started": started.isoformat(timespec="seconds"),
+            "tol": tol,
+            "command": readable(command),
+            "cases": {case.name: _facts(case) for case in cases},
+        }
+    )
+
+
+def versions(records: Sequence[Record]) -> dict[str, str | None]:
+    """The version of each engine, by name: all of them, where a run that was resumed found another; None where none is known."""
+    found: dict[str, list[str]] = {record.engine: [] for record in records}
+    for record in records:
+        if record.version is not None and record.version not in found[record.engine]:  # one that crashed may not have told it
+            found[record.engine].append(record.version)
+    return {engine: " and ".join(each) or None for engine, each in found.items()}
+
+
+def missing(plan: Sequence[tuple[str, str, str]], records: Sequence[Record]) -> dict[str, Any]:
+    """Case, engine and mode of the pairs that a run was to make and did not, as `run` has them; empty where all are there."""
+    made = {(record.case, record.engine, record.mode) for record in records}
+    pairs = [list(pair) for pair in plan if pair not in made]
+    return {"missing": pairs} if pairs else {}
+
+
+def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
+    """The true values of each case that has any, by case and output."""
+    return {
+        case.name: {
+            output.name: as_numbers(case.reference[output.name], output) for output in case.outputs if output.name in case.reference
+        }
+        for case in cases
+        if case.reference
+    }
+
+
+def git_state(folder: Path) -> dict[str, Any] | None:
+    """Commit, branch (null where none is checked out), whether files differ from it, and a digest of how where they do.
+
+    None where there is no repository.
+    """
+
+    def git(*arguments: str) -> str | None:
+        try:
+            done = subprocess.run(["git", "-C", folder, *arguments], capture_output=True, text=True, timeout=10, check=False)
+        except (OSError, subprocess.TimeoutExpired):  # no git, or a repository on a drive that does not answer
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    commit = git("rev-parse", "HEAD")
+    changed = git("status", "--porcelain", "--untracked-files=no")
+    if not commit:
+        return None
+    edits = {"edits": hashlib.sha256((git("diff", "HEAD") or "").encode()).hexdigest()[:12]} if changed else {}
+    return {
+        "commit": commit,
+        "branch": git("symbolic-ref", "--short", "HEAD"),
+        "changed": None if changed is None else bool(changed),
+        **edits,
+    }
+
+
+def conditions() -> dict[str, Any]:
+    """What a later run is compared by, and takes a moment to find out: the state of the files, and how fast this machine is now."""
+    return {"git": git_state(Path.cwd()), "calibration_seconds": calibration()}
+
+
+def calibration() -> float:
+    """Seconds of a fixed piece of work, the median of five: what times are divided by to be compared with another day's.
+
+    Without those in which others had the processor. About 20 ms: interpreter steps and small linear solves in turn, which is what
+    the engines' loops consist of.
+    """
+    matrix, column = np.eye(12) + 0.01 * np.arange(144.0).reshape(12, 12) / 144.0, np.ones(12)
+    times: list[float] = []
+    for _ in range(5):
+        before, begin = waited(), perf_counter()
+        for _ in range(700):
+            column = np.linalg.solve(matrix, column)
+            column /= np.abs(column).max()
+            total = 0.0
+            for step in range(500):
+                total += step * 0.5
+        times.append(perf_counter() - begin - (waited() - before))
+    return float(np.median(times))
+
+
+def _facts(case: Case) -> dict[str, Any]:
+    sweep = case.sweep
+    swept = {"name": TIME, "type": TIME} if sweep.driver == TIME else _driver(case, sweep.driver) | {"rate": sweep.rate}
+    return {
+        "source": case.source,
+        "truth": truth_of(case),
+        "driver": swept,
+        "motions": {name: _driver(case, name) | {"motion": _motion(motion)} for name, motion in sweep.motions.items()},
+        "signs": case.signs,
+        "notes": notes(case),
+        "outputs": {output.name: dict(output.facts) for output in case.outputs},
+    }
+
+
+def _driver(case: Case, name: str) -> dict[str, Any]:
+    driver = case.mechanism.driver(name)
+    return {"type": driver.type, **asdict(driver), "design": case.sweep.path.design.get(name, 0.0)}
+
+
+def _motion(motion: Motion) -> dict[str, Any]:
+    return _motion(motion.motion) if isinstance(motion, Absolute) else {"type": motion.type, **asdict(motion)}
+
+
+def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts of any origin as JSON has them: what is read equals what was written. What has no counterpart becomes its text."""
+
+    def instead(value: Any) -> Any:
+        return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)  # pyright: ignore
+
+    return msgspec.json.decode(msgspec.json.encode(dict(facts), enc_hook=instead))
+
+
+def readable(text: str) -> str:
+    """Text that UTF-8 can hold: file names and foreign messages may be undecodable bytes in disguise."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def truth_of(case: Case) -> Truth:
+    """Return the kind of truth of a case: without a reference there is only consensus, whatever it claims."""
+    return case.truth if case.reference else Truth.CONSENSUS_ONLY
+
+
+def processor() -> str:
+    """Return the processor's name; platform.processor() gives none on Linux."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()

@@ -1,0 +1,104 @@
+"""A run being written down while it goes on, and taken up again where it ended by force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from ..case.case import Case
+from ..harness.engine import Engine
+from ..harness.engine_versions import PATIENCE, versions
+from ..harness.provenance import circumstances, conditions, plain, references
+from ..harness.record import Record, Results
+from ..harness.run import planned
+from .run_digest import digest
+from .store import HistoryError, Store
+
+
+@dataclass
+class Keeping:
+    """A run in a history.
+
+    Attributes:
+        run: its number.
+        resumed: it began earlier, and was taken up again.
+        made: its records of then.
+        facts: its circumstances, for `run`.
+        problems: what the history could not do; from then on the run goes on without it.
+    """
+
+    store: Store
+    run: int
+    facts: Mapping[str, Any]
+    resumed: bool = False
+    made: Sequence[Record] = ()
+    problems: list[str] = field(default_factory=list[str])
+
+    def add(self, record: Record) -> None:
+        """Keep a record."""
+        if self.problems:
+            return
+        try:
+            self.store.add_record(self.run, record)
+        except HistoryError as error:
+            self.problems.append(f"{error}; the records before {record.case} {record.engine} are kept there as run {self.run}")
+
+    def end(self, results: Results, *, interrupted: bool) -> None:
+        """The run has ended: with all its records, or by an interrupt."""
+        if not self.problems:
+            try:
+                self.store.finish(self.run, results, "interrupted" if interrupted else "finished")
+            except HistoryError as error:
+                self.problems.append(f"{error}; all records are kept there, but run {self.run} has no end; --resume gives it one")
+        self.store.close()
+
+
+def keep(
+    path: Path,
+    cases: Sequence[Case],
+    engines: Sequence[Engine],
+    *,
+    tol: float,
+    command: str,
+    settings: Mapping[str, Any],
+    resume: bool,
+    unread: Sequence[str] = (),
+    joints: Mapping[str, str] | None = None,
+) -> Keeping:
+    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits, versions, machine and files.
+
+    Args:
+        settings: further circumstances.
+        resume: take up one that has no end; where there is none, a new one begins.
+        unread: names of cases that were asked for and make no sense.
+        joints: digests of the modules of joint types, by name: other code makes another run.
+
+    Raises:
+        HistoryError: the file cannot be read or written.
+    """
+    started = datetime.now(UTC)
+    facts = circumstances(cases, started=started, tol=tol, command=command) | plain({**settings, **conditions()})
+    plan = planned(cases, engines, unread)
+    limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
+    git: Mapping[str, Any] = facts["git"] or {}
+    state = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed", "edits")]
+    code = [*state, *(joints or {}).items()]
+    found = versions(engines, min(settings.get("timeout", PATIENCE), PATIENCE))
+    versioned = [(each.name, each.mode, version) for each, version in zip(engines, found, strict=True)]
+    machine = [*(facts[name] for name in ("host", "processor")), *versioned]
+    identity = digest(cases, plan, tol, limits, code, machine)
+    store = Store(path)
+    try:
+        if resume:
+            with store.sparing():
+                earlier = store.resume_run(identity)
+                if earlier is not None:
+                    return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
+        run = store.begin_run(identity, plan, facts, references(cases))
+    except BaseException:
+        store.close()
+        raise
+    return Keeping(store, run, facts)

@@ -1,0 +1,297 @@
+"""The store: a history file, read and written.
+
+    with Store(path) as store:                      # Store(path, writable=False) to read only
+        run = store.begin_run(...)                  # its number
+        store.add_record(run, record)               # on the disk when this returns
+        store.finish(run, results)
+        for each in store.runs(): ...               # RunRow, the latest first
+        results = store.results(run)                # as `kincheck run --json` writes them
+
+Everything else is SQL on `store.connection`: the tables are described in `schema`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+import zlib
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, Self, TypeAlias
+
+import msgspec
+
+from ..harness.provenance import missing, versions
+from ..harness.record import Record, Results, settled
+from . import faults
+from .faults import DamagedRunError, HistoryError, explained, told
+from .process_identity import alive, owner
+from .schema import MIGRATIONS, check, migrate, write_ahead
+
+Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
+"""The file says that a run is running until it ends; where its process is gone it was killed."""
+Plan: TypeAlias = Sequence[tuple[str, str, str]]
+
+# Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB as JSON).
+QUICK = 1
+
+
+@dataclass(frozen=True)
+class RunRow:
+    """A run as the history has it; see the table `runs`."""
+
+    id: int
+    started: str
+    finished: str | None
+    status: Status
+    command: str
+    plan: Plan
+    circumstances: dict[str, Any]
+
+
+class Store:
+    """A history file. From every method comes a HistoryError where it cannot be read or written."""
+
+    def __init__(self, path: Path, *, writable: bool = True) -> None:
+        self.path = path
+        self.passed_over: dict[int, str] = {}  # runs that cannot be read, and why
+        with self.explained("opened"):
+            self.connection = self._writable() if writable else self._readable()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        with suppress(sqlite3.Error):  # what was committed is on the disk; tidying up can fail on a full one
+            self.connection.close()
+
+    def begin_run(
+        self, identity: str, plan: Plan, circumstances: dict[str, Any], references: Mapping[str, Any] | None = None
+    ) -> int:
+        """A new run; its number.
+
+        Args:
+            identity: by which it is found to be resumed: equal for runs that give the same records.
+            plan: case, engine and mode of its pairs, in the order of the results.
+            circumstances: as `Results.run`; among them when it started, and the command.
+            references: as `Results.references`, for whoever reads the run before it has ended, or if it never does.
+        """
+        started, command = circumstances["started"], circumstances["command"]
+        row = (started, "running", command, identity, owner(), _json(plan), _json(circumstances))
+        with self._transaction():
+            done = self.connection.execute(
+                "INSERT INTO runs (started, status, command, identity, owner, plan, circumstances) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                row,
+            )
+            assert done.lastrowid is not None
+            self._attach(done.lastrowid, "references", references or {})
+        return done.lastrowid
+
+    def resume_run(self, identity: str) -> RunRow | None:
+        """The last run of that identity, if it has no end and no other process is at it. It is this process's from now on."""
+        with self._transaction():
+            query = "SELECT id, owner FROM runs WHERE identity = ? AND status != 'finished' ORDER BY id DESC"
+            for run, other in self.connection.execute(query, (identity,)).fetchall():
+                if other == owner() or not alive(other):
+                    change = "UPDATE runs SET status = 'running', finished = NULL, owner = ? WHERE id = ?"
+                    self.connection.execute(change, (owner(), run))
+                    return self.run(run)
+        return None
+
+    def add_record(self, run: int, record: Record) -> None:
+        """Keep a record. A pair that has one keeps that: it is never there twice."""
+        seconds = record.seconds
+        row: dict[str, Any] = {
+            "run_id": run,
+            "case_name": record.case,
+            "engine": record.engine,
+            "mode": record.mode,
+            "made": now(),
+            "outcome": str(record.outcome),
+            "message": record.message,
+            "validated": record.validated,
+            "truth": str(record.truth),
+            "version": record.version,
+            "solved": record.solved,
+            "samples": record.samples,
+            "residual_max": record.residual_max,
+            "build_seconds": seconds and seconds.build,
+            "first_seconds": seconds and seconds.first,
+            "warm_seconds": seconds and seconds.warm,
+            "waited_seconds": seconds and seconds.waited,
+            "compare_seconds": seconds and seconds.compare,
+            "us_per_step": record.us_per_step,
+            "errors": _json(record.errors),
+            "record": zlib.compress(msgspec.json.encode(record), QUICK),
+        }
+        names = ", ".join(row)
+        with self._transaction():
+            places = ", ".join("?" * len(row))
+            self.connection.execute(f"INSERT OR IGNORE INTO records ({names}) VALUES ({places})", [*row.values()])
+
+    def finish(self, run: int, results: Results | None = None, status: Status = "finished") -> None:
+        """The run has ended. What the results have besides records, references above all, is kept with it."""
+        with self._transaction():
+            if results is not None:
+                for kind in (name for name in results.__struct_fields__ if name not in ("schema", "run", "records")):
+                    self._attach(run, kind, getattr(results, kind))
+            self.connection.execute("UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run))
+
+    def remove(self, run: int) -> None:
+        """Remove a run and all that belongs to it alone."""
+        with self._transaction():
+            for table, column in (("attachments", "run_id"), ("records", "run_id"), ("runs", "id")):
+                removed = self.connection.execute(f"DELETE FROM {table} WHERE {column} = ?", (run,)).rowcount
+            self.connection.execute("DELETE FROM documents WHERE digest NOT IN (SELECT digest FROM attachments)")
+        if not removed:
+            raise HistoryError(f"history {self.path}: there is no run {run}")
+
+    def runs(self) -> list[RunRow]:
+        """All runs that can be read, the latest first."""
+        rows: list[RunRow] = []
+        with self.explained("read"):
+            numbers = self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()
+        for (number,) in numbers:
+            with self.sparing():
+                rows.append(self.run(number))
+        return [row for row in rows if row.id not in self.passed_over]
+
+    @contextmanager
+    def sparing(self) -> Generator[None]:
+        """Pass over a run that cannot be read."""
+        try:
+            yield
+        except DamagedRunError as error:
+            self.passed_over.setdefault(error.run, str(error))
+
+    @property
+    def damage(self) -> list[str]:
+        """Runs that were passed over, a line each."""
+        return told(self.path, self.passed_over)
+
+    def run(self, run: int) -> RunRow:
+        """The run of that number.
+
+        Raises:
+            HistoryError: there is none.
+        """
+        with self.explained("read", run):
+            query = "SELECT id, started, finished, status, command, plan, circumstances, owner FROM runs WHERE id = ?"
+            row = self.connection.execute(query, (run,)).fetchone()
+            if row is not None:
+                return RunRow(
+                    id=row[0],
+                    started=row[1],
+                    finished=row[2],
+                    status="killed" if row[3] == "running" and not alive(row[7]) else row[3],
+                    command=row[4],
+                    plan=msgspec.json.decode(row[5], type=list[tuple[str, str, str]]),
+                    circumstances=msgspec.json.decode(row[6], type=dict[str, Any]),
+                )
+        raise HistoryError(f"history {self.path}: there is no run {run}")
+
+    def records(self, run: int) -> list[Record]:
+        """The records of a run, in the order of its plan."""
+        place = {pair: k for k, pair in enumerate(self.run(run).plan)}
+        with self.explained("read", run):
+            rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
+            records = [settled(msgspec.json.decode(zlib.decompress(blob), type=Record)) for (blob,) in rows]
+        return sorted(records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place)))
+
+    def results(self, run: int) -> Results:
+        """A run as the command wrote it; of one without an end, what there is, and in `run["missing"]` what is not."""
+        row, records = self.run(run), self.records(run)
+        attached: dict[str, dict[str, Any]] = {}
+        with self.explained("read", run):
+            query = "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest) WHERE run_id = ?"
+            for kind, case, content in self.connection.execute(query, (run,)):
+                attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
+            facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
+            whole: dict[str, Any] = {"run": facts, "records": [], **attached}
+            return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
+
+    def _attach(self, run: int, kind: str, documents: Mapping[str, Any]) -> None:
+        for case, document in documents.items():
+            text = msgspec.json.encode(document)
+            digest = hashlib.sha256(text).hexdigest()
+            self.connection.execute("INSERT OR IGNORE INTO documents VALUES (?, ?)", (digest, zlib.compress(text)))
+            self.connection.execute("INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest))
+
+    def _writable(self) -> sqlite3.Connection:
+        connection = sqlite3.connect(self.path, timeout=faults.BUSY, isolation_level=None)
+        try:
+            check(connection)  # before anything is changed in a file that may not be ours
+            write_ahead(connection, faults.BUSY)
+            connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power cut too
+            connection.execute("PRAGMA foreign_keys = ON")
+            migrate(connection)
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _readable(self) -> sqlite3.Connection:
+        if not self.path.is_file():
+            raise HistoryError(f"history {self.path}: there is no such file; `kincheck run --history FILE` makes one")
+        # a file in a place where nothing can be written has no journal beside it: then nobody else is writing it either
+        for how in ("mode=ro", "mode=ro&immutable=1"):
+            connection = sqlite3.connect(
+                f"{self.path.absolute().as_uri()}?{how}", uri=True, timeout=faults.BUSY, isolation_level=None
+            )
+            try:
+                version = check(connection)
+            except sqlite3.OperationalError:
+                connection.close()
+                if how != "mode=ro":
+                    raise
+                self._check_whole()
+                continue
+            except BaseException:
+                connection.close()
+                raise
+            if version < len(MIGRATIONS):
+                connection.close()
+                return self._writable()
+            return connection
+        raise AssertionError("the second way either connects or raises")
+
+    def _check_whole(self) -> None:
+        """What was written last may be beside the file still, and cannot be read where nothing can be written."""
+        beside = self.path.with_name(f"{self.path.name}-wal")
+        if beside.is_file() and beside.stat().st_size:
+            raise HistoryError(
+                f"history {self.path}: its latest records are in {beside.name} still, and the folder cannot be written, which "
+                "putting them together takes; copy both files to a folder that can be"
+            )
+
+    @contextmanager
+    def _transaction(self) -> Generator[None]:
+        with self.explained("written"):
+            self.connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self.connection.execute("COMMIT")
+            except BaseException:
+                if self.connection.in_transaction:  # SQLite has ended it itself after some failures
+                    self.connection.execute("ROLLBACK")
+                raise
+
+    def explained(self, what: str, run: int | None = None) -> AbstractContextManager[None]:
+        """What goes wrong meanwhile is a HistoryError: see `faults`."""
+        return explained(self.path, what, run)
+
+
+def _json(value: Any) -> str:
+    return msgspec.json.encode(value).decode()
+
+
+def now() -> str:
+    """The time as the history has it."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -1,0 +1,1 @@
+"""One mechanism as compiled programs: request, rows, program layout, samples."""

@@ -1,0 +1,133 @@
+"""Programs that predict lanes from those before them on a motion, and what is carried for that (see `programs`).
+
+predict   from state, v, a and time; time    -> state        Taylor step of second order
+extrapolate   states of the groups of lanes before, weights   -> state       through `NODES` of them, without v and a; and what is
+                                                                carried of the last of them
+extend    states of the samples before, weights   -> state        likewise, for lanes that are motions of their own
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from ...algebra import Scalar
+from ...program import NODES, Program, groups_behind, place_of, program, where_larger
+from ...program.plan import shifted
+from ..formulation.formulation import EULER_PARAMETERS
+from .request import ACCEPT, EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, remembered
+
+if TYPE_CHECKING:
+    from .programs import Tracer
+
+WEIGHT, PAST = "weight", "past"
+"""The vectors of the samples that a state is continued through: their weights, and where they are remembered their states."""
+ABOUT = 1.5
+"""A step may be this much longer than the one it learns from."""
+
+
+def carried(tracer: Tracer) -> list[tuple[int, int]]:
+    """Slots of a solved lane, and of what the lanes after it are predicted from."""
+    sizes = {name: len(value) for name, value in tracer.formulation.design.items()}
+    sizes |= {PREDICTED + name: count for name, count in sizes.items()}
+    sizes |= {RATE: tracer.unknowns, RATE_T: tracer.unknowns}
+    pairs = [(tracer.layout.scalar(FROM + TIME), tracer.layout.scalar(EARLIER + TIME))]
+    told = TIME, *remembered(tracer.blocks), *tracer.turns
+    pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in told]
+    pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(name)) for name in ACCEPT]
+    for name, count in sizes.items():
+        pairs += zip(tracer.layout.vector(name, count), tracer.layout.vector(FROM + name, count), strict=True)
+    return pairs
+
+
+def continued(tracer: Tracer) -> list[tuple[int, int]]:
+    """What of that is carried where the lanes after are continued through those before: tests need it, predictions do not.
+
+    Where they are predicted after all there is no step behind, and nothing is made of what it lacked.
+    """
+    time, unknowns = tracer.layout.scalar(TIME), tracer.unknowns
+    ahead = [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[FROM + PREDICTED + name]]
+    ahead += [slot for name in (RATE, RATE_T) for slot in tracer.layout.vector(FROM + name, unknowns)]
+    (_, earlier), *pairs = carried(tracer)
+    return [(time, earlier), *(pair for pair in pairs if pair[1] not in ahead)]
+
+
+def predict(tracer: Tracer) -> Program:
+    """The state at the time by a Taylor step of second order, and what the last such step lacked.
+
+    That is of third order, whatever the coordinates: it grows by the cube of the step. It is known where the step before was
+    about as long as this one, or longer.
+    """
+    read, vector = tracer.read, tracer.vector
+    time, here, earlier = (read(label + TIME) for label in ("", FROM, EARLIER))
+    h, h_before = time - here, here - earlier
+    v, a = vector(FROM + RATE, tracer.unknowns), vector(FROM + RATE_T, tracer.unknowns)
+    step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
+    start = {name: vector(FROM + name, len(value)) for name, value in tracer.formulation.design.items()}
+    taylor = tracer.formulation.retract(tracer.formulation.configuration(start), step)
+    part = h / h_before
+    lack = where_larger(ABOUT * h_before, h, part * part * part, 0.0)
+    out: dict[int, Scalar] = {}
+    corrected: dict[str, list[Scalar]] = {}
+    for name, value in taylor.items():
+        tracer.store(out, PREDICTED + name, value)  # kept, to see what the iteration makes of it
+        solved, predicted = start[name], vector(FROM + PREDICTED + name, len(value))
+        corrected[name] = [x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)]
+        corrected[name] = _of_length_one(corrected[name])
+    tracer.store_state(out, corrected)
+    return program("predict", tracer.tape, out, tracer.prepared)
+
+
+def extrapolate(tracer: Tracer, lanes: int) -> Program:
+    """The state from what it is in the group of so many lanes before, or several, by the weights of those: `weights_of_groups`."""
+    # and what is carried of the last of them, which is at hand here; but its time and drives are no longer there
+    last, given = NODES - 1, {tracer.layout.scalar(name) for name in (TIME, *tracer.turns)}
+    stood = {target: tracer.tape.at(last, source) for source, target in continued(tracer) if source not in (*given, target)}
+    state, behind = _state_slots(tracer), groups_behind(lanes)
+    past = _past_slots(tracer) if behind > 1 else state
+    stood |= {target: tracer.tape.input(source) for source, target in shifted(past[0], state, behind)}
+    groups = [*(past[k * len(state) :][: len(state)] for k in range(behind - 1)), state]
+    place = {slot: k for k, slot in enumerate(state)}
+
+    def at(k: int, slot: int) -> Scalar:
+        group, _ = place_of(k, lanes)
+        return tracer.tape.at(k, groups[group][place[slot]])
+
+    return _continued(tracer, "extrapolate", at, stood)
+
+
+def extend(tracer: Tracer) -> Program:
+    """The state from what it was at the last `NODES` samples, by the weights of those; see `weights_of_samples`."""
+    state, past = _state_slots(tracer), _past_slots(tracer)
+    place = {slot: k for k, slot in enumerate(state)}
+    return _continued(tracer, "extend", lambda k, slot: tracer.tape.input(past[k * len(state) + place[slot]]), {})
+
+
+def _state_slots(tracer: Tracer) -> list[int]:
+    """The slots of the state."""
+    return [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[name]]
+
+
+def _past_slots(tracer: Tracer) -> list[int]:
+    """The slots in which what was there at up to `NODES` samples, or in groups of lanes, is remembered."""
+    return tracer.layout.vector(PAST, NODES * len(_state_slots(tracer)))
+
+
+def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]) -> Program:
+    """The state by Lagrange's formula, without v and a; at(k, slot) is what a slot was at node k. And what else is put out."""
+    weights = tracer.vector(WEIGHT, NODES)
+    out = dict(further)
+    for part, value in tracer.formulation.design.items():
+        slots = tracer.layout.vector(part, len(value))
+        found = [sum((w * at(k, slot) for k, w in enumerate(weights)), 0.0) for slot in slots]
+        for label in (part, PREDICTED + part):
+            tracer.store(out, label, _of_length_one(found))
+    return program(name, tracer.tape, out, tracer.prepared)
+
+
+def _of_length_one(value: list[Scalar]) -> list[Scalar]:
+    """Euler parameters of length one, up to the square of what they lack; any other vector as it is."""
+    if len(value) != EULER_PARAMETERS:
+        return value
+    k = 1.5 - 0.5 * sum((x * x for x in value), 0.0)
+    return [k * x for x in value]

@@ -1,0 +1,125 @@
+"""A mechanism traced: its programs and how they are laid out, kept on disk beside the machine code that is made of them.
+
+What is kept is found again by the mechanism, the request and the source of all that traces: where any of it differs, it is traced
+anew. Joints of the user's own are traced every time, for their source may be anywhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from ...mechanism.mechanism import Mechanism
+from ...program import ITERATIONS, NODES, Program, groups_behind
+from ...program.disk_cache import kept
+from ...program.llvm import compiler
+from ..formulation.constraints import Frames
+from ..structure.components import Section
+from ..structure.degrees_of_freedom import Selection
+from . import acceptance, predictor
+from .request import Request
+
+CORE = Path(__file__).parents[2]
+PACKAGE = __name__.split(".kinematics.")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Tracing:
+    """What tracing a mechanism for a request gives.
+
+    Attributes:
+        slots: name of a scalar -> its place in a lane.
+        vectors: name of a vector -> the places of its components.
+        state: name of a vector of the state -> its value at design.
+        geometry: the values of all varied places at design.
+        given: name of a vector that tells how a given body moves -> its value at rest at design.
+        carried, continued: slots of a solved lane, and of what the lanes after it are predicted from, or continued.
+        prepared: slots of what depends on the geometry alone.
+        behind: by how many groups of lanes those after them are extrapolated.
+        blocks: of the rows (`Elimination.sigmas`).
+    """
+
+    programs: Sequence[Program]
+    slots: Mapping[str, int]
+    vectors: Mapping[str, Sequence[int]]
+    state: Mapping[str, Sequence[float]]
+    geometry: Mapping[str, Sequence[float]]
+    given: Mapping[str, Sequence[float]]
+    carried: Sequence[tuple[int, int]]
+    continued: Sequence[tuple[int, int]]
+    prepared: Sequence[int]
+    behind: int
+    blocks: int
+    selection: Selection
+    frame: Frames
+
+
+def traced(mechanism: Mechanism, request: Request, section: Section | None = None) -> Tracing:
+    """Select the rows and trace the programs that the request needs, or take what is known of an earlier time.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match.
+    """
+    compiled = request.compiled and compiler.available()
+    lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
+    if section or request.varied or not (ours(mechanism) and compiled):
+        return _trace(mechanism, request, section, lanes)
+    content = _source() + pickle.dumps((mechanism, request, lanes))
+    found: Tracing = pickle.loads(kept(content, lambda: pickle.dumps(_trace(mechanism, request, None, lanes))))
+    return found
+
+
+def ours(mechanism: Mechanism) -> bool:
+    """Whether all it is made of is of this package: what is equal then means the same."""
+    parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers)
+    return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
+
+
+@cache
+def _source() -> bytes:
+    """A digest of the source that tracing runs through, and whatever stands beside it."""
+    digest = hashlib.sha256()
+    for folder in (CORE, *(CORE / name for name in ("primitives", "joints", "program", "analysis"))):
+        for file in sorted(folder.glob("*.py" if folder is CORE else "**/*.py")):
+            digest.update(file.read_bytes())
+    return digest.digest()
+
+
+def _trace(mechanism: Mechanism, request: Request, section: Section | None, lanes: int) -> Tracing:
+    from .programs import Tracer  # with all that tracing takes: who finds it done does without
+
+    tracer = Tracer(mechanism, request, section)
+    programs = [tracer.newton(), predictor.predict(tracer)]
+    if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
+        programs.append(tracer.tangent())
+    if not request.state:
+        programs.append(predictor.extrapolate(tracer, lanes))
+    programs.append(tracer.outputs())
+    programs += acceptance.tests(tracer, neighbours=False)
+    if not request.state:  # parts of a mechanism are attempted lane by lane
+        programs += acceptance.tests(tracer, neighbours=True)
+    if request.varied:
+        programs.append(tracer.prepared.program())
+        if not request.state:
+            programs.append(predictor.extend(tracer))
+    carried, continued = predictor.carried(tracer), predictor.continued(tracer)
+    tracer.layout.scalar(ITERATIONS)
+    return Tracing(
+        programs,
+        tracer.layout.slots,
+        tracer.layout.vectors,
+        tracer.formulation.design,
+        tracer.geometry,
+        tracer.at_rest,
+        carried,
+        continued,
+        tracer.prepared.slots,
+        groups_behind(lanes),
+        tracer.blocks,
+        tracer.selection,
+        tracer.frame,
+    )

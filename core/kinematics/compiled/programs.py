@@ -1,0 +1,201 @@
+"""The programs of a sweep, traced from the equations: they share one layout of slots.
+
+    newton    state, drives                      -> state, residual, sigma, orientation   one Newton-Raphson iteration; what is
+                                                    said of residual and rows is that before it
+    outputs   state, drives' rates               -> v, a, wanted motions, closure, leftover, branch   one factorisation at the
+                                                    converged pose, solved for nu and gamma
+    tangent   state, drives' rates               -> v, a         where a march begins, if not all of it is put out
+
+Those that follow a motion are in `prediction` and `acceptance`. Each is traced for what is asked: no acceleration, no gamma; no
+velocity, no factorisation after the last iteration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property, reduce
+from typing import Any
+
+from ...algebra import Scalar, Vec3, quat, vec
+from ...mechanism.mechanism import Mechanism, Vector
+from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
+from ...program import Elimination, Prepared, Program, Tape, absolute, maximum, minimum, program
+from ...trajectory import QUANTITIES
+from ..formulation.acceptance_criteria import EPSILON
+from ..formulation.body_kinematics import motion_of_frame, motion_of_point
+from ..formulation.cartesian import Cartesian, Given
+from ..formulation.constraints import Style, constraints, frames
+from ..formulation.driver_inputs import turns
+from ..formulation.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
+from ..formulation.parameters import placed, places
+from ..formulation.relative import Relative
+from ..structure.components import Section, select_section
+from ..structure.degrees_of_freedom import select_rows
+from .request import BLOCKS, FIRM, GIVEN, ORIENTATION, RATE, RATE_T, SIGMA, Layout, Request, by_block
+
+
+class Tracer:
+    """One tape for all programs: what they share is written down once.
+
+    Raises:
+        SolveError: the mechanism cannot be solved as described (see `select_rows`).
+    """
+
+    def __init__(self, mechanism: Mechanism, request: Request, section: Section | None = None) -> None:
+        self.request, self.tape, self.layout = request, Tape(), Layout()
+        self.mechanism, self._section = mechanism, section
+        self.frame = section.frame(mechanism) if section else frames(mechanism)
+        self.given: Mapping[str, Given] = {name: Given() for name in section.given} if section else {}
+        formulation = self._formulate({})
+        if section:
+            self.selection = select_section(mechanism, self.frame, formulation)
+        else:
+            self.selection = select_rows(mechanism, self.frame, formulation, request.rows)
+        self.geometry = {place: places(mechanism)[place] for place in request.varied}
+        given = {place: self.vector(place, len(value)) for place, value in self.geometry.items()}
+        slots = {slot for place in given for slot in self.layout.vectors[place]}
+        self.prepared = Prepared(self.tape, slots, self.layout.scalar)
+        if given:
+            self.mechanism = placed(mechanism, given)
+            self.frame = section.frame(self.mechanism) if section else frames(self.mechanism, self.frame.unit)
+        self.given = {name: self._moved(name) for name in self.given}
+        self.formulation = self._formulate({name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers})
+        design = self.formulation.design
+        for label in BLOCKS:
+            for name, value in design.items():
+                self.layout.vector(label + name, len(value))
+        self.at = self.formulation.configuration({name: self.vector(name, len(value)) for name, value in design.items()})
+        self.unknowns = self.formulation.unknowns
+
+    def _formulate(self, drives: Mapping[str, Drive]) -> Formulation:
+        found = constraints(self.mechanism, self.frame, drives, self.request.style)
+        if self.request.style is Style.RELATIVE:
+            return Relative.of(self.mechanism, self.frame, found)
+        return Cartesian(found, self.frame.moving, given=self.given)
+
+    def _moved(self, name: str) -> Given:
+        """A given body, its motion read from slots."""
+        u, q, v, w, v_t, w_t = (self.vector(f"given {label} {name}", count) for label, count in GIVEN.items())
+        return Given(Pose.of(vec(u), quat(q)), Twist(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t)))
+
+    def read(self, name: str) -> Scalar:
+        """A scalar of the lanes."""
+        return self.tape.input(self.layout.scalar(name))
+
+    def vector(self, name: str, count: int) -> list[Scalar]:
+        """A vector of the lanes."""
+        return [self.tape.input(slot) for slot in self.layout.vector(name, count)]
+
+    def store(self, out: dict[int, Scalar], name: str, value: Iterable[Scalar]) -> None:
+        """Add the components of a vector to what is put out."""
+        scalars = list(value)
+        out.update(zip(self.layout.vector(name, len(scalars)), scalars, strict=True))
+
+    def store_state(self, out: dict[int, Scalar], state: State) -> None:
+        """Add a state to what is put out."""
+        for name, value in state.items():
+            self.store(out, name, value)
+
+    def _kept(self, values: Sequence[Any]) -> list[Any]:
+        return [values[k] for k in self.selection.chosen]
+
+    @cached_property
+    def _factor(self) -> Elimination:
+        """The rows at the state, factored: to iterate, and where the iteration ends for the rates."""
+        return Elimination(self._kept(self.formulation.rows(self.at)))
+
+    @property
+    def turns(self) -> Sequence[str]:
+        """The scalars that hold the angles of drivers that turn."""
+        return turns(self.mechanism, self.request.drivers)
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of the rows, each with an estimate of its own of how singular it is."""
+        return len(self._factor.sigmas)
+
+    def newton(self) -> Program:
+        """One Newton-Raphson iteration of (28), Phi = 0: (29) Phi_Pi dPi = -Phi."""
+        phi = self._kept(self.formulation.phi(self.at))
+        out: dict[int, Scalar] = {
+            # iterations end by this: a pose is off by the residual over sigma, and the next one by the square of that
+            self.layout.scalar("residual"): largest(phi) * maximum(1.0, FIRM / maximum(self._factor.sigma, EPSILON)),
+            self.layout.scalar(SIGMA): self._factor.sigma,
+            self.layout.scalar(ORIENTATION): self._factor.orientation,
+        }
+        out |= {self.layout.scalar(name): x for name, x in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)}
+        step = self._factor.solve(phi)
+        self.store_state(out, self.formulation.retract(self.at, [-x for x in step]))
+        return program("newton", self.tape, out, self.prepared)
+
+    def tangent(self) -> Program:
+        """Rates of the unknowns and their accelerations."""
+        return program("tangent", self.tape, self._solve_rates(2)[-1], self.prepared)
+
+    def _solve_rates(self, order: int) -> tuple[list[Scalar], list[Scalar], dict[int, Scalar]]:
+        """v and a as far as an order wants them, else zero, and by slot: one factorisation for both."""
+        out: dict[int, Scalar] = {}
+        v = a = list[Scalar]([0.0] * self.unknowns)
+        # (30) Phi_Pi v = nu and (32) Phi_Pi a = gamma are linear: one factor at the pose serves both; the paper iterates, (31)
+        if order:
+            v = self._factor.solve(self._kept(self.formulation.nu(self.at)))
+            self.store(out, RATE, v)
+        if order == 2:
+            a = self._factor.solve(self._kept(self.formulation.gamma(self.at, v)))
+            self.store(out, RATE_T, a)
+        return v, a, out
+
+    @property
+    def at_rest(self) -> Mapping[str, Sequence[float]]:
+        """The vectors that tell how given bodies move, at rest at the design position."""
+        values = {label: (1.0, 0.0, 0.0, 0.0) if label == "q" else (0.0, 0.0, 0.0) for label in GIVEN}
+        return {f"given {label} {name}": value for name in self.given for label, value in values.items()}
+
+    def outputs(self) -> Program:
+        """The wanted motions with the rates they need, and the tests of a solution: closure, redundant rows, branch.
+
+        All in one: what follows from the pose is computed once, and beside the elimination, whose pivots wait for one another.
+        """
+        v, a, rates = self._solve_rates(self.request.order)
+        return self._outputs(v, a, rates)
+
+    def outputs_of_rates(self) -> Program:
+        """Return the program of `outputs` for rates that are given, instead of those that solve the mechanism's equations."""
+        return self._outputs(self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns), {})
+
+    def _outputs(self, v: Sequence[Scalar], a: Sequence[Scalar], rates: Mapping[int, Scalar]) -> Program:
+        phi = self.formulation.phi(self.at)
+        out: dict[int, Scalar] = {
+            **rates,
+            self.layout.scalar("closure"): largest(self._kept(phi)),
+            self.layout.scalar("leftover"): largest([phi[k] for k in self.selection.dropped]),
+            self.layout.scalar("branch"): reduce(minimum, self.formulation.branch(self.at), 1.0),
+        }
+        twists = self.formulation.twists(self.at, v)
+        accelerations = self.formulation.accelerations(self.at, v, a)
+
+        def moving(body: str) -> tuple[Pose, Twist, Acceleration]:
+            pose, twist = self.at.poses.get(body, GROUND_POSE), twists.get(body, GROUND_TWIST)
+            return pose, twist, accelerations.get(body, GROUND_ACCELERATION)
+
+        def of_point(body: str, position: Vector) -> tuple[Vec3, Vec3, Vec3]:
+            return motion_of_point(position, self.frame.arm(body, position), self.frame.unit, *moving(body))
+
+        for name in self.request.points:
+            point = self.mechanism.point(name)
+            self._store_motion(out, QUANTITIES, name, of_point(point.body, point.position))
+        for name in self.request.bodies:
+            body = self.mechanism.body(name)
+            self._store_motion(out, ("r", "rdot", "rddot"), name, of_point(name, body.origin))
+            self._store_motion(out, ("p", "omega", "omega_t"), name, motion_of_frame(quat(body.euler_parameters), *moving(name)))
+        return program("outputs", self.tape, out, self.prepared)
+
+    def _store_motion(self, out: dict[int, Scalar], labels: Sequence[str], name: str, found: Iterable[Iterable[Scalar]]) -> None:
+        """Add a motion as far as an order wants it."""
+        for label, value in zip(labels[: self.request.order + 1], found, strict=False):
+            self.store(out, f"{label} {name}", value)
+
+
+def largest(values: Sequence[Scalar]) -> Scalar:
+    """The largest size of numbers, or zero."""
+    return reduce(maximum, (absolute(value) for value in values)) if values else 0.0

@@ -1,0 +1,235 @@
+"""Follow the curve of poses by its length, not by a driver: beyond lock-ups, where the driver turns back, and over bifurcations.
+
+Pseudo-arclength continuation. The unknowns are the pose q and the path's time t; a step of length h along the tangent (dq, dt),
+|dq| = 1 [units of the mechanism's size, rad], is corrected across the tangent by Newton's iteration on
+
+    phi(q, t) = 0,   dq . (q - q_predicted) = 0        Jacobian  B = [ J  -nu ; dq^T  0 ]
+
+B is regular at limit points, where J is not. Limit points are zeros of dt along the curve. At bifurcations [J -nu] loses rank, and
+the determinant of B changes its sign where an odd number of branches cross.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+
+from ...mechanism.motions import Path
+from ...trajectory import Array
+from ..compiled.dense_equations import System
+from ..compiled.request import CONSISTENT
+from ..formulation.acceptance_criteria import LARGEST_DEVIATION
+
+# The tangent turns by less than this [rad] in a step, so that the correction is a tenth of it: another branch is farther away.
+LARGEST_TURN = 0.2
+# A step below this is round-off beside the residuals that are corrected.
+SHORTEST = 1e-9
+CORRECTIONS = 10
+# False position gains a digit and more each time. The driver is stationary at a limit point: where dt is this, by the motion per
+# length, the driver's value is off by the square of it.
+REFINEMENTS, ROUNDING = 40, 1e-12
+# Where no such spot is found because the curve branches there too, it is off by more than this.
+STATIONARY = 1e-9
+# Beside a bifurcation, poses are taken at multiples of this: there sigma, about as large, costs two digits, and a polynomial
+# through eight of them is exact to about 1e-16.
+NODE = 0.01
+# Cubics through the four nodes on either side are off by about NODE ** 4 where the nodes begin: their zeros meet at a bifurcation.
+MEETS = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A pose on the curve.
+
+    Attributes:
+        state: shape (numbers, 1).
+        time: of the path.
+        dq, dt: unit tangent, shape (n,), and the time's part of it.
+        arc: length from where the walk began.
+        sigma: smallest singular value of [J -nu]: zero where the curve branches.
+        sign: of the determinant of B.
+    """
+
+    state: Array
+    time: float
+    dq: Array
+    dt: float
+    arc: float
+    sigma: float
+    sign: float
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """A singular pose on the curve: its length and time, and the spot nearest to it that corrections lead to."""
+
+    spot: Spot
+    arc: float
+    time: float
+
+
+class ArclengthWalk:
+    """Steps along the curve of poses of a system on a path."""
+
+    def __init__(self, system: System, path: Path, tol: float) -> None:
+        self.system, self.path, self.tol = system, path, tol
+
+    def sample(self, time: float) -> Array:
+        """What moves the drivers, shape (sampled, 1)."""
+        times = np.array([time])
+        model = self.system.model
+        return model.samples(times, self.path.drive(model.request.drivers, times))
+
+    def begin(self, state: Array, time: float, direction: float) -> Spot:
+        """A pose as the first of a walk, with time growing or falling from there.
+
+        Raises:
+            np.linalg.LinAlgError: the pose is singular to the last digit: it says no direction.
+        """
+        found = self.system.equations(state, self.sample(time))
+        dq = direction * _solution(found.jacobian[0], found.nu[0])
+        return self._spot(state, time, dq / np.linalg.norm(dq), 0.0)
+
+    def advance(self, spot: Spot, h: float) -> Spot | None:
+        """The pose at about the length h from a spot; None where corrections do not converge nearby, or it is no solution.
+
+        Corrections are across the tangent of the spot: h is measured along it.
+        """
+        state = self.system.stepped(spot.state, h * spot.dq[None])
+        time, moved, closure = spot.time + h * spot.dt, 0.0, np.inf
+        for _ in range(CORRECTIONS):
+            found = self.system.equations(state, self.sample(time))
+            if not found.closure[0] < 0.5 * closure:
+                break  # the last step gained nothing: rounding
+            closure = float(found.closure[0])
+            try:
+                across = _bordered(found.jacobian[0], found.nu[0], spot.dq)
+                step = _solution(across, np.append(-found.phi[0], 0.0))
+            except np.linalg.LinAlgError:
+                return None
+            moved += float(np.abs(step[:-1]).max())
+            if moved > LARGEST_DEVIATION * abs(h) + self.tol:
+                return None
+            state, time = self.system.stepped(state, step[None, :-1]), time + float(step[-1])
+        try:
+            after = self._spot(state, time, spot.dq, spot.arc + h)
+        except np.linalg.LinAlgError:
+            return None
+        return after if self._solved(after) else None
+
+    def _spot(self, state: Array, time: float, along: Array, arc: float) -> Spot:
+        found = self.system.equations(state, self.sample(time))
+        bordered = _bordered(found.jacobian[0], found.nu[0], along)
+        tangent = _solution(bordered, np.append(np.zeros(len(along)), 1.0))
+        tangent /= np.linalg.norm(tangent[:-1])
+        sigma = float(np.linalg.svd(bordered[:-1], compute_uv=False)[-1])
+        sign = float(np.linalg.slogdet(_bordered(found.jacobian[0], found.nu[0], tangent[:-1]))[0])
+        return Spot(state, time, tangent[:-1], float(tangent[-1]), arc, sigma, sign)
+
+    def _solved(self, spot: Spot) -> bool:
+        zero = np.zeros((1, self.system.unknowns))
+        tests = self.system.outputs(spot.state, self.sample(spot.time), zero, zero)
+        closure, leftover, branch = (float(tests[name][0, 0]) for name in ("closure", "leftover", "branch"))
+        return closure <= self.tol and leftover <= max(CONSISTENT, self.tol) and branch > 0.0
+
+    def along(self, spot: Spot, length: float, longest: float, attempts: int | None = None) -> Iterator[Spot]:
+        """Spots after one, up to a length from where the walk began; ends before it where steps get too short, or are too many."""
+        h = 0.1 * longest
+        for _ in count() if attempts is None else range(attempts):
+            if spot.arc >= length:
+                return
+            after = self.advance(spot, min(h, length - spot.arc))
+            turn = np.arccos(min(1.0, float(after.dq @ spot.dq))) if after else np.inf
+            if after is None or turn > LARGEST_TURN:
+                h *= 0.5
+                if h < SHORTEST:
+                    return
+                continue
+            h = min(longest, h * float(np.clip(0.5 * LARGEST_TURN / max(turn, 1e-9), 0.5, 2.0)))
+            spot = after
+            yield spot
+
+    def limit(self, before: Spot, after: Spot) -> Beside:
+        """Where the driver turns back between two spots: the zero of dt, by false position (Illinois), to round-off.
+
+        Where the curve also branches there, corrections do not converge: the zero is interpolated.
+        """
+        a, b, f_a, f_b = 0.0, after.arc - before.arc, before.dt, after.dt
+        last_b: bool | None = None  # which end the last spot replaced: an end that stays twice weighs half
+        best = min(before, after, key=lambda spot: abs(spot.dt))
+        for _ in range(REFINEMENTS):
+            h = (a * f_b - b * f_a) / (f_b - f_a)
+            spot = self.advance(before, h)
+            if spot is None:
+                break
+            best = min(best, spot, key=lambda spot: abs(spot.dt))
+            if abs(spot.dt) <= ROUNDING:
+                break
+            is_b = (spot.dt > 0.0) == (f_b > 0.0)
+            weight = 0.5 if is_b is last_b else 1.0
+            a, f_a, b, f_b = (a, weight * f_a, h, spot.dt) if is_b else (h, spot.dt, b, weight * f_b)
+            last_b = is_b
+        if abs(best.dt) > STATIONARY and (nodes := self._nodes(before, after, best.arc - before.arc)) is not None:
+            offsets, spots = nodes
+            root = _root(offsets, np.array([spot.dt for spot in spots]))
+            if np.isfinite(root):
+                return Beside(best, best.arc + root, _between(offsets, spots, root))
+        return Beside(best, best.arc, best.time)
+
+    def branching(self, before: Spot, after: Spot) -> Beside | None:
+        """Where the curve branches between two spots, if it does.
+
+        Corrections do not converge there, but on both sides sigma falls to zero like a line: with its sign turned on one side it
+        is smooth, and its zero is interpolated. Where sigma has a least value other than zero there is no such line.
+        """
+        centre = self._least(before, after.arc - before.arc)
+        nodes = self._nodes(before, after, centre)
+        if nodes is None:
+            return None
+        offsets, spots = nodes
+        signed = np.sign(offsets) * np.array([spot.sigma for spot in spots])
+        from_left, from_right, root = (_root(offsets[kept], signed[kept]) for kept in (slice(4), slice(4, 8), slice(8)))
+        if not abs(from_left - from_right) <= MEETS:
+            return None
+        return Beside(spots[3], before.arc + centre + root, _between(offsets, spots, root))
+
+    def _nodes(self, before: Spot, after: Spot, centre: float) -> tuple[Array, list[Spot]] | None:
+        """Spots on both sides of a length from the first, and where they are; None where any is not reached."""
+        offsets = min(NODE, 0.125 * (after.arc - before.arc)) * np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
+        found = [self.advance(before, centre + offset) for offset in offsets.tolist()]
+        spots = [spot for spot in found if spot is not None]
+        return (offsets, spots) if len(spots) == len(found) else None
+
+    def _least(self, before: Spot, length: float) -> float:
+        """The length from a spot at which sigma is least, by golden section; where no correction converges, sigma is zero."""
+        part = 0.5 * (np.sqrt(5.0) - 1.0)
+        a, b = 0.0, length
+        while b - a > 0.01 * length:
+            c, d = b - part * (b - a), a + part * (b - a)
+            spots = self.advance(before, c), self.advance(before, d)
+            at_c, at_d = (spot.sigma if spot else 0.0 for spot in spots)
+            a, b = (a, d) if at_c < at_d else (c, b)
+        return 0.5 * (a + b)
+
+
+def _bordered(jacobian: Array, nu: Array, dq: Array) -> Array:
+    return np.block([[jacobian, -nu[:, None]], [dq[None], np.zeros((1, 1))]])
+
+
+def _solution(matrix: Array, b: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, b), dtype=np.float64)
+
+
+def _between(offsets: Array, spots: Sequence[Spot], at: float) -> float:
+    """The time at an offset among spots, interpolated."""
+    return float(np.polynomial.Polynomial.fit(offsets, [spot.time for spot in spots], len(spots) - 1)(at))
+
+
+def _root(x: Array, y: Array) -> float:
+    """The zero nearest to zero of the polynomial through points; NaN where it has none."""
+    roots = np.polynomial.Polynomial.fit(x, y, len(x) - 1).roots()
+    real = roots.real[np.abs(roots.imag) <= MEETS]
+    return float(real[np.abs(real).argmin()]) if len(real) else np.nan

@@ -1,0 +1,240 @@
+"""What was followed of a motion, part by part: a singular pose that the motion passes ends one part, and begins the next; so does
+one where only the rows are singular that it was followed by."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mechanism.motions import Path
+from ...trajectory import Array
+from ..compiled.request import FROM, LARGEST_SIGMA, SIGMA, TIME
+from ..compiled.samples import Route
+from ..formulation.acceptance_criteria import LOW, doubtful, in_question
+from .row_exchange import BETTER, NEAR, Choice
+from .singular_crossing import bridge, onward
+from .walk import End, March, arrived, led, march
+
+# Each takes some milliseconds to be passed. A motion that has so many is one of thousands of turns.
+MOST = 1000
+# A sample takes a millisecond to find that no rows are better there; where so many have none it is the mechanism that is singular.
+WITHOUT = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A route, and which of all samples were followed on it."""
+
+    route: Route
+    samples: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """A singular pose that the motion passes.
+
+    Attributes:
+        lane: all slots of the last pose before it.
+        time: of that pose.
+        route: on which.
+    """
+
+    lane: Array
+    time: float
+    route: Route
+
+
+@dataclass(frozen=True, eq=False)
+class Stuck:
+    """A sample beside a passage that is too near for either side to reach it.
+
+    Attributes:
+        sample: which.
+        route: on which the passage is.
+        before, near: lanes: a good one before the passage, and the last one there.
+    """
+
+    sample: int
+    route: Route
+    before: Array
+    near: Array
+
+
+class Followed:
+    """A march, and its going on beyond its ends.
+
+    Attributes:
+        found: the samples; those beyond ends are put in as they are reached.
+        parts: the first is the route asked for, from where it stands on its path.
+        part_of: the part of each sample, shape (n,).
+        choice: of rows.
+        ends: those that remain.
+        passages, stuck: what was passed.
+    """
+
+    def __init__(self, route: Route, found: March, tol: float) -> None:
+        self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
+        self.choice = Choice(route.model)
+        stands = led(route, tol)
+        self.parts = [Part(stands if isinstance(stands, Route) else route, np.arange(len(self.times)))]
+        self.part_of = np.zeros(len(self.times), dtype=np.intp)
+        self.ends: list[End] = []
+        self.passages: list[Passage] = []
+        self.stuck: list[Stuck] = []
+        self.renewed = 0
+        self._stood: dict[int, Array] = {}
+
+    @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """Samples that were reached and may be wrong, shape (n,)."""
+        return self.found.solved & doubtful(*self._tests, self.tol)
+
+    @property
+    def in_question(self) -> NDArray[np.bool_]:
+        """Those, and samples that may be better by other rows, shape (n,)."""
+        model = self.route.model
+        largest = np.fmax.reduce(self.found.kept[model.rows[LARGEST_SIGMA].start], initial=0.0) if model.selection.dropped else None
+        return self.found.solved & in_question(*self._tests, self.tol, largest)
+
+    @property
+    def _tests(self) -> tuple[Array, Array]:
+        sigma, closure = (self.found.kept[self.route.model.rows[name].start] for name in (SIGMA, "closure"))
+        return sigma, closure
+
+    def go_on(self) -> None:
+        """Pass the singular poses at ends, one after the other, where the motion passes them."""
+        waiting = list(self.found.ends)
+        while waiting:
+            end = waiting.pop(0)
+            further = self._beyond(end)
+            if further is None:
+                self.ends.append(end)
+            else:
+                waiting = [*further, *waiting]
+
+    def renew(self, lanes: Mapping[int, Array]) -> None:
+        """Follow samples by rows that are chosen there, from lanes that stand at them."""
+        left: list[int] = list(lanes)
+        routes = {k: self.parts[int(self.part_of[k])].route for k in left}
+        without = 0
+        while left and without < WITHOUT:
+            here = left[0]
+            standing = self.choice.anew(routes[here], lanes[here])
+            if standing is None:
+                without += 1
+                left = left[1:]
+            else:
+                samples = np.array(left)
+                self._follow(Route(standing.model, self._path(samples), standing.lane, float(self.times[here])), samples)
+                self.renewed += 1
+                left = [k for k in left[1:] if self.in_question[k]]
+
+    def _beyond(self, end: End) -> list[End] | None:
+        """What ends the motion beyond an end; None where it does not go on."""
+        slots = end.route.model.slots
+        if not end.early and end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]:
+            return None
+        here, number = _time(end.route, end.lane), self._number(end.route)
+        side = 1.0 if end.wanted > here else -1.0
+        standing = self.choice.anew(end.route, end.lane) if self.renewed < MOST else None
+        if standing is not None:
+            self.renewed += 1
+            if number is None:
+                return self._arrive(Route(standing.model, end.route.path, standing.lane, here))
+            missing = self._missing(number, side, end.wanted)
+            ends = self._follow(Route(standing.model, self._path(missing), standing.lane, here), missing)
+            return [each for each in ends if side * (each.wanted - here) >= 0.0]
+        if end.early and number is not None:  # the way to the start is gone to its end
+            return self._further(end, number, side)
+        if len(self.passages) == MOST:
+            return None
+        lane = self.before(here, side, number) if number is not None else end.route.departure
+        passed = bridge(end.route, lane, here, self.tol, end.lane, rates=False) if lane is not None else None
+        if passed is None:
+            return None
+        self.passages.append(Passage(end.lane, here, end.route))
+        if number is None:
+            return self._arrive(onward(end.route, passed.beyond, end.route.path.times))
+        missing = self._missing(number, side, end.wanted)
+        ends = self._follow(onward(end.route, passed.beyond, self.times[missing]), missing)
+        beyond = _time(end.route, passed.beyond)
+        back = [each for each in ends if side * (each.wanted - beyond) < 0.0]
+        while back and back[0].early:  # a sample right beyond the pose is not given up for want of better rows
+            back = self._further(back[0], len(self.parts) - 1, -side)
+        short = {k for k in missing.tolist() if not self.found.solved[k] and side * (self.times[k] - beyond) < 0.0}
+        self.stuck += [Stuck(k, end.route, lane, end.lane) for k in sorted(short)] if lane is not None else []
+        return [each for each in ends if side * (each.wanted - beyond) >= 0.0]
+
+    def _further(self, end: End, number: int, side: float) -> list[End]:
+        """Go along a route again, and where it left off on."""
+        samples, slots = self.parts[number].samples, end.route.model.slots
+        low = LOW * float(end.lane[slots[FROM + SIGMA]] / end.lane[slots[FROM + LARGEST_SIGMA]])
+        found = march(end.route, self.tol, low=low)
+        further = found.solved & ~self.found.solved[samples]
+        taken = samples[further]
+        self.found.kept[:, taken], self.found.solved[taken], self.part_of[taken] = found.kept[:, further], True, number
+        return [each for each in found.ends if side * (each.wanted - end.route.start) >= 0.0]
+
+    def _missing(self, number: int, side: float, wanted: float) -> NDArray[np.intp]:
+        """The samples that a part did not reach on a side, from the first that was wanted on."""
+        start = self.parts[number].route.start
+        return np.flatnonzero(~self.found.solved & (side * (self.times - start) >= side * (wanted - start)))
+
+    def _path(self, samples: NDArray[np.intp]) -> Path:
+        """The path at samples."""
+        path = self.route.path
+        return Path(path.motions, self.times[samples], path.design)
+
+    def _arrive(self, way: Route) -> list[End]:
+        """Go on to the start of the samples, and from there."""
+        last = len(way.path.times) - 1
+        found = march(way, self.tol, {last})
+        if not found.solved.all():
+            return list(found.ends)
+        lane = arrived(way.model, found.visited[last])
+        return self._follow(Route(way.model, self.route.path, lane, self.route.start), np.arange(len(self.times)))
+
+    def _follow(self, route: Route, samples: NDArray[np.intp]) -> list[End]:
+        """Put what a route reaches of samples in their place, where there was nothing or it was much nearer to singular."""
+        found, sigma = march(route, self.tol, low=LOW), self.route.model.rows[SIGMA].start
+        nearer = BETTER * self.found.kept[sigma, samples] < found.kept[sigma]
+        reached = found.solved & (nearer | ~self.found.solved[samples])
+        taken = samples[reached]
+        self.found.kept[:, taken], self.found.solved[taken] = found.kept[:, reached], True
+        self.part_of[taken] = len(self.parts)
+        self.parts.append(Part(route, samples))
+        return list(found.ends)
+
+    def visit(self, samples: Collection[int]) -> dict[int, Array]:
+        """Lanes that stand at samples; those that are not reached again are missing."""
+        found: dict[int, Array] = {}
+        for number, part in enumerate(self.parts):
+            wanted = {at for at, k in enumerate(part.samples.tolist()) if k in samples and self.part_of[k] == number}
+            if wanted:
+                found |= {int(part.samples[at]): lane for at, lane in march(part.route, self.tol, visit=wanted).visited.items()}
+        return found
+
+    def before(self, time: float, side: float, number: int) -> Array | None:
+        """The lane of the last sample of a part before a time, going outwards, that is not in doubt; or of its start, if known."""
+        route = self.parts[number].route
+        away = side * (self.times - route.start)
+        mine = (self.part_of == number) & self.found.solved & ~self.doubtful
+        good = np.flatnonzero(mine & (away >= 0.0) & (away < side * (time - route.start)))
+        if not len(good):
+            return route.departure if route.stands else None
+        nearest = int(good[away[good].argmax()])
+        if nearest not in self._stood:
+            self._stood |= self.visit({nearest})
+        return self._stood.get(nearest)
+
+    def _number(self, route: Route) -> int | None:
+        """Return the number of the part that is followed on a route; None on the way to the start."""
+        return next((k for k, part in enumerate(self.parts) if part.route is route), None)
+
+
+def _time(route: Route, lane: Array) -> float:
+    """At which a lane stands on a route."""
+    return float(lane[route.model.slots[FROM + TIME]])

@@ -1,0 +1,70 @@
+"""Run a compiled model along a path: the march, a closer look at what is doubtful, and the motions of points and bodies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...mechanism.motions import Path
+from ...program import ITERATIONS
+from ...trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
+from ..compiled.compiled_model import Model
+from ..compiled.motion_start import by_ways
+from ..compiled.request import SIGMA
+from ..compiled.samples import Route
+from ..formulation.acceptance_criteria import LOW, in_question
+from .walk import march
+
+
+def sweep(model: Model, path: Path, tol: float) -> Trajectory:
+    """Run a compiled model over the samples of a path; see `solve`."""
+    return follow(Route(model, path), tol)
+
+
+def follow(route: Route, tol: float) -> Trajectory:
+    """Run a compiled model along a route; see `solve`."""
+    if route.single:
+        return _follow(route, tol)
+    compare = math.isfinite(tol)  # else nothing is asked of the samples
+    return by_ways(route.begin, route.model.mechanism, route.path, lambda start: _follow(route.by(start), tol), compare=compare)
+
+
+def _follow(route: Route, tol: float) -> Trajectory:
+    model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
+    closure, leftover, sigma = found.worst
+    largest = math.inf if model.selection.dropped else None
+    findings: Mapping[str, Any] = {}
+    if not math.isfinite(tol):  # nothing is asked of the samples
+        message = "; ".join(found.messages)
+    elif found.ends or (tol not in route.settled and in_question(sigma, closure, tol, largest)):
+        from .singular_samples import scrutinise  # rarely needed
+
+        scrutiny = scrutinise(route, found, tol)
+        closure, leftover, sigma = _worst(found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved])
+        message, findings = "; ".join(scrutiny.messages), scrutiny.details
+    if not (found.solved.any() if message else found.solved.size):
+        closure = leftover = sigma = math.nan
+    iterations, table, unit = found.kept[rows[ITERATIONS].start], found.kept.T, model.frame.unit
+    return Trajectory(
+        points=Motions(PointMotion, table, model.of_points),
+        solved=found.solved,
+        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
+        residual=closure * unit,
+        message=message,
+        details={
+            **route.details,
+            "redundant_residual": leftover * unit,
+            "smallest_singular_value": min(sigma, 1.0),
+            **findings,
+        },
+        bodies=Motions(BodyMotion, table, model.of_bodies),
+    )
+
+
+def _worst(tests: Array) -> tuple[float, float, float]:
+    """The largest residuals of kept and redundant rows, and the smallest estimate of sigma; rows from "closure" to `SIGMA`."""
+    closure, leftover = np.maximum.reduce(tests[:2], axis=1, initial=0.0).tolist()
+    return closure, leftover, float(np.minimum.reduce(tests[-1], initial=1.0))

@@ -1,0 +1,240 @@
+"""Which rows say what others say, which contradict each other and by how much, and what is left free: by name, at the design.
+
+The rows are those of the native formulation, joints first, then drivers; lengths are in mechanism sizes, so that rows of lengths
+and of angles compare. Contradictions are found by exact rows: simplified ones have another fixed point where the residual is
+not zero (formulation section 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...mechanism.mechanism import Mechanism
+from ...trajectory import Array
+from ..compiled.request import CONSISTENT
+from ..formulation.cartesian import COLUMNS, Cartesian
+from ..formulation.constraints import Constraint, Style, frames
+from ..formulation.state_vectors import jacobian
+from ..structure.degrees_of_freedom import FreedomAccount, account
+from ..structure.redundancy import DIGITS, RANK_TOLERANCE, independent_joint_rows, independent_rows
+from .instantaneous_screws import Screw, free_motions, screws
+
+# What a row owes to another below this is round-off of an orthogonalisation.
+OWED = 1e-9
+# Singular values of sound linkages are above this; below, geometry is nearly redundant, and often meant to be so.
+NEARLY = 1e-3
+# Rows with less than this part of the largest share of a contradiction are not its cause.
+SHARE = 0.1
+# The way to the pose nearest to an assembly: no step is longer than this [units of the mechanism's size, rad], within which rows
+# are near to linear, and there are enough to go around the mechanism several times.
+STEP, STEPS = 0.1, 200
+
+
+@dataclass(frozen=True)
+class NamedRow:
+    """A row by name.
+
+    Attributes:
+        owner: joint or driver.
+        primitive: the condition it is one equation of.
+        holds: what it prevents at the design, on the owner's second body: a shift along, or a turn about, a direction.
+    """
+
+    owner: str
+    primitive: str
+    holds: str
+
+    def __str__(self) -> str:
+        return f"{self.owner}: {self.primitive} ({self.holds})"
+
+
+@dataclass(frozen=True)
+class Dependency:
+    """A row that others say already: the sum of the others times their weights."""
+
+    row: NamedRow
+    repeats: tuple[tuple[float, NamedRow], ...]
+
+
+@dataclass(frozen=True)
+class ComponentCount:
+    """Bodies that joints, couplers or drivers tie together, with their share of the count; drivers are not among the rows."""
+
+    bodies: tuple[str, ...]
+    unknowns: int
+    rows: int
+    rank: int
+    drivers: tuple[str, ...]
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        return self.unknowns - self.rank
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A row that cannot be met, and by how much: residual [m or rad], or its rate by the driver's."""
+
+    row: NamedRow
+    amount: float
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """A driver that cannot move what it drives: the least by which other rows would have to give way, per unit of the driver."""
+
+    driver: str
+    rows: tuple[Violation, ...]
+
+
+class Ranks:
+    """The rows of a mechanism at the design position, and what can be said of their rank."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.frame = mechanism, frames(mechanism)
+        self.formulation = Cartesian.of(mechanism, self.frame)
+        self.at = self.formulation.configuration(self.formulation.design)
+        self.matrix = jacobian(self.formulation, self.at)
+        self.joint_rows = len(self.matrix) - len(mechanism.drivers)
+
+    @cached_property
+    def account(self) -> FreedomAccount:
+        """The count; drivers are no part of it."""
+        return account(self.mechanism, self.frame)
+
+    @cached_property
+    def rows(self) -> list[NamedRow]:
+        """All rows by name."""
+        found: list[NamedRow] = []
+        for c in self.formulation.constraints:
+            count = c.primitive.n if isinstance(c, Constraint) else 1
+            kind = type(c.primitive).__name__ if isinstance(c, Constraint) else "Relation"
+            found += [
+                NamedRow(c.owner, kind, self._holds(len(found) + k, c.j if isinstance(c, Constraint) else "")) for k in range(count)
+            ]
+        return found
+
+    def _holds(self, k: int, body: str) -> str:
+        """What a row prevents: read from its entries on a body that moves."""
+        names = [body, *self.formulation.bodies] if body in self.formulation.columns else [*self.formulation.bodies]
+        for name in names:
+            first = self.formulation.columns[name]
+            for what, block in (("along", self.matrix[k, first : first + 3]), ("about", self.matrix[k, first + 3 : first + 6])):
+                size = float(np.linalg.norm(block))
+                if size > OWED:
+                    return f"{what} {_direction(block / size)}"
+        return "coordinates"
+
+    @cached_property
+    def dependencies(self) -> list[Dependency]:
+        """The joint rows that are redundant, each in terms of rows that are kept."""
+        joints = self.matrix[: self.joint_rows]
+        kept = independent_joint_rows(self.formulation, joints)
+        found: list[Dependency] = []
+        for k in sorted(set(range(self.joint_rows)) - set(kept)):
+            weights: Array = joints[k] @ np.linalg.pinv(joints[kept])
+            terms = [(float(weights[at]), self.rows[kept[at]]) for at in _largest_first(weights) if abs(weights[at]) > OWED]
+            found.append(Dependency(self.rows[k], tuple(terms)))
+        return found
+
+    @cached_property
+    def nearly(self) -> list[tuple[float, list[NamedRow]]]:
+        """Combinations of joint rows that are nearly redundant: their size, which is a singular value, and the rows in them."""
+        u, values = np.linalg.svd(self.matrix[: self.joint_rows], full_matrices=False)[:2]
+        scale = values.max(initial=0.0)
+        found: list[tuple[float, list[NamedRow]]] = []
+        for k in np.flatnonzero((values > RANK_TOLERANCE * scale) & (values < NEARLY * scale)):
+            share = np.abs(u[:, k])
+            found.append((float(values[k]), [self.rows[row] for row in _largest_first(share) if share[row] > SHARE * share.max()]))
+        return found
+
+    @cached_property
+    def components(self) -> list[ComponentCount]:
+        """The parts of the mechanism that nothing ties together."""
+        groups: list[set[int]] = []  # of columns
+        for row in self.matrix:
+            columns = set(np.flatnonzero(row).tolist())
+            columns |= {
+                COLUMNS * (c // COLUMNS) + k for c in columns if c < COLUMNS * len(self.formulation.bodies) for k in range(6)
+            }
+            touching = [group for group in groups if group & columns]
+            groups = [group for group in groups if not group & columns] + [columns.union(*touching)]
+        loose = set(range(self.formulation.unknowns)) - set[int]().union(*groups)
+        groups += [set(range(c, c + COLUMNS)) for c in sorted(loose) if c % COLUMNS == 0]
+        return [self._component(sorted(group)) for group in sorted((g for g in groups if g), key=min)]
+
+    def _component(self, columns: Sequence[int]) -> ComponentCount:
+        own = np.flatnonzero(np.abs(self.matrix[:, columns]).max(axis=1) > 0.0)
+        joints, drivers = own[own < self.joint_rows], own[own >= self.joint_rows]
+        bodies = tuple(name for name, first in self.formulation.columns.items() if first in columns)
+        names = tuple(self.rows[int(k)].owner for k in drivers)
+        rank = len(independent_rows(self.matrix[joints][:, columns], 0))
+        return ComponentCount(bodies, len(columns), len(joints), rank, names)
+
+    @cached_property
+    def free(self) -> list[list[Screw]]:
+        """The motions that are left with all drivers held, each by the bodies that take part."""
+        return [screws(self.formulation, self.at, self.frame, rates) for rates in free_motions(self.matrix)]
+
+    @cached_property
+    def blocked(self) -> list[Blocked]:
+        """The drivers that cannot move at a rate of their own."""
+        joints, drives = self.matrix[: self.joint_rows], self.matrix[self.joint_rows :]
+        found: list[Blocked] = []
+        for k, driver in enumerate(self.mechanism.drivers):
+            rate = np.zeros(len(drives))
+            rate[k] = 1.0
+            start, _, rank, _ = np.linalg.lstsq(drives, rate)
+            against = float(np.abs(drives @ start - rate).max())
+            hold = np.linalg.svd(drives, full_matrices=True)[2][int(rank) :].T
+            least = start + hold @ np.linalg.lstsq(joints @ hold, -joints @ start, rcond=RANK_TOLERANCE)[0]
+            given = joints @ least
+            if np.abs(given).max(initial=0.0) > OWED or against > OWED:
+                # by a radian of the driver, or by a metre
+                units = (self.frame.unit, 1.0) if driver.turns else (1.0, 1.0 / self.frame.unit)
+                found.append(Blocked(driver.name, tuple(self._violations(given, *units))))
+        return found
+
+    def _violations(self, amounts: Array, length: float, angle: float = 1.0) -> list[Violation]:
+        """The rows with the largest amounts; those of lengths and of angles are in these units."""
+        largest = np.abs(amounts).max(initial=0.0)
+        order = [k for k in _largest_first(amounts) if abs(amounts[k]) > max(SHARE * largest, OWED * OWED)]
+        units = [length if "along" in self.rows[k].holds else angle for k in order]
+        return [Violation(self.rows[k], float(amounts[k]) * unit) for k, unit in zip(order, units, strict=True)]
+
+    @cached_property
+    def contradictions(self) -> list[Violation]:
+        """The rows that do not hold in the pose nearest to an assembly, with the drivers at design; empty where it closes."""
+        exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
+        state = exact.design
+        for _ in range(STEPS):
+            at = exact.configuration(state)
+            phi = np.array(exact.phi(at))
+            if np.abs(phi).max(initial=0.0) <= CONSISTENT:
+                break
+            step = np.linalg.lstsq(jacobian(exact, at), -phi, rcond=RANK_TOLERANCE)[0]
+            size = float(np.abs(step).max())
+            state = exact.retract(at, (step * min(1.0, STEP / size) if size else step).tolist())
+            if size < CONSISTENT:
+                break
+        phi = np.array(self.formulation.phi(self.formulation.configuration(state)))
+        return self._violations(phi, self.frame.unit) if np.abs(phi).max(initial=0.0) > CONSISTENT else []
+
+
+def _largest_first(amounts: Array) -> list[int]:
+    """Indices by size; of equals, to all but round-off, in their own order: the same on every processor."""
+    sizes = np.abs(amounts)
+    scale = float(sizes.max(initial=0.0)) or 1.0
+    return np.argsort(-np.round(sizes / scale, DIGITS), kind="stable").tolist()
+
+
+def _direction(a: Array) -> str:
+    k = int(np.abs(a).argmax())
+    if abs(a[k]) > 1.0 - OWED:
+        return "xyz"[k]
+    return "(" + ", ".join(f"{x if abs(x) > OWED else 0.0:.3g}" for x in a * np.sign(a[k])) + ")"

@@ -1,0 +1,225 @@
+"""The Cartesian formulation: six unknowns (dr, dpi) of every moving body, and all joints as rows.
+
+A joint's own coordinate, its turn or displacement, is a further unknown where it is named: coupled to another, or by the style.
+dpi is in global axes, or in body axes where the row style is; the poses are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import groupby
+from typing import Any
+
+from ...algebra import Scalar, Vec3, is_literal_zero, quat, turned_by, vec
+from ...mechanism.mechanism import Mechanism
+from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Primitive, Row, Twist
+from ...program import cos, sin
+from .constraints import Constraint, Frames, Relation, Style, constraints
+from .formulation import GROUND_ACCELERATION, Acceleration, Condition, Configuration, Rows, State
+
+COLUMNS = 6
+"""Unknowns of a moving body: dr and dpi."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """How a body moves that is solved for elsewhere."""
+
+    pose: Pose = GROUND_POSE
+    twist: Twist = GROUND_TWIST
+    acceleration: Acceleration = GROUND_ACCELERATION
+
+
+@dataclass(frozen=True, eq=False)
+class Cartesian:
+    """The constraints over the named moving bodies; implements `Formulation`.
+
+    Attributes:
+        named: coordinates that have a column whether or not a primitive is driven by them.
+        given: moving bodies that have no columns.
+    """
+
+    constraints: Sequence[Constraint | Relation]
+    bodies: Sequence[str]
+    named: Sequence[str] = ()
+    given: Mapping[str, Given] = field(default_factory=dict[str, Given])
+
+    @classmethod
+    def of(
+        cls, mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive] | None = None, style: Style = Style.NATIVE
+    ) -> Cartesian:
+        """All constraints of a mechanism over its moving bodies; drivers that are not named hold their design value."""
+        return cls(constraints(mechanism, frame, drives or {}, style), frame.moving)
+
+    @cached_property
+    def columns(self) -> Mapping[str, int]:
+        """First column of every moving body."""
+        return {name: COLUMNS * k for k, name in enumerate(self.bodies)}
+
+    @cached_property
+    def coordinates(self) -> Mapping[str, int]:
+        """Column of every named coordinate; they come after the bodies."""
+        driven = (c.coordinate for c in self.constraints if isinstance(c, Constraint) and c.coordinate)
+        return {name: COLUMNS * len(self.bodies) + k for k, name in enumerate(dict.fromkeys([*self.named, *driven]))}
+
+    @property
+    def unknowns(self) -> int:
+        return COLUMNS * len(self.bodies) + len(self.coordinates)
+
+    @property
+    def design(self) -> Mapping[str, Sequence[float]]:
+        still: dict[str, Sequence[float]] = {f"u {name}": (0.0, 0.0, 0.0) for name in self.bodies}
+        still |= {f"q {name}": (1.0, 0.0, 0.0, 0.0) for name in self.bodies}
+        return still | {f"x {name}": (0.0,) for name in self.coordinates}
+
+    @property
+    def owners(self) -> Sequence[tuple[str, str]]:
+        return [name for c in self.constraints for name in [_named(c)] * _count(c)]
+
+    @property
+    def conditions(self) -> Sequence[Condition]:
+        far, found, first = self._from_ground, list[Condition](), 0
+        for _, group in groupby(self.constraints, key=_named):
+            members = [*group]
+            rows = range(first, first := first + sum(map(_count, members)))
+            pairs = [c for c in members if isinstance(c, Constraint)]
+            remote = max((far.get(c.i, 0) + far.get(c.j, 0) for c in pairs), default=0)
+            steady = all(c.primitive.steady or not (c.i in self.columns or c.i in self.given) for c in pairs)
+            found.append(Condition(rows, remote, steady))
+        return found
+
+    @property
+    def _from_ground(self) -> Mapping[str, int]:
+        """Joints and drivers between every body and the ground, or what is given; bodies that none leads to are missing."""
+        pairs = [(c.i, c.j) for c in self.constraints if isinstance(c, Constraint)]
+        far = {name: 0 for pair in pairs for name in pair if name not in self.columns}
+        while reached := {b: far[a] + 1 for i, j in pairs for a, b in ((i, j), (j, i)) if a in far and b not in far}:
+            far |= reached
+        return far
+
+    @property
+    def _body_axes(self) -> bool:
+        return any(c.primitive.body_axes for c in self.constraints if isinstance(c, Constraint))
+
+    def configuration(self, state: State) -> Configuration:
+        poses = {name: each.pose for name, each in self.given.items()}
+        for name in self.bodies:
+            poses[name] = Pose.of(vec(state[f"u {name}"]), quat(state[f"q {name}"]))
+        return Configuration(state, poses)
+
+    def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
+        state: dict[str, Sequence[Scalar]] = {}
+        for name, k in self.columns.items():
+            dr, dpi = vec(step[k : k + 3]), self._global(at.poses[name], vec(step[k + 3 : k + COLUMNS]))
+            state[f"u {name}"] = tuple(at.poses[name].u + dr)
+            state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi))
+        for name, k in self.coordinates.items():
+            state[f"x {name}"] = (at.state[f"x {name}"][0] + step[k],)
+        return state
+
+    def phi(self, at: Configuration) -> list[Scalar]:
+        found: list[Scalar] = []
+        for c in self.constraints:
+            if isinstance(c, Relation):
+                found.append(sum((k * at.state[f"x {name}"][0] for name, k in c.weights.items()), 0.0) - c.drive.c)
+            else:
+                found += self._bound(c, at).phi(*_pair(c, at))
+        return found
+
+    def branch(self, at: Configuration) -> list[Scalar]:
+        bodily = (c for c in self.constraints if isinstance(c, Constraint))
+        return [value for c in bodily for value in self._bound(c, at).branch(*_pair(c, at))]
+
+    def rows(self, at: Configuration) -> Rows:
+        found: Rows = []
+        for c in self.constraints:
+            if isinstance(c, Relation):
+                found.append({self.coordinates[name]: k for name, k in c.weights.items()})
+                continue
+            pair, bound = _pair(c, at), self._bound(c, at, rate=1.0)
+            rows = [self._sparse(row, c) for row in bound.rows(*pair)]
+            if c.coordinate:  # nu is linear in the drive's rate: what it is at rate one is minus the coordinate's column
+                for row, value in zip(rows, bound.nu(*pair), strict=True):
+                    if not is_literal_zero(value):
+                        row[self.coordinates[c.coordinate]] = -value
+            found += rows
+        return found
+
+    def nu(self, at: Configuration) -> list[Scalar]:
+        carried = {name: each.twist for name, each in self.given.items()}
+        found: list[Scalar] = []
+        for c in self.constraints:
+            if isinstance(c, Relation):
+                found.append(c.drive.c_t)
+            else:
+                found += self._less(self._bound(c, at).nu(*_pair(c, at)), c, at, carried)
+        return found
+
+    def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
+        twists = self._own(v) | {name: each.twist for name, each in self.given.items()}
+        carried = {name: Twist(each.acceleration.v_t, each.acceleration.w_t) for name, each in self.given.items()}
+        found: list[Scalar] = []
+        for c in self.constraints:
+            if isinstance(c, Relation):
+                found.append(c.drive.c_tt)
+                continue
+            rate = v[self.coordinates[c.coordinate]] if c.coordinate else 0.0
+            vi, vj = twists.get(c.i, GROUND_TWIST), twists.get(c.j, GROUND_TWIST)
+            found += self._less(self._bound(c, at, rate).gamma(*_pair(c, at), vi, vj), c, at, carried)
+        return found
+
+    def _less(self, values: Sequence[Scalar], c: Constraint, at: Configuration, carried: Mapping[str, Twist]) -> list[Scalar]:
+        """Right-hand sides less what given bodies contribute to the left."""
+        found: list[Scalar] = [*values]
+        for body, place in ((c.i, "i"), (c.j, "j")):
+            if body in carried:
+                rows = self._bound(c, at).rows(*_pair(c, at))
+                found = [x - row.along(place, carried[body]) for x, row in zip(found, rows, strict=True)]
+        return found
+
+    def _bound(self, c: Constraint, at: Configuration, rate: Scalar = 0.0) -> Primitive:
+        """The primitive, driven by its coordinate where it has one; the coordinate's acceleration is an unknown's, not here."""
+        if not c.coordinate:
+            return c.primitive
+        (x,) = at.state[f"x {c.coordinate}"]
+        drive = Drive(x, rate, 0.0, cos(0.5 * x), sin(0.5 * x))
+        driven: Any = c.primitive
+        return replace(driven, drive=drive)
+
+    def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
+        return {name: Twist(twist.v, self._global(at.poses[name], twist.w)) for name, twist in self._own(v).items()}
+
+    def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:
+        # A w' differentiated is A w'dot + w x w, and the last is zero
+        return {name: Acceleration(twist.v, self._global(at.poses[name], twist.w)) for name, twist in self._own(a).items()}
+
+    def _own(self, v: Sequence[Scalar]) -> dict[str, Twist]:
+        """The unknowns by body, in the axes of the rows."""
+        return {name: Twist(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS])) for name, k in self.columns.items()}
+
+    def _global(self, pose: Pose, w: Vec3) -> Vec3:
+        return pose.turn(w) if self._body_axes else w
+
+    def _sparse(self, row: Row, c: Constraint) -> dict[int, Scalar]:
+        entries: dict[int, Scalar] = {}
+        for body, blocks in ((c.i, (row.ri, row.pi)), (c.j, (row.rj, row.pj))):
+            if body in self.columns:
+                first = self.columns[body]
+                values = [value for block in blocks for value in block]
+                entries |= {first + k: x for k, x in enumerate(values) if not is_literal_zero(x)}
+        return entries
+
+
+def _named(c: Constraint | Relation) -> tuple[str, str]:
+    """Joint or driver, and primitive."""
+    return c.owner, "Relation" if isinstance(c, Relation) else type(c.primitive).__name__
+
+
+def _count(c: Constraint | Relation) -> int:
+    return 1 if isinstance(c, Relation) else c.primitive.n
+
+
+def _pair(c: Constraint, at: Configuration) -> tuple[Pose, Pose]:
+    return at.poses.get(c.i, GROUND_POSE), at.poses.get(c.j, GROUND_POSE)

@@ -1,0 +1,137 @@
+"""Solve a mechanism over a sweep: from the description to the motion of points and bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..errors import SolveError
+from ..input_checks import finite, no_such, real
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.motions import Motion, Path, Ramp, as_changes
+from ..trajectory import Array, Trajectory
+from .compiled.request import Request
+from .formulation.constraints import Style
+from .solver_selection import prepare
+from .structure.driver_count import require_driven
+
+
+def solve(
+    mechanism: Mechanism,
+    driver: str,
+    values: Sequence[float] | Array,
+    *,
+    rate: float = 1.0,
+    points: Sequence[str] | None = None,
+    bodies: Sequence[str] = (),
+    order: int = 2,
+    tol: float = 1e-12,
+    style: str = "native",
+    motions: Mapping[str, Motion] | None = None,
+) -> Trajectory:
+    """Sweep one driver over values.
+
+    What was made ready for the last few mechanisms is kept in the process: the next call for one of them costs a fraction.
+
+    Args:
+        mechanism: what to solve.
+        driver: name of the driver that moves; the others hold their design value.
+        values: driver values [m or rad], in any order: measured from the design position, or the coordinate itself where the
+            driver is not relative. They are solved from the design position outwards.
+        rate: driver units per second; velocities and accelerations are per second at this constant rate.
+        points: points whose motion is wanted; all of them unless given.
+        bodies: bodies whose motion is wanted, in the paper's variables.
+        order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for is not computed.
+        tol: largest accepted constraint residual, relative to the mechanism's size; positive and finite.
+        style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes), "conventional" (full
+            products), "mixed" (joint coordinates as further unknowns) or "relative" (joint coordinates of a tree as the only
+            ones); the solutions are the same.
+        motions: of further drivers, their values measured likewise, over the time in which the swept one goes from its design
+            value at the rate; the others hold. They are asked at the samples, and between them where a step is divided: what goes
+            away and comes back between two samples is not seen.
+
+    Returns:
+        The motion; NaN where a sample cannot be reached, and the reason in its message.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
+            argument makes no sense.
+    """
+    path, request = asked(
+        "solve",
+        mechanism,
+        driver,
+        values,
+        motions or {},
+        rate=rate,
+        points=points,
+        bodies=bodies,
+        order=order,
+        tol=tol,
+        style=style,
+    )
+    return prepare(mechanism, request, path)(tol)
+
+
+def asked(
+    who: str,
+    mechanism: Mechanism,
+    driver: str,
+    values: Sequence[float] | Array,
+    motions: Mapping[str, Motion],
+    *,
+    rate: float,
+    points: Sequence[str] | None,
+    order: int,
+    tol: float,
+    bodies: Sequence[str] = (),
+    style: str = "native",
+) -> tuple[Path, Request]:
+    """The path and the request that the arguments of `solve` mean.
+
+    Raises:
+        SolveError: an argument makes no sense; the message begins with who asks.
+    """
+    wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
+    values = real(who, "values", values, "one driver value for each sample")
+    problem = _problem(driver, values, motions, rate, order, tol)
+    if problem:
+        raise SolveError(f"{who}: {problem}")
+    for what, names, known in (
+        ("driver", (driver, *motions), mechanism.drivers),
+        ("point", wanted, mechanism.points),
+        ("body", bodies, mechanism.bodies),
+    ):
+        there = [each.name for each in known]
+        for name in names:
+            if name not in there:
+                require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
+                raise no_such(who, what, name, there)
+    design = {name: value for name in (driver, *motions) if (value := mechanism.design_value(name))}
+    with np.errstate(over="ignore"):
+        times = (values - design.get(driver, 0.0)) / rate
+    if not np.isfinite(times).all():
+        raise SolveError(f"{who}: rate is {rate}: no number is the time of the values then; give a larger one")
+    path = Path({**as_changes(motions, design), driver: Ramp(float(rate))}, times, design)
+    return path, Request(tuple(path.motions), wanted, tuple(bodies), int(order), Style(style))
+
+
+def _problem(driver: str, values: Array, motions: Mapping[str, Motion], rate: float, order: int, tol: float) -> str:
+    """What makes no sense about arguments, or nothing; told only where there is something, because telling takes its time."""
+    if not finite(order) or order not in (0, 1, 2):
+        return f"order is {order!r}, expected 0, 1 or 2"
+    if not (finite(rate) and rate != 0.0):
+        return f"rate is {rate!r}, expected driver units per second other than 0; 1 serves"
+    if not (finite(tol) and tol > 0.0):
+        return f"tol is {tol!r}, expected a positive number; 1e-12 serves"
+    if values.ndim != 1:
+        return f"values have shape {values.shape}, expected (n,): one driver value for each sample"
+    if not np.isfinite(values).all():
+        return "values are not all finite; give finite driver values"
+    if driver in motions:
+        return f"motions has {driver!r}, which is swept; leave it out, or sweep another driver"
+    for name, motion in motions.items():
+        if not isinstance(motion, Motion):  # pyright: ignore[reportUnnecessaryIsInstance]
+            return f"motions[{name!r}] is {motion!r}, expected a motion such as Sine or Table"
+    return ""

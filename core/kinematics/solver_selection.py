@@ -1,0 +1,102 @@
+"""How a mechanism is solved is chosen by its size: as one program, component by component, or as one sparse system.
+
+The answers are the same to round-off. One program costs least for each sample, and more to trace: it grows faster than what it ties
+together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large for
+one program is a sparse system. Measured on chains of four-bars, one program against components, both interpreted: 17 bodies 3 and
+13 us a sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and 0.2 s. Compiled, 33 bodies take
+3 and 8 us, after 6 s and 0.1. On rings of loops, one program against a sparse system: 31 bodies 21 and 180 us, made ready in 1.3
+and 0.04 s; 39 bodies 42 and 275 us, 2.2 and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and refuses
+more of what could be solved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache, partial
+from threading import local
+
+from ..errors import SolveError
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.motions import Path
+from ..trajectory import Trajectory
+from .compiled.motion_start import start_of
+from .compiled.program_cache import ours
+from .compiled.request import Request
+from .compiled.samples import recent_route
+from .continuation.sweep import follow
+from .formulation.constraints import Style, frames
+
+# Up to as many bodies one program is made ready in a third of a second.
+ONE_PROGRAM = 20
+# An irreducible mechanism is worth two seconds, once: as one program it is six times as fast as a sparse system. Larger rings are
+# so near to singular that the estimate of sigma leaves all their samples in doubt.
+IRREDUCIBLE = 40
+
+Solver = Callable[[float], Trajectory]
+"""Solves what it was made for, to a tolerance."""
+
+
+def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
+    """Make a mechanism ready to be solved along a path.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
+    """
+    if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
+        known = ours(mechanism) and path.ours
+        make = (_OF_THREAD.large if known else _large)(mechanism, request)
+        if make:
+            return make(path)
+    return partial(follow, recent_route(mechanism, request, path))
+
+
+def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
+    """Say what is assumed of the start of many designs, by the nominal one; empty where the design decides it."""
+    start = start_of(mechanism, path)
+    if start.stands and not start.ambiguous:
+        return []
+    return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]
+
+
+def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] | None:
+    """Component by component, or as a sparse system; None where one program is better."""
+    # few mechanisms are so large: the others need not wait for the import
+    from .by_components.block_solver import Cascade
+    from .by_components.sweep import CascadeSweep
+    from .structure.components import components
+    from .structure.driver_count import require_driven
+
+    try:
+        parts = [] if mechanism.couplers else components(mechanism, frames(mechanism))  # couplers tie components together
+    except SolveError:
+        require_driven(mechanism)  # which names what can still move
+        raise
+    if parts and max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
+        cascade = Cascade(mechanism, request, parts)
+
+        def along(path: Path) -> Solver:
+            return CascadeSweep(cascade, path).solve
+
+        again = lru_cache(maxsize=1)(along)
+        return lambda path: (again if path.ours else along)(path)
+    if len(mechanism.moving) <= IRREDUCIBLE:
+        return None
+    from .sparse.sparse_model import SparseModel
+    from .sparse.sweep import solve_sparse
+
+    model = SparseModel(mechanism, compiled=request.compiled)
+    return lambda path: partial(solve_sparse, model, path, request.points, request.bodies, request.order)
+
+
+class _OfThread(local):
+    """The same, and once for whoever solves one again and again. One only, and of its paths the last: they fill much of the memory.
+
+    Each thread has its own, for it is solved in place.
+    """
+
+    def __init__(self) -> None:
+        self.large = lru_cache(maxsize=1)(_large)
+
+
+_OF_THREAD = _OfThread()

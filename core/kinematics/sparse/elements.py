@@ -1,0 +1,123 @@
+"""The constraints of a large mechanism as elements: constraints of one kind share one small program, its lanes are the constraints.
+
+Constraints are of one kind where their primitives have the same type, the same of their bodies move and the same vectors are zero
+(the arm of a joint at a body's origin). What all of a kind have in common is a constant of its program; all else is an input:
+geometry once, poses and drives at every evaluation, rates for the accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...program import Executor, NumpyExecutor
+from ...program.llvm.compiler import available
+from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.jit import LlvmCode
+from ...trajectory import Array
+from ..formulation.constraints import Constraint, Relation
+from .element_types import HOW, QUANTITIES, WHERE, ElementType, Member, Numbering
+
+
+class Elements:
+    """All constraints. What they evaluate to stands in arrays that the next evaluation overwrites.
+
+    Attributes:
+        numbering: of states and rates.
+        owners: for every row the joint or driver, and the primitive, it belongs to.
+        phi, nu, gamma: shape (rows,), in the order of the constraints.
+        branch: all branch tests, shape (tests,).
+        entries: of the Jacobian, shape (entries,); each place occurs once.
+        rows, columns: where the entries belong, shape (entries,).
+        results, parts: all of these, one after the other, and where each of them is.
+        drivers: how many there are.
+        kinds, starts: see `ElementType`, and where the quantities of each start among the results.
+        compiled: whether they are evaluated by machine code.
+    """
+
+    def __init__(
+        self, constraints: Sequence[Constraint | Relation], bodies: Sequence[str], drivers: int, *, compiled: bool
+    ) -> None:
+        members, self.drivers = list[Member](), drivers
+        self.owners: list[tuple[str, str]] = []
+        for k, c in enumerate(constraints, drivers - len(constraints)):  # the drivers come last
+            members.append(Member(c, len(self.owners), k if k >= 0 else None))
+            self.owners += [(c.owner, members[-1].what)] * (1 if isinstance(c, Relation) else c.primitive.n)
+        coordinates = dict.fromkeys(name for member in members for name in member.coordinates)
+        self.numbering = Numbering(*({name: k for k, name in enumerate(names)} for names in (bodies, coordinates)))
+        kinds: dict[Any, list[Member]] = {}
+        for member in members:
+            kinds.setdefault(member.kind(self.numbering.bodies), []).append(member)
+        self.kinds, self.compiled = [ElementType(each, self.numbering) for each in kinds.values()], compiled and available()
+        self.rows, self.columns = (
+            np.concatenate([getattr(kind, name).ravel() for kind in self.kinds]) for name in ("rows", "columns")
+        )
+        sizes = dict.fromkeys(QUANTITIES, len(self.owners))
+        sizes |= {name: sum(kind.size(name) for kind in self.kinds) for name in ("branch", "entries")}
+        ends = np.cumsum(list(sizes.values()))
+        # one array, so that each kind writes once
+        self.results = np.zeros(ends[-1])
+        self.phi, self.nu, self.gamma, self.branch, self.entries = np.split(self.results, ends[:-1])
+        starts: dict[str, int] = dict(zip(QUANTITIES, [0, *ends[:-1].tolist()], strict=True))
+        self.parts = {name: slice(starts[name], starts[name] + size) for name, size in sizes.items()}
+        self.starts: list[Mapping[str, int]] = []
+        for kind in self.kinds:
+            self.starts.append(dict(starts))
+            for name in ("branch", "entries"):
+                starts[name] += kind.size(name)
+        self._bound = [
+            _Bound(kind, self.results, at, compiled=self.compiled) for kind, at in zip(self.kinds, self.starts, strict=True)
+        ]
+
+    @property
+    def sizes(self) -> dict[str, dict[str, int]]:
+        """Operations and flops of the programs of all kinds, for one constraint each."""
+        return {name: size for kind in self.kinds for name, size in kind.sizes.items()}
+
+    def evaluate(self, state: Array, drives: Array) -> None:
+        """Update phi, nu, branch and entries.
+
+        Args:
+            state: see `Numbering`.
+            drives: c, c_t, c_tt, cos c/2 and sin c/2 of every driver, shape (drivers * 5,).
+        """
+        given = np.concatenate([state, drives])
+        for kind in self._bound:
+            kind.run(WHERE, given)
+
+    def accelerate(self, rates: Array) -> None:
+        """Update gamma at the rates, where the bodies were last evaluated."""
+        for kind in self._bound:
+            kind.run(HOW, rates)
+
+
+class _Bound:
+    """The constraints of a kind as lanes."""
+
+    def __init__(self, kind: ElementType, results: Array, starts: Mapping[str, int], *, compiled: bool) -> None:
+        """Write what is constant, and prepare to write the rest, into an array where every quantity has its start."""
+        self._results, lanes = results, kind.lanes
+        self._executor: Executor = LlvmExecutor(LlvmCode(kind.plan), lanes) if compiled else NumpyExecutor(kind.plan, lanes)
+        for rows, value in kind.constants(starts):
+            results[rows] = value
+        # gathered and scattered by one call each: of some hundred bodies it is the calls that take the time
+        inputs = {name: (kind.inputs[name], read) for name, read in kind.read.items()}
+        outputs = {name: (kind.outputs[name], rows) for name, rows in kind.places(starts).items()}
+        self._taken, self._written = (
+            {name: (self._executor.window(slots), self._executor.arranged(at).copy()) for name, (slots, at) in each.items()}
+            for each in (inputs, outputs)
+        )
+        if kind.geometry:
+            slots = range(kind.geometry_at, kind.geometry_at + len(kind.geometry))
+            self._executor.put(slots, np.array(kind.geometry))
+
+    def run(self, name: str, given: Array) -> None:
+        """Run a program over numbers of the whole mechanism, and write what it gives."""
+        window, places = self._taken[name]
+        window[:] = given[places]
+        if name in self._written:
+            window, places = self._written[name]
+            self._executor.run(name)
+            self._results[places] = window

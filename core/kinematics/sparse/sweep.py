@@ -1,0 +1,299 @@
+"""Sweep a large mechanism as one sparse system, outwards from the design position."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...algebra import Quat, Vec3, quat, vec
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Path, outwards
+from ...primitives.base import Pose, Twist
+from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ..compiled.motion_start import Start, by_ways, start_of
+from ..continuation.step_halving import HALVINGS, MOST_PARTS, TOO_MANY
+from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, LOW, WORSE_BY_PIVOTS
+from ..formulation.body_kinematics import motion_of_frame, motion_of_point
+from ..formulation.formulation import Acceleration
+from .batched_newton import REMEMBERED
+from .error_bound import uncertain
+from .sparse_model import FailedError, SparseModel, Stand
+
+
+def solve_sparse(
+    mechanism: Mechanism | SparseModel,
+    path: Path,
+    points: Sequence[str] = (),
+    bodies: Sequence[str] = (),
+    order: int = 2,
+    tol: float = 1e-12,
+) -> Trajectory:
+    """Solve a mechanism over the samples of a path, as one sparse system.
+
+    Args:
+        mechanism: what to solve; made ready (`SparseModel`) where it is to be solved more than once.
+        points, bodies: names whose motion is wanted.
+        order: 0 for positions, 1 for velocities too, 2 for accelerations too.
+        tol: largest accepted constraint residual, relative to the size of the bodies.
+
+    Returns:
+        The motion; NaN where a sample cannot be reached, and the reason in its message.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
+    """
+    model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
+    wanted = _Wanted(model, points), _Wanted(model, bodies, frames=True)
+    sweep, start = partial(_Sweep, model, path, tol, *wanted, order), start_of(model.mechanism, path)
+    return by_ways(start, model.mechanism, path, lambda each: sweep(each).solve(), compare=np.isfinite(tol))
+
+
+AT_ONCE = 64
+"""Stands whose motions are computed together: one alone takes as many calls of numpy."""
+WORTH = 4
+"""Samples on one side that are worth making tables for: that takes what 12 (43 bodies) to 36 (1,999) save, once for all sweeps."""
+
+
+class _Wanted:
+    """Points whose motion is wanted: of bodies the origins, and how their frames turn."""
+
+    def __init__(self, model: SparseModel, names: Sequence[str], *, frames: bool = False) -> None:
+        m, self.names, self._model = model.mechanism, names, model
+        found = [(name, m.body(name).origin) if frames else (m.point(name).body, m.point(name).position) for name in names]
+        number = {name: k for k, name in enumerate(model.frame.moving)}
+        # what is not among the moving bodies comes after them, and stands still
+        self._body = np.array([number.get(body, len(number)) for body, _ in found], np.intp)
+        self._position = _columns([position for _, position in found], 3)
+        self._arm = _columns([tuple(model.frame.arm(body, position)) for body, position in found], 3)
+        self._frame = _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
+
+    def _taken(self, at: Sequence[Stand]) -> list[Array]:
+        """What their motion follows from: poses, rates and accelerations of their bodies, shapes (7 or 6, stands, names)."""
+        n, found = self._model.bodies, list[Array]()
+        for rows, each in ((7, [k.state for k in at]), (6, [k.rates for k in at]), (6, [k.accelerations for k in at])):
+            whole = np.zeros((rows, len(at), n + 1))
+            whole[:, :, :n] = np.array(each)[:, : rows * n].reshape(len(at), rows, n).swapaxes(0, 1)
+            found.append(whole)
+        found[0][3, :, n] = 1.0
+        return [each[:, :, self._body] for each in found]
+
+    def motions(self, at: Sequence[Stand]) -> Array:
+        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape (stands, components, names)."""
+        poses, rates, accelerations = self._taken(at)
+        moving = (
+            Pose.of(vec([*poses[:3]]), quat(poses[3:])),
+            Twist(vec([*rates[:3]]), vec([*rates[3:]])),
+            Acceleration(vec([*accelerations[:3]]), vec([*accelerations[3:]])),
+        )
+        found: list[Vec3 | Quat] = [*motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)]
+        if self._frame is not None:
+            found += motion_of_frame(quat(self._frame), *moving)
+        shape = len(at), len(self.names)
+        return np.stack([np.broadcast_to(component, shape) for each in found for component in each], axis=1)
+
+
+def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
+    return np.array(rows).reshape(-1, count).T
+
+
+@dataclass
+class _Sweep:
+    """A path through a model, and what is found along it; refused: by sample, how uncertain what is found there is."""
+
+    model: SparseModel
+    path: Path
+    tol: float
+    points: _Wanted
+    bodies: _Wanted
+    order: int
+    start: Start
+    messages: list[str] = field(default_factory=list[str])
+    smallest_pivot: float = np.inf
+    renewed: int = 0
+    refused: dict[int, float] = field(default_factory=dict[int, float])
+
+    def __post_init__(self) -> None:
+        self.by = self.model
+        self.known = [self.model]
+
+    def solve(self) -> Trajectory:
+        """The motion at all samples."""
+        path, n = self.path, len(self.path.times)
+        stands = {name: np.full(n, np.nan) for name in ("closure", "leftover", "iterations")}
+        wanted = (self.points, self.bodies)
+        found = [np.full((n, size, len(each.names)), np.nan) for each, size in zip(wanted, (9, 19), strict=True)]
+        departure = self._departure()
+        for side in outwards(path.times, self.start.time):
+            if departure is None or not len(side):
+                continue
+            followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
+            certain = self._certain(followed)
+            while some := list(islice(certain, AT_ONCE)):
+                reached = [k for _, k in some]
+                for name, values in stands.items():
+                    values[reached] = [getattr(at, name) for at, _ in some]
+                for into, each in zip(found, wanted, strict=True):
+                    if each.names:
+                        into[reached] = each.motions([at for at, _ in some])
+        self._tell_refused()
+        return self._trajectory(found, stands)
+
+    def _departure(self) -> Stand | None:
+        """Return where the samples are followed from; None if that cannot be reached."""
+        model, path, here, start = self.model, self.path, self.model.design, self.start.time
+        try:
+            if way := self.start.lead:
+                here = model.moving(here, 0.0, self._drives(way, 0.0))
+                for there in self._follow(here, way, way.times):
+                    here = there
+                if self.messages:
+                    self.messages[:] = [f"on the way to {self.start.name}: {self.messages[0]}"]
+                    return None
+            return model.moving(here, start, self._drives(path, start))
+        except FailedError as error:
+            self.messages.append(f"the motion cannot start at {path.where(start)}: {error}")
+            return None
+
+    def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
+        """Where the motion stands at each of the times, outwards, until it ends; then there is a message."""
+        drives, many = self.model.drives(path, times), len(times) >= WORTH
+        self.by = self.model
+        before: deque[Stand] = deque([here], REMEMBERED)
+        k = alone = 0
+        while k < len(times):
+            found: list[Stand] = []
+            together = self.by.together if many else None
+            if together and k >= alone:
+                found = together.reach(before, times[k:], drives[:, k:], self.tol)
+                if not found:  # from here on by pivots that are chosen
+                    alone = k + together.width
+                    try:
+                        here = self.by.moving(here, here.time, self._drives(path, here.time))
+                    except FailedError as error:
+                        self._end(here, path, times, k, str(error))
+                        return
+            if not found:
+                here, why = self._reach(here, path, float(times[k]), drives[:, k])
+                if why:
+                    self._end(here, path, times, k, why)
+                    return
+                found = [here]
+                if together and together.outgrown and self.by.together is together:
+                    together.order(self.by)
+            for here in found:
+                if here.time == before[-1].time:
+                    before.pop()
+                before.append(here)
+                self.smallest_pivot = min(self.smallest_pivot, here.pivot)
+                yield here
+                k, by = k + 1, self.by
+                before[-1] = here = self._by_better_rows(here, path)
+                if self.by is not by:  # what was found beyond is not as good
+                    break
+
+    def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> tuple[Stand, str]:
+        """Go to a time, in parts where need be: where that ends, and why before that time."""
+        for _ in range(MOST_PARTS):
+            try:
+                return self.by.reach(here, time, drives, self.tol), ""
+            except FailedError:
+                try:
+                    here = self._by_better_rows(self._part(here, path, time), path)
+                except FailedError as error:
+                    return here, str(error)
+        return here, TOO_MANY
+
+    def _part(self, here: Stand, path: Path, time: float) -> Stand:
+        """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).
+
+        Raises:
+            FailedError: there is none.
+        """
+        last, longer = FailedError(), None
+        for k in range(1, HALVINGS + 1):
+            part = here.time + (time - here.time) * 0.5**k
+            try:
+                found = self.by.reach(here, part, self._drives(path, part), self.tol)
+            except FailedError as error:
+                last, longer = error, None
+                continue
+            if longer is not None:
+                return longer
+            longer = found
+        raise last
+
+    def _certain(self, followed: Iterable[tuple[Stand, int]]) -> Iterator[tuple[Stand, int]]:
+        """Samples, each as soon as the motion stands there, without those that residuals leave uncertain.
+
+        That pivots are small is no reason to refuse one: in large mechanisms many are.
+        """
+        limit = AMPLIFIED * self.tol
+        for here, k in followed:
+            least = min(here.pivot, here.sigmas.min(initial=np.inf))
+            if WORSE_BY_PIVOTS * max(here.closure, EPSILON) > limit * least**2:
+                found = uncertain(self.by, here, self._drives(self.path, here.time))
+                worst = float(np.max(found[: self.order + 1]))
+                if not worst <= limit:  # or it is no number
+                    self.refused[k] = worst
+                    continue
+            yield here, k
+
+    def _tell_refused(self) -> None:
+        if self.refused:
+            worst = max(self.refused, key=self.refused.__getitem__)
+            there = self.path.where(float(self.path.times[worst]))
+            where = f"by up to {self.refused[worst]:.2g} (at {there}), allowed {AMPLIFIED * self.tol:.2g}"
+            why = f"so near a singular pose that residuals leave the pose or its rates uncertain, {where}"
+            self.messages.append(f"refused at {len(self.refused)} samples {why}; keep away from it")
+
+    def _by_better_rows(self, here: Stand, path: Path) -> Stand:
+        """Where it stands; by other rows, where its own are much nearer to singular than they were and others are not."""
+        if not (here.sigmas < LOW * here.high).any():
+            return here
+        found = self.by.anew(here, self._drives(path, here.time), self.known)
+        if found is None:
+            return replace(here, high=here.sigmas)
+        self.by, here = found
+        self.renewed += 1
+        self.known += [self.by] if self.by not in self.known else []
+        return here
+
+    def _drives(self, path: Path, time: float) -> Array:
+        return self.model.drives(path, np.array([time]))[:, 0]
+
+    def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
+        self.smallest_pivot = min(self.smallest_pivot, here.pivot)
+        reason += f"; smallest pivot there {here.pivot:.3g} (zero at a lock-up or dead centre)"
+        self.messages.append(path.ended(here.time, float(times[k]), float(times[k - 1]) if k else None, reason))
+
+    def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array]) -> Trajectory:
+        (points, bodies), unit, order = found, self.model.frame.unit, self.order
+        solved: NDArray[np.bool_] = ~np.isnan(tests["closure"])
+        closure, leftover = (largest_found(tests[name][solved]) * unit for name in ("closure", "leftover"))
+        # rates of place and of rotation stand side by side
+        rates = [np.concatenate([bodies[:, k : k + 3], bodies[:, k + 10 : k + 13]], axis=1) for k in (3, 6)]
+        series = [points[:, 3 * k : 3 * k + 3] for k in range(order + 1)]
+        missing = [None] * (2 - order)
+        return Trajectory(
+            points={name: PointMotion(*(each[:, :, k] for each in series), *missing) for k, name in enumerate(self.points.names)},
+            solved=solved,
+            iterations=np.where(solved, tests["iterations"], 0.0).astype(np.int64),
+            residual=closure,
+            message="; ".join(self.messages),
+            details={
+                **self.model.details,
+                "redundant_residual": leftover,
+                "smallest_pivot": self.smallest_pivot,
+                **({"rows_chosen_anew": self.renewed} if self.renewed else {}),
+            },
+            bodies={
+                name: BodyMotion(bodies[:, :3, k], bodies[:, 9:13, k], *(each[:, :, k] for each in rates[:order]), *missing)
+                for k, name in enumerate(self.bodies.names)
+            },
+        )

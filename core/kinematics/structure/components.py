@@ -1,0 +1,229 @@
+"""A large mechanism in components: sets of bodies that can be solved one after the other, each with those before it given.
+
+Found by matching rows with bodies' columns and the strongly connected sets of bodies that follow from it (block-triangular form). A
+component becomes a mechanism of its own, a section, with names by number: components that are built alike are then equal but for
+their geometry, and share programs.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from graphlib import TopologicalSorter
+
+import numpy as np
+
+from ...algebra import ZERO, vec
+from ...errors import SolveError
+from ...joints import Joint, Kind
+from ...mechanism.drivers import Driver, JointDriver, PointCoordinate
+from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ..formulation.cartesian import COLUMNS, Cartesian
+from ..formulation.constraints import Frames, extent, unit_near
+from ..formulation.formulation import Formulation, row_names
+from ..formulation.parameters import places
+from ..formulation.state_vectors import jacobian
+from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection
+from .redundancy import independent_rows
+
+ORIGIN = "origin "
+"""Before the name of a body: the point of a section that is its internal origin and nothing else."""
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """Bodies that are solved together.
+
+    Attributes:
+        given: moving bodies of components before, that its joints and drivers touch.
+        joints, drivers: those that belong to it.
+    """
+
+    bodies: tuple[str, ...]
+    given: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    drivers: tuple[Driver, ...]
+
+    @property
+    def extent(self) -> float:
+        """A power of two of metres near its size; zero where all its joints are at one point."""
+        points = [point for joint in self.joints for point in joint.points_on()]
+        size = extent(points)
+        return unit_near(size) if size > 0.0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """A component as a mechanism of its own.
+
+    Attributes:
+        unit: of length [m], that of the whole mechanism.
+        given: moving bodies that are solved for elsewhere.
+        origins: place (see `places`) of the internal origin of every moving body.
+    """
+
+    mechanism: Mechanism
+    unit: float
+    given: tuple[str, ...]
+    origins: Mapping[str, str]
+
+    @property
+    def signature(self) -> object:
+        """Equal for sections that are equal but for their geometry."""
+        m = self.mechanism
+        return (
+            m.bodies,
+            tuple((joint.type, joint.bodies, *_besides_geometry(joint)) for joint in m.joints),
+            tuple((point.name, point.body) for point in m.points),
+            m.drivers,
+            tuple(self.origins.items()),
+        )
+
+    def frame(self, mechanism: Mechanism) -> Frames:
+        """How the section is measured, or the same section with its geometry known only later."""
+        value = places(mechanism)
+        fixed = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
+        moving = {name: (1.0 / self.unit) * vec(value[place]) for name, place in self.origins.items()}
+        return Frames(self.unit, fixed | moving, tuple(body.name for body in mechanism.moving if body.name not in self.given))
+
+
+def _besides_geometry(joint: Joint) -> list[object]:
+    """Further fields of a joint, and which of its optional lengths are given."""
+    values = [(each, getattr(joint, each.name)) for each in fields(joint)]
+    return [value is None if "kind" in each.metadata else value for each, value in values if each.name != "name"]
+
+
+def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
+    """The components in an order in which each needs only those before it.
+
+    Raises:
+        SolveError: couplers tie joints together, or the rows cannot be matched with the unknowns.
+    """
+    if mechanism.couplers:
+        raise SolveError(f"mechanism {mechanism.name!r}: couplers tie its components together; solve it as one")
+    formulation = Cartesian.of(mechanism, frame)
+    order = _order(mechanism, formulation)
+    level = {name: k for k, bodies in enumerate(order) for name in bodies}
+    joints: list[list[Joint]] = [[] for _ in order]
+    drivers: list[list[Driver]] = [[] for _ in order]
+    given: list[dict[str, None]] = [{} for _ in order]
+
+    def place(bodies: Sequence[str]) -> int:
+        """The component of the body that is solved last; the others are given there."""
+        moving = [name for name in bodies if name in level]
+        last = max(level[name] for name in moving)
+        given[last] |= dict.fromkeys(name for name in moving if level[name] != last)
+        return last
+
+    for joint in mechanism.joints:
+        joints[place(joint.bodies)].append(joint)
+    for driver in mechanism.drivers:
+        drivers[place(_bodies(mechanism, driver))].append(driver)
+    parts = zip(order, given, joints, drivers, strict=True)
+    return [Component(bodies, tuple(others), tuple(js), tuple(ds)) for bodies, others, js, ds in parts]
+
+
+def _bodies(mechanism: Mechanism, driver: Driver) -> tuple[str, ...]:
+    if isinstance(driver, JointDriver):
+        return mechanism.joint(driver.joint).bodies
+    return (mechanism.point(driver.point).body,) if isinstance(driver, PointCoordinate) else ()
+
+
+def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]]:
+    """Sets of bodies, first what can be solved first."""
+    sparse, graphs = (importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph"))
+    rows = formulation.rows(formulation.configuration(formulation.design))
+    n = formulation.unknowns
+    at = [(k, column) for k, row in enumerate(rows) for column in row]
+    pattern = sparse.coo_array((np.ones(len(at)), tuple(np.array(at).T)), shape=(len(rows), n)).tocsr()
+    row_of: list[int] = graphs.maximum_bipartite_matching(pattern, perm_type="row").tolist()
+    if min(row_of) < 0:
+        raise SolveError(f"mechanism {mechanism.name!r}: its rows cannot be matched with its unknowns; it is not driven enough")
+    # a joint's own coordinate goes with the body that its joint is solved with
+    owner = {name: mechanism.joint(name.rsplit(".", 1)[0]).bodies for name in formulation.coordinates}
+    body_of = [k // COLUMNS for k in range(COLUMNS * len(formulation.bodies))]
+    body_of += [next(formulation.columns[b] // COLUMNS for b in owner[name][::-1] if b in formulation.columns) for name in owner]
+    needs = {(body_of[column], body_of[other]) for column, k in enumerate(row_of) for other in rows[k]}
+    shape = (len(formulation.bodies),) * 2
+    graph = sparse.coo_array((np.ones(len(needs)), tuple(np.array(sorted(needs)).T)), shape=shape)
+    count, set_of = graphs.connected_components(graph, directed=True, connection="strong")
+    before: dict[int, set[int]] = {k: set() for k in range(count)}
+    for body, other in needs:
+        if set_of[body] != set_of[other]:
+            before[int(set_of[body])].add(int(set_of[other]))
+    members: dict[int, list[str]] = {k: [] for k in range(count)}
+    for name, k in zip(formulation.bodies, set_of.tolist(), strict=True):
+        members[k].append(name)
+    return [tuple(members[k]) for k in TopologicalSorter(before).static_order()]
+
+
+def section(
+    component: Component, unit: float, origins: Mapping[str, Vector], points: Sequence[Point], bodies: Sequence[Body]
+) -> Section:
+    """The component with names by number: b0, b1, ... its bodies, g0, ... those given, j0, ... its joints, p0, ... its points.
+
+    Args:
+        origins: internal origin of every moving body, global [m].
+        points: those wanted or driven.
+        bodies: those of its own whose motion is wanted.
+    """
+    own = {name: f"b{k}" for k, name in enumerate(component.bodies)}
+    names = own | {name: f"g{k}" for k, name in enumerate(component.given)}
+    joint_names = {joint.name: f"j{k}" for k, joint in enumerate(component.joints)}
+    point_names = {point.name: f"p{k}" for k, point in enumerate(points)}
+    joints = [
+        joint.changed(name=joint_names[joint.name], i=names.get(joint.i, GROUND), j=names.get(joint.j, GROUND))
+        for joint in component.joints
+    ]
+    named = [replace(point, name=point_names[point.name], body=names.get(point.body, GROUND)) for point in points]
+    drivers: list[Driver] = []
+    for driver in component.drivers:
+        if isinstance(driver, JointDriver):
+            drivers.append(replace(driver, joint=joint_names[driver.joint]))
+        elif isinstance(driver, PointCoordinate):
+            drivers.append(replace(driver, point=point_names[driver.point]))
+    at: dict[str, str] = {}
+    for name, body in names.items():
+        found = next((place for place, point in _joint_places(joints, body) if point == origins[name]), None)
+        if found is None:  # an origin at no joint of the component is a point of its own
+            named.append(Point(f"{ORIGIN}{body}", body, origins[name]))
+            found = f"points.{ORIGIN}{body}.position"
+        at[body] = found
+    wanted = {body.name: body for body in bodies}
+    described = [replace(wanted[name], name=new) if name in wanted else Body(new) for name, new in names.items()]
+    return Section(Mechanism("section", described, joints, named, drivers), unit, tuple(names.values())[len(own) :], at)
+
+
+def _joint_places(joints: Sequence[Joint], body: str) -> list[tuple[str, tuple[float, ...]]]:
+    """Places of the points that joints have on a body."""
+    parts = [(joint.name, part) for joint in joints if body in joint.bodies for part in joint.parts(body)]
+    return [(f"joints.{owner}.{name}", value) for owner, (name, kind, value) in parts if kind is Kind.POSITION]
+
+
+def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:
+    """The rows of a section to solve for, drivers first.
+
+    Raises:
+        SolveError: they are too few.
+    """
+    matrix, drivers = jacobian(formulation), len(mechanism.drivers)
+    kept = independent_rows(matrix, drivers, formulation.conditions)
+    names = row_names(formulation)
+    if len(kept) < formulation.unknowns:
+        raise SolveError(
+            f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can still move at the design "
+            f"position (rank {len(kept)} of {formulation.unknowns}): lock-up, dead centre or too few drivers; shift the design"
+        )
+    taken = set(kept)
+    dropped = tuple(k for k in range(len(matrix)) if k not in taken)
+    found = FreedomAccount(
+        bodies=len(frame.moving),
+        coordinates=COORDINATES * len(frame.moving),
+        equations=sum(joint.rows for joint in mechanism.joints) + len(frame.moving),
+        moving_coordinates=formulation.unknowns,
+        rows=len(matrix) - drivers,
+        rank=len(kept) - drivers,
+        redundant_rows=tuple(names[k] for k in dropped),
+    )
+    return Selection(found, tuple(kept), dropped)

@@ -1,0 +1,266 @@
+"""A mechanism with its numbers taken exactly, and its equations as programs for ball arithmetic.
+
+Coordinates, axes and lengths are fractions: their doubles, or the decimals that print them. What joints make of them (differences,
+directions, lengths) stays a fraction until a root is taken, and is a ball from there on, so nothing is rounded unseen. A joint type
+that calls `math` itself rounds to a double there; the joint types of kincheck do not. Pi of a screw's lead is its double.
+
+Besides the residuals no equation of the primitives is used: the Jacobian is the derivative of the traced residuals, and the unit
+length of the Euler parameters is an equation of its own. Proofs therefore check rows, nu and gamma rather than rest on them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from ...algebra import Scalar, Vec3, quat
+from ...mechanism.mechanism import Mechanism
+from ...primitives.base import GROUND_POSE, Drive
+from ...program import Program, Tape, Traced, program
+from ...program.ball_executor import Ball, flint
+from ...program.derivative import jacobian
+from ..formulation.cartesian import Cartesian
+from ..formulation.constraints import Frames, constraints, frames
+
+Reading = Callable[[float], Fraction]
+"""How a float of a description is understood."""
+
+
+def as_double(x: float) -> Fraction:
+    """The double itself, which is what every engine is given."""
+    return Fraction(x)
+
+
+def as_decimal(x: float) -> Fraction:
+    """The shortest decimal that denotes the double: what a case file says, where it has 15 digits or less and is in SI units."""
+    return Fraction(repr(float(x)))
+
+
+class Exact:
+    """A fraction, or a ball once a root was taken."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    @staticmethod
+    def of(x: Fraction) -> Exact:
+        """The number of a fraction."""
+        return Exact(flint().fmpq(x.numerator, x.denominator))
+
+    @property
+    def ball(self) -> Ball:
+        """The number at the precision of the block around."""
+        return flint().arb(self.value)
+
+    @property
+    def trivial(self) -> float | None:
+        """The number as a float where it is 0, 1 or -1: products with these, and their sums, are exact in double precision."""
+        return next((x for x in (0.0, 1.0, -1.0) if not self._is_ball and self.value == int(x)), None)
+
+    @property
+    def _is_ball(self) -> bool:
+        return isinstance(self.value, flint().arb)
+
+    def __add__(self, b: Any) -> Exact:
+        return Exact(self.value + _value(b))
+
+    def __sub__(self, b: Any) -> Exact:
+        return Exact(self.value - _value(b))
+
+    def __mul__(self, b: Any) -> Any:
+        return NotImplemented if isinstance(b, Vec3) else Exact(self.value * _value(b))
+
+    def __truediv__(self, b: Any) -> Exact:
+        return Exact(self.value / _value(b))
+
+    def __rsub__(self, a: Any) -> Exact:
+        return Exact(_value(a) - self.value)
+
+    def __rtruediv__(self, a: Any) -> Exact:
+        return Exact(_value(a) / self.value)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self) -> Exact:
+        return Exact(-self.value)
+
+    def __abs__(self) -> Exact:
+        return Exact(abs(self.value))
+
+    # choices of a description (which axis is most nearly perpendicular) may fall either way where balls overlap
+    def __lt__(self, b: Any) -> bool:
+        return bool((self - b).ball < 0)
+
+    def __gt__(self, b: Any) -> bool:
+        return bool((self - b).ball > 0)
+
+    def __le__(self, b: Any) -> bool:
+        return bool((self - b).ball <= 0)
+
+    def __ge__(self, b: Any) -> bool:
+        return bool((self - b).ball >= 0)
+
+    def __bool__(self) -> bool:
+        return bool(self.value != 0)
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def sqrt(self) -> Exact:
+        """The square root, a fraction where it is one; of a ball around zero, that of its part >= 0."""
+        if not self._is_ball and self.value.p.is_square() and self.value.q.is_square():
+            return Exact(self.value.sqrt())
+        return Exact(self.ball.nonnegative_part().sqrt())
+
+    def arctan2(self, x: Any) -> Exact:
+        """The angle of the direction (x, self) [rad]; numpy asks for it by this name."""
+        return Exact(flint().arb.atan2(self.ball, flint().arb(_value(x))))
+
+
+def _value(b: Any) -> Any:
+    if isinstance(b, Exact):
+        return b.value
+    return Exact.of(Fraction(b)).value if math.isfinite(b) else flint().arb(b)
+
+
+def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
+    """The mechanism with the numbers of joints, points, couplers and drivers as `Exact`; joints do not see those of bodies."""
+
+    def read(value: Any) -> Any:
+        if isinstance(value, float):
+            return Exact.of(reading(value))
+        if isinstance(value, tuple):
+            return tuple(map(read, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        return Exact.of(Fraction(value)) if isinstance(value, int) and not isinstance(value, bool) else value
+
+    def each(item: Any) -> Any:
+        return replace(item, **{f.name: read(getattr(item, f.name)) for f in fields(item)})
+
+    return Mechanism(
+        mechanism.name,
+        mechanism.bodies,
+        [*map(each, mechanism.joints)],
+        [*map(each, mechanism.points)],
+        [*map(each, mechanism.drivers)],
+        [*map(each, mechanism.couplers)],
+    )
+
+
+class _Inputs:
+    """The slots of the programs: state, drivers, then geometry as it is met."""
+
+    def __init__(self) -> None:
+        self.tape = Tape()
+        self.count = 0
+        self.geometry: list[Ball] = []
+
+    def vector(self, count: int) -> list[Traced]:
+        first, self.count = self.count, self.count + count
+        return [self.tape.input(slot) for slot in range(first, self.count)]
+
+    def lift(self, value: Any) -> Any:
+        """A value with every exact number in it made an input of the programs, or a literal where it is trivial."""
+        if isinstance(value, Exact):
+            return self._number(value)
+        if isinstance(value, Mapping):
+            return {key: self.lift(each) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
+        if is_dataclass(value) and not isinstance(value, type):
+            return replace(value, **{f.name: self.lift(getattr(value, f.name)) for f in fields(value)})
+        if isinstance(value, float) and value not in (0.0, 1.0, -1.0):
+            return self._number(Exact.of(Fraction(value)))
+        return value
+
+    def _number(self, value: Exact) -> Scalar:
+        if value.trivial is not None:
+            return value.trivial
+        self.geometry.append(value.ball)
+        return self.vector(1)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class ExactEquations:
+    """What a proof needs of a mechanism. All programs read: the state, then the drivers, then `geometry`.
+
+    Attributes:
+        state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler parameters "q BODY", coordinates
+            "x JOINT.FREEDOM" [units or rad].
+        drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its half.
+        geometry: values of the further inputs.
+        residuals: as many as there are scalars in the state: the kept rows, then the lengths of the Euler parameters.
+        derivative: their Jacobian; the slot of an entry is row * size + column, zeros are left out.
+        points: how far each point has come from the design [m], three slots each.
+        tests: the rows that were left out (`left_out` of them), then the branch tests.
+    """
+
+    frame: Frames
+    state: Mapping[str, int]
+    drivers: tuple[str, ...]
+    geometry: Sequence[Ball]
+    residuals: Program
+    derivative: Program
+    points: Program
+    tests: Program
+    left_out: int
+
+    @property
+    def size(self) -> int:
+        """Scalars of the state."""
+        return sum(self.state.values())
+
+
+def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str], kept: Sequence[int]) -> ExactEquations:
+    """The programs of an exact mechanism.
+
+    Args:
+        mechanism: as `exact_mechanism` gives it; called at the precision that the geometry is to have.
+        drivers: names of those that move.
+        points: names of the points that are wanted.
+        kept: the rows that are solved; the others are tested.
+    """
+    frame, inputs = frames(mechanism), _Inputs()
+    design = Cartesian.of(mechanism, frame).design
+    parts = {name: inputs.vector(len(value)) for name, value in design.items()}
+    state = [x for part in parts.values() for x in part]
+    drives = {name: _drive(inputs) for name in drivers}
+    formulation = Cartesian([inputs.lift(c) for c in constraints(mechanism, frame, drives)], frame.moving)
+    at = formulation.configuration(parts)
+    phi = formulation.phi(at)
+    lengths = [0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0) for q in (quat(p) for n, p in parts.items() if n[0] == "q")]
+    residuals = [*(phi[k] for k in kept), *lengths]
+    taken = set(kept)
+    left_out = [each for k, each in enumerate(phi) if k not in taken]
+    moved: list[Scalar] = []
+    for name in points:
+        point = mechanism.point(name)
+        pose, arm = at.poses.get(point.body, GROUND_POSE), inputs.lift(frame.arm(point.body, point.position))
+        moved += inputs.lift(Exact.of(Fraction(frame.unit))) * (pose.u + pose.swing(arm))
+    entries = {
+        row * len(state) + column: value
+        for row, gradient in enumerate(jacobian(inputs.tape, residuals, state))
+        for column, value in gradient.items()
+    }
+    return ExactEquations(
+        frame,
+        {name: len(value) for name, value in design.items()},
+        tuple(drivers),
+        inputs.geometry,
+        _program("residuals", inputs.tape, residuals),
+        program("derivative", inputs.tape, entries),
+        _program("points", inputs.tape, moved),
+        _program("tests", inputs.tape, [*left_out, *formulation.branch(at)]),
+        len(left_out),
+    )
+
+
+def _drive(inputs: _Inputs) -> Drive:
+    c, half_cos, half_sin = inputs.vector(3)
+    return Drive(c, 0.0, 0.0, half_cos, half_sin)
+
+
+def _program(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
+    return program(name, tape, dict(enumerate(values)))

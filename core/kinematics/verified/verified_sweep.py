@@ -1,0 +1,116 @@
+"""Proved samples of a sweep: the native solution of each sample, and the ball that is proved to hold the true one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from time import perf_counter
+
+import numpy as np
+
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Path, outwards
+from ...program.ball_executor import Ball, flint, precision
+from ...trajectory import Array, Trajectory
+from ..compiled.compiled_model import compile_model
+from ..compiled.motion_start import start_of
+from ..compiled.request import Request
+from ..continuation.row_exchange import chosen_at
+from ..continuation.sweep import sweep
+from ..formulation.cartesian import Cartesian
+from ..formulation.constraints import frames
+from ..formulation.formulation import row_names
+from ..formulation.state_vectors import displaced, state_of
+from .exact import Reading, equations, exact_mechanism
+from .krawczyk import Enclosure, UnprovedError, enclose
+
+Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]
+"""Value from the design, velocity and acceleration [SI] of each moving driver at every sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proofs:
+    """Proofs of all samples.
+
+    Attributes:
+        samples: in the order of the path.
+        seconds: of each sample, without the native solution [s].
+        native: the native solution, from which the proofs start; they do not rest on it.
+        rows: the equations that the proofs are about, as "joint: primitive".
+        redundant: those that were left out, because the others say the same at the design position.
+        others: by sample, those left out where the choice at the design is worse than need be.
+    """
+
+    samples: Sequence[Enclosure | UnprovedError]
+    seconds: Sequence[float]
+    native: Trajectory
+    rows: Sequence[str]
+    redundant: Sequence[str]
+    others: Mapping[int, Sequence[str]]
+
+
+def prove(
+    mechanism: Mechanism, path: Path, points: Sequence[str], drives: Drives, reading: Reading, bits: int, tol: float
+) -> Proofs:
+    """Prove the samples of a path.
+
+    Args:
+        points: names of the points whose motion is wanted.
+        drives: the exact values of the moving drivers, which the path has as doubles.
+        reading: how the numbers of the mechanism are understood.
+        bits: working precision.
+        tol: of the native solution; see `solve`.
+
+    Raises:
+        SolveError: as `solve`.
+        KincheckError: python-flint is not installed.
+    """
+    flint()
+    model = compile_model(mechanism, Request(tuple(path.motions), tuple(points), tuple(body.name for body in mechanism.moving)))
+    native = sweep(model, path, tol)
+    poses = _states(mechanism, native, path.times, start_of(mechanism, path).time)
+    samples: list[Enclosure | UnprovedError] = []
+    seconds: list[float] = []
+    others: dict[int, Sequence[str]] = {}
+    names = row_names(Cartesian.of(mechanism, model.frame))
+    with precision(bits):
+        exact, kept = exact_mechanism(mechanism, reading), model.selection.chosen
+        traced = {kept: equations(exact, tuple(drives), points, kept)}
+        unit = traced[kept].frame.unit
+        units = [1 if mechanism.driver(name).turns else Fraction(unit) for name in drives]
+        for k, reached in enumerate(native.solved):
+            started = perf_counter()
+            driven = [[_ball(x / unit) for x in drives[name][k]] for name, unit in zip(drives, units, strict=True)]
+            try:
+                if not reached:
+                    raise UnprovedError(f"there is no approximate pose to start from: {native.message}")
+                change = {name: float(drives[name][k][0]) for name in drives}
+                rows = chosen_at(mechanism, change, poses[k], kept) if model.selection.dropped else kept
+                if rows not in traced:
+                    traced[rows] = equations(exact, tuple(drives), points, rows)
+                if rows != kept:
+                    others[k] = [names[row] for row in range(len(names)) if row not in rows]
+                samples.append(enclose(traced[rows], points, poses[k], driven, bits))
+            except UnprovedError as error:
+                samples.append(error)
+            seconds.append(perf_counter() - started)
+    solved, redundant = ([names[k] for k in each] for each in (kept, model.selection.dropped))
+    return Proofs(samples, seconds, native, solved, redundant, others)
+
+
+def _ball(x: Fraction) -> Ball:
+    return flint().arb(flint().fmpq(x.numerator, x.denominator))
+
+
+def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float = 0.0) -> Array:
+    """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies, shape (n, size)."""
+    frame = frames(mechanism)
+    poses = displaced(mechanism, frame, {name: (motion.r, motion.p) for name, motion in native.bodies.items()})
+    state = state_of(Cartesian.of(mechanism, frame), mechanism, frame, poses, {})
+    for turn in (vector[0] for name, vector in state.items() if name.startswith("x ") and name.endswith(".rotation")):
+        # turns are counted from the start outwards; a sweep so coarse that they are miscounted fails to be proved
+        for side in outwards(times, start):
+            outward = side[native.solved[side]]
+            turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
+    return np.stack([x for vector in state.values() for x in vector], axis=1)

@@ -1,0 +1,1 @@
+"""Mechanism: the description of bodies, joints, drivers and motions. It computes nothing."""

@@ -1,0 +1,211 @@
+"""Mechanism: bodies, points, joints and drivers as data. Validation of names and shapes, no numerics.
+
+All points and axes are global coordinates at the design position, SI units, as in a table of hardpoints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, TypeAlias
+
+from ..errors import MechanismError, Phrase, unknown
+from ..input_checks import held, require_finite, triple
+from ..joints.base import Joint, Kind, unit
+from ..joints.coupler import Coupler
+from ..joints.gap import gap
+from .drivers import Driver, JointDriver, PointCoordinate
+
+GROUND = "ground"
+"""The name of the global frame; it can be used like a body and needs no declaration."""
+
+Vector: TypeAlias = tuple[float, float, float]
+# How far a joint between fixed bodies may be off [m]: no output is held to less, unless a case says so.
+HOLDS = 1e-9
+FOUR_NUMBERS = "four numbers, e0 first"
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A rigid body and its reference frame at the design position.
+
+    Attributes:
+        origin: reference point, global [m].
+        euler_parameters: e0..e3 of the rotation body -> global [-]; normalised to length one.
+        fixed: the body is part of the ground; it costs nothing and can carry joints.
+    """
+
+    name: str
+    origin: Vector = (0.0, 0.0, 0.0)
+    euler_parameters: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        who = f"body {self.name!r}: origin"
+        object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
+        require_finite(who, self.origin, Kind.POSITION.value)
+        p = held(who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS)
+        require_finite(who, p, FOUR_NUMBERS)
+        length = math.sqrt(sum(e * e for e in p))
+        # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
+        if not abs(length - 1.0) < 1e-3:
+            raise MechanismError(
+                f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected four numbers of "
+                "length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
+            )
+        object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of a body whose motion is wanted: position global at design [m]."""
+
+    name: str
+    body: str
+    position: Vector
+
+    def __post_init__(self) -> None:
+        who = f"point {self.name!r}: position"
+        object.__setattr__(self, "position", triple(who, self.position, Kind.POSITION.value))
+        require_finite(who, self.position, Kind.POSITION.value)
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A named set of bodies, joints, points and drivers.
+
+    Attributes:
+        grounded: joints between two fixed bodies, as CAD exports have them. They are taken out of `joints`: they hold whatever
+            moves, and no engine has rows for them.
+
+    Raises:
+        MechanismError: a name is used twice, something refers to a name that does not exist, or a joint between fixed bodies does
+            not hold at the design position, or is driven or coupled.
+    """
+
+    name: str
+    bodies: Sequence[Body]
+    joints: Sequence[Joint]
+    points: Sequence[Point] = field(default=())
+    drivers: Sequence[Driver] = field(default=())
+    couplers: Sequence[Coupler] = field(default=())
+    grounded: Sequence[Joint] = field(default=())
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", (*self.joints, *self.grounded))
+        for what in ("bodies", "joints", "points", "drivers", "couplers"):
+            object.__setattr__(self, what, tuple(getattr(self, what)))
+            _unique(what, [each.name for each in getattr(self, what)])
+        if any(body.name == GROUND for body in self.bodies):
+            raise MechanismError(f"body {GROUND!r} exists by itself; give the fixed body another name or leave it out", "bodies")
+        known = {GROUND: None} | dict.fromkeys(body.name for body in self.bodies)
+        for joint in self.joints:
+            for name in joint.bodies:
+                _known(f"joint {joint.name!r} ({joint.type})", "body", name, known, f"joints.{joint.name}.bodies")
+        self._leave_out_grounded()
+        for point in self.points:
+            _known(f"point {point.name!r}", "body", point.body, known, f"points.{point.name}.body")
+        for coupler in self.couplers:
+            for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
+                who, key = f"joint {coupler.name!r} ({coupler.type})", f"joints.{coupler.name}.joints"
+                _known(who, "joint", name, self._named["joints"], key)
+                joint = self.joint(name)
+                if freedom not in joint.freedoms:
+                    raise MechanismError(
+                        f"{who}: joint {name!r} is {joint.type} and has no {freedom} to couple; "
+                        f"its freedoms: {', '.join(joint.freedoms) or 'none'}",
+                        key,
+                    )
+        for driver in self.drivers:
+            if isinstance(driver, PointCoordinate):
+                key = f"drivers.{driver.name}.point"
+                _known(f"driver {driver.name!r}", "point", driver.point, self._named["points"], key)
+                if self.is_fixed(self.point(driver.point).body):
+                    raise MechanismError(
+                        f"driver {driver.name!r}: point {driver.point!r} is on {self.point(driver.point).body!r}, which is "
+                        "fixed; drive a point of a moving body",
+                        key,
+                    )
+            elif isinstance(driver, JointDriver):
+                key = f"drivers.{driver.name}.joint"
+                _known(f"driver {driver.name!r}", "joint", driver.joint, self._named["joints"], key)
+                driver.check(self.joint(driver.joint))
+
+    def _leave_out_grounded(self) -> None:
+        """Part the joints that can move from those that cannot."""
+        still = tuple(joint for joint in self.joints if all(map(self.is_fixed, joint.bodies)))
+        object.__setattr__(self, "grounded", still)
+        if not still:
+            return
+        names = {joint.name for joint in still}
+        object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint.name not in names))
+        needed = {driver.joint: f"driver {driver.name!r}" for driver in self.drivers if isinstance(driver, JointDriver)}
+        needed |= {name: f"joint {coupler.name!r} ({coupler.type})" for coupler in self.couplers for name in coupler.joints}
+        for joint in still:
+            who = f"{joint}: {joint.i!r} and {joint.j!r} are both fixed"
+            if joint.name in needed:
+                raise MechanismError(
+                    f"{who}, and {needed[joint.name]} needs it to move; free one of them", f"joints.{joint.name}.bodies"
+                )
+            if (off := gap(joint)) > HOLDS:
+                raise MechanismError(
+                    Phrase(
+                        f"{who}, and at the design position it is off by ",
+                        float(f"{off:.3g}"),
+                        "; correct its length, free one of them or remove the joint",
+                    ),
+                    f"joints.{joint.name}",
+                )
+
+    def is_fixed(self, name: str) -> bool:
+        """Whether the body of that name is the ground or fixed to it."""
+        return name == GROUND or self.body(name).fixed
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        return self._named["bodies"][name]
+
+    def joint(self, name: str) -> Joint:
+        """The joint of that name."""
+        return self._named["joints"][name]
+
+    def point(self, name: str) -> Point:
+        """The point of that name."""
+        return self._named["points"][name]
+
+    def driver(self, name: str) -> Driver:
+        """The driver of that name."""
+        return self._named["drivers"][name]
+
+    def design_value(self, name: str) -> float:
+        """The value of a driver at the design position, as its values are given: the coordinate of its point [m], or zero."""
+        driver = self.driver(name)
+        if not isinstance(driver, PointCoordinate) or driver.relative:
+            return 0.0
+        return sum((d * x for d, x in zip(unit(driver.direction), self.point(driver.point).position, strict=True)), 0.0)
+
+    @cached_property
+    def _named(self) -> Mapping[str, Mapping[str, Any]]:
+        """What there is of each kind, by name."""
+        all_of = {"bodies": self.bodies, "joints": (*self.joints, *self.grounded), "points": self.points, "drivers": self.drivers}
+        return {what: {each.name: each for each in found} for what, found in all_of.items()}
+
+    @property
+    def moving(self) -> tuple[Body, ...]:
+        """The bodies that are not fixed, in order."""
+        return tuple(body for body in self.bodies if not body.fixed)
+
+
+def _unique(what: str, names: Sequence[str]) -> None:
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise MechanismError(f"{what}: the name {min(twice)!r} is used more than once; names must be unique", what)
+
+
+def _known(who: str, what: str, name: str, known: Mapping[str, Any], key: str) -> None:
+    if name in known:
+        return
+    raise MechanismError(f"{who}: {unknown(what, name, known)}", key)

@@ -1,0 +1,242 @@
+"""Motions: how a driver's value goes with time. Each gives the value and its first two derivatives.
+
+Values are measured from the design position [m or rad]; times are in seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MechanismError
+from ..input_checks import finite, held
+from ..trajectory import Array
+
+ROUNDED_TIME = 1e-12
+"""A time may lie outside a motion's span by this part of its numbers: the rounding of a time, and nothing that anybody writes."""
+
+
+class Measure(Enum):
+    """What a field of a motion is measured in; tells a reader which unit applies."""
+
+    DRIVER = "driver units"
+    DRIVER_RATE = "driver units per second"
+    ANGLE = "an angle"
+    FREQUENCY = "Hz"
+    TIME = "s"
+
+
+def measured(measure: Measure, **options: Any) -> Any:
+    """A field of a motion [m or rad, rad, Hz, s]."""
+    return field(metadata={"measure": measure}, **options)
+
+
+@dataclass(frozen=True)
+class Motion(ABC):
+    """Base of the motions. Declaring one with a type registers it; case files name it."""
+
+    type: ClassVar[str]
+    registry: ClassVar[dict[str, type[Motion]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        if "type" in cls.__dict__:
+            Motion.registry[cls.type] = cls
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The times it is given for [s]."""
+        return -math.inf, math.inf
+
+    @abstractmethod
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Value, velocity and acceleration at times t [s], each of t's shape."""
+
+
+@dataclass(frozen=True)
+class Ramp(Motion):
+    """value = rate * t; rate in driver units per second."""
+
+    type = "ramp"
+    rate: float = measured(Measure.DRIVER_RATE)
+
+    def __post_init__(self) -> None:
+        _finite("ramp", rate=self.rate)
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        return self.rate * t, np.full_like(t, self.rate), np.zeros_like(t)
+
+
+@dataclass(frozen=True)
+class Sine(Motion):
+    """value = amplitude * sin(2 pi frequency t + phase); frequency in Hz, phase an angle."""
+
+    type = "sine"
+    amplitude: float = measured(Measure.DRIVER)
+    frequency: float = measured(Measure.FREQUENCY)
+    phase: float = measured(Measure.ANGLE, default=0.0)
+
+    def __post_init__(self) -> None:
+        _finite("sine", amplitude=self.amplitude, frequency=self.frequency, phase=self.phase)
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        omega = 2.0 * math.pi * self.frequency
+        s, c = np.sin(omega * t + self.phase), np.cos(omega * t + self.phase)
+        return self.amplitude * s, self.amplitude * omega * c, -self.amplitude * omega**2 * s
+
+
+@dataclass(frozen=True)
+class Table(Motion):
+    """The natural cubic spline through values at increasing times [s]: twice differentiable, so that accelerations exist.
+
+    Outside the table the end pieces go on.
+    """
+
+    type = "table"
+    times: tuple[float, ...] = measured(Measure.TIME)
+    values: tuple[float, ...] = measured(Measure.DRIVER)
+
+    def __post_init__(self) -> None:
+        for name in ("times", "values"):  # lists and arrays may change, motions do not
+            given = getattr(self, name)
+            object.__setattr__(self, name, held(f"table motion: {name}", given, None, "as many numbers as samples"))
+        if len(self.times) != len(self.values) or len(self.times) < 2:
+            raise MechanismError(
+                f"table motion: {len(self.times)} times and {len(self.values)} values, expected as many of each, two or more; "
+                "give a value for each time"
+            )
+        if not all(map(finite, (*self.times, *self.values))):
+            raise MechanismError("table motion: a time or value is not finite; give numbers")
+        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise MechanismError("table motion: times do not increase; sort them and remove repeats")
+
+    @property
+    def span(self) -> tuple[float, float]:
+        return self.times[0], self.times[-1]
+
+    @cached_property
+    def _spline(self) -> Any:
+        # slow to import, and rarely wanted
+        from scipy.interpolate import CubicSpline  # pyright: ignore[reportMissingTypeStubs]
+
+        return CubicSpline(self.times, self.values, bc_type="natural")
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        return self._spline(t), self._spline(t, 1), self._spline(t, 2)
+
+
+@dataclass(frozen=True)
+class Absolute(Motion):
+    """A motion that gives a driver's absolute value, measured from the design value as all motions are on the way."""
+
+    motion: Motion
+    design: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        return self.motion.span
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        value, velocity, acceleration = self.motion.at(t)
+        return value - self.design, velocity, acceleration
+
+
+def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:
+    """Motions of drivers, by name, as changes from their design values, which are given where they are not zero."""
+    there = {name: motion for name, motion in motions.items() if name in design and not isinstance(motion, Absolute)}
+    return {**motions, **{name: Absolute(motion, design[name]) for name, motion in there.items()}}
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The way a mechanism is driven: the motions of its drivers over time; drivers without a motion hold their design value.
+
+    Two are equal where motions and times are, to the last bit. The times do not change.
+
+    Attributes:
+        motions: by driver name.
+        times: of the samples, in the order wanted [s], shape (n,).
+        design: values of drivers at the design position where they are not zero; for messages.
+    """
+
+    motions: Mapping[str, Motion]
+    times: Array
+    design: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Path) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    @cached_property
+    def _content(self) -> tuple[Any, ...]:
+        return tuple(self.motions.items()), self.times.tobytes(), tuple(self.design.items())
+
+    @property
+    def ours(self) -> bool:
+        """Whether all motions are of this module, of numbers that do not change: what is equal then means the same."""
+        motions = (each.motion if isinstance(each, Absolute) else each for each in self.motions.values())
+        try:
+            hash(self._content)
+        except TypeError:  # a number given as an array
+            return False
+        return all(type(each).__module__ == __name__ for each in motions)
+
+    def where(self, t: float) -> str:
+        """The values of the moving drivers at time t, to read."""
+        values = self.drive(list(self.motions), np.array([t]))[0, :, 0]
+        named = zip(self.motions, values, strict=True)
+        return ", ".join(f"{name} = {self.design.get(name, 0.0) + value:.9g}" for name, value in named)
+
+    def ended(self, here: float, wanted: float, last: float | None, reason: str) -> str:
+        """Says that the motion cannot be followed to a wanted time, how far it can, and the last sample reached if there is one."""
+        reached = "no sample reached on this side" if last is None else f"last reachable sample at {self.where(last)}"
+        return (
+            f"cannot be followed beyond {self.where(here)} (wanted {self.where(wanted)}): {reason}; {reached}; "
+            "shorten the sweep or drive another coordinate"
+        )
+
+    def drive(self, names: Sequence[str], t: Array) -> Array:
+        """Value, velocity and acceleration of the named drivers at times t, shape (3, names, *t.shape)."""
+        still = (np.zeros_like(t),) * 3
+        return np.stack([np.stack(self.motions[name].at(t) if name in self.motions else still) for name in names], axis=1)
+
+    def values(self, t: Array) -> Array:
+        """Return the moving drivers' values from the design at times t, shape (drivers, n)."""
+        return np.array([motion.at(t)[0] for motion in self.motions.values()]).reshape(-1, len(t))
+
+    def covers(self, t: float) -> bool:
+        """Return whether all motions are given for time t, up to its rounding."""
+        return all(_within(motion.span, t) for motion in self.motions.values())
+
+    def lead_in(self, to: float) -> Path:
+        """Return the straight way of all drivers from the design, at time zero, to where they are at a time, at time one."""
+        values = self.values(np.array([to]))[:, 0].tolist()
+        return Path({name: Ramp(value) for name, value in zip(self.motions, values, strict=True)}, np.ones(1))
+
+
+def _within(span: tuple[float, float], t: float) -> bool:
+    low, high = span
+    rounding = ROUNDED_TIME * max(abs(t), *(abs(each) for each in span if math.isfinite(each)), 0.0)
+    return low - rounding <= t <= high + rounding
+
+
+def outwards(times: Array, start: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The samples after the start, those at it among them, and those before it: indices, the nearest first, equal ones in order."""
+    nearest = np.argsort(np.abs(times - start), kind="stable")
+    after = times[nearest] >= start
+    return nearest[after], nearest[~after]
+
+
+def _finite(who: str, **numbers: Any) -> None:
+    for name, value in numbers.items():
+        if not finite(value):
+            raise MechanismError(f"{who} motion: {name} is {value!r}; give a finite number")

@@ -1,0 +1,173 @@
+"""Drawings: what the page draws of a scene. Hardpoints by body, links between those of one body, rods between bodies.
+
+A body is where its frame is: hardpoints are in body coordinates, and the page puts them where the poses say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+from ..algebra import (Vec3, quat, rotation_less_identity, vec)
+from ..joints.base import unit
+from ..mechanism.mechanism import GROUND
+from ..harness.record import (Scene, SceneBody, SceneJoint)
+from .axis import Axis
+
+MARKS = {
+    "revolute": "hinge",
+    "screw": "hinge",
+    "cylindrical": "slide",
+    "translational": "slide",
+    "spherical": "ball",
+    "universal": "cross",
+    "constant_velocity": "cross",
+}
+"""How a joint is marked, by type; others get a mark that stands for any joint."""
+
+# Up to this many hardpoints every one is joined with every other, as arms are drawn; more would be a tangle, and get a hub.
+ALL_JOINED = 4
+# Hardpoints of one body closer than this are one [m]: tables are given to a tenth of a millimetre at best.
+SAME = 1e-6
+
+
+@dataclass
+class Drawing:
+    """What is drawn, as the page's script reads it; places are indices of `nodes`, bodies indices of `bodies`.
+
+    Attributes:
+        bodies: name, whether fixed, where the axes are drawn (body frame), and poses: origins r [m] and Euler parameters p,
+            one for each frame of the scene or one only.
+        nodes: body, and x, y, z in its frame [m].
+        links: two nodes of one body.
+        rods: two nodes of two bodies.
+        marks: node, kind of mark, axis in the body's frame or null, whether the joint is on something fixed.
+        labels: two nodes, between which the text stands.
+        paths: nodes whose way over the frames is drawn.
+        steps: what is said of each frame.
+        start: the frame closest to the design position, shown first.
+        joints: name, type and bodies of every joint, in words.
+        caption: whence the poses are, or why there are none.
+    """
+
+    bodies: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    nodes: list[tuple[int, float, float, float]] = field(default_factory=list[tuple[int, float, float, float]])
+    links: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    rods: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    marks: list[tuple[int, str, list[float] | None, bool]] = field(default_factory=list[tuple[int, str, list[float] | None, bool]])
+    labels: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
+    paths: list[int] = field(default_factory=list[int])
+    steps: list[str] = field(default_factory=list[str])
+    start: int = 0
+    joints: list[tuple[str, str, str]] = field(default_factory=list[tuple[str, str, str]])
+    caption: str = ""
+
+
+def drawing(scene: Scene, axis: Axis) -> Drawing:
+    """The drawing of a scene, its frames told by the values of the axis."""
+    return _Draughtsman(scene, axis).drawn
+
+
+class _Draughtsman:
+    def __init__(self, scene: Scene, axis: Axis) -> None:
+        ground = SceneBody(name=GROUND, fixed=True, origin=[0.0, 0.0, 0.0], euler_parameters=[1.0, 0.0, 0.0, 0.0])
+        self.bodies = [ground, *scene.bodies]
+        self.numbers = {body.name: k for k, body in enumerate(self.bodies)}
+        self.drawn = Drawing()
+        for joint in scene.joints:
+            self._joint(joint)
+        for point in scene.points:
+            node = self._node(point.body, point.position)
+            self._label(node, node, point.name)
+            if point.output and scene.frames:
+                self.drawn.paths.append(node)
+        self.drawn.bodies = [self._body(k) for k in range(len(self.bodies))]
+        self.drawn.steps = [f"sample {k} · {axis.at(k)}".removesuffix(" · ") for k in scene.frames]
+        self.drawn.start = min(range(len(scene.frames)), key=self._from_design, default=0)
+        solved = f"Poses at {len(scene.frames)} of {len(axis.values)} samples, by the native solver. " if scene.frames else ""
+        self.drawn.caption = solved + (f"{scene.message[0].upper()}{scene.message[1:]}." if scene.message else "")
+
+    def _from_design(self, frame: int) -> float:
+        """How far the bodies are from the design position [m + -], to compare frames by."""
+        posed = [body for body in self.bodies if body.r]
+        return sum(math.dist(each.r[frame], each.origin) + math.dist(each.p[frame], each.euler_parameters) for each in posed)
+
+    def _node(self, body: str, position: Sequence[float]) -> int:
+        """The hardpoint of a body there, a new one if there is none."""
+        number = self.numbers[body]
+        arm = vec(position) - vec(self.bodies[number].origin)
+        local = _in_body(self.bodies[number], arm)
+        for k, (other, *place) in enumerate(self.drawn.nodes):
+            if other == number and all(abs(a - b) < SAME for a, b in zip(place, local, strict=True)):
+                return k
+        self.drawn.nodes.append((number, *local))
+        return len(self.drawn.nodes) - 1
+
+    def _joint(self, joint: SceneJoint) -> None:
+        i, j = joint.bodies
+        self.drawn.joints.append((joint.name, joint.type.replace("_", " "), f"{i} – {j}"))
+        if not joint.points:
+            return  # it has directions only and is nowhere in particular
+        first, second = self._node(i, joint.points[0]), self._node(j, joint.points[-1])
+        if len(joint.points) > 1:
+            self._label(first, second, joint.name)
+            self.drawn.rods.append((first, second))
+            self._mark(first, "end", None, i)
+            self._mark(second, "end", None, j)
+        else:
+            self._label(first, first, joint.name)
+            axis = list(_in_body(self.bodies[self.numbers[i]], unit(joint.axes[0]))) if joint.axes else None
+            self._mark(first, MARKS.get(joint.type, "other"), axis, i, j)
+
+    def _mark(self, node: int, kind: str, axis: list[float] | None, *bodies: str) -> None:
+        self.drawn.marks.append((node, kind, axis, any(self.bodies[self.numbers[name]].fixed for name in bodies)))
+
+    def _label(self, a: int, b: int, text: str) -> None:
+        """A label; what has the same place shares one."""
+        for k, (*place, said) in enumerate(self.drawn.labels):
+            if place == [a, b]:
+                if text not in said.split(" · "):
+                    self.drawn.labels[k] = (a, b, f"{said} · {text}")
+                return
+        self.drawn.labels.append((a, b, text))
+
+    def _body(self, number: int) -> dict[str, Any]:
+        """A body for the page; joins its hardpoints if it moves, a single one with its origin, if that was chosen."""
+        body = self.bodies[number]
+        if not body.fixed:
+            mine = [k for k, (other, *_) in enumerate(self.drawn.nodes) if other == number]
+            if len(mine) == 1 and any(body.origin):  # the global origin is that of bodies which were given none
+                mine = sorted({*mine, self._node(body.name, body.origin)})
+            self._link(number, mine)
+        frame = self._frame([vec(place) for other, *place in self.drawn.nodes if other == number])
+        r, p = body.r or [body.origin], body.p or [body.euler_parameters]
+        return {"name": body.name, "fixed": body.fixed, "frame": frame, "r": r, "p": p}
+
+    def _link(self, number: int, nodes: Sequence[int]) -> None:
+        if len(nodes) <= ALL_JOINED:
+            self.drawn.links += combinations(nodes, 2)
+            return
+        self.drawn.nodes.append((number, *_middle([vec(self.drawn.nodes[k][1:]) for k in nodes])))
+        self.drawn.links += [(k, len(self.drawn.nodes) - 1) for k in nodes]
+
+    def _frame(self, hardpoints: Sequence[Vec3]) -> list[float]:
+        """Where a body's axes are drawn: at its origin, or amid its hardpoints if the origin is far from them."""
+        if not hardpoints:
+            return [0.0, 0.0, 0.0]
+        middle = _middle(hardpoints)
+        reach = max(math.dist([*point], middle) for point in hardpoints)
+        return [0.0, 0.0, 0.0] if math.hypot(*middle) <= reach + SAME else [*middle]
+
+
+def _middle(points: Sequence[Vec3]) -> tuple[float, float, float]:
+    x, y, z = (sum(values) / len(points) for values in zip(*points, strict=True))
+    return x, y, z
+
+
+def _in_body(body: SceneBody, a: Vec3) -> tuple[float, float, float]:
+    """A vector given globally at the design, in the body's frame."""
+    x, y, z = a + rotation_less_identity(quat(body.euler_parameters).conjugate()) @ a
+    return x, y, z

@@ -1,0 +1,88 @@
+"""Results as JUnit XML, for continuous integration: one test case per case, engine and output."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+from ..harness.compare import describe
+from ..harness.labels import (UNMADE, notes, suspects)
+from ..harness.record import (Deviations, Outcome, Record, Results)
+
+FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
+
+SUSPECTED = "suspect the reference rather than the engine: see the suite's output"
+
+
+def to_junit(results: Results) -> bytes:
+    """Return the results as JUnit XML.
+
+    A missing engine or feature, and an output that was not judged, is a skip with its reason. A
+    pair that was never made is an error.
+
+    What is to be known of a case's geometry is the output of its suite.
+    """
+    root = ElementTree.Element("testsuites", name="kincheck")
+    for case in dict.fromkeys([*(record.case for record in results.records), *(case for case, _, _ in results.missing)]):
+        suite = ElementTree.SubElement(root, "testsuite", name=case)
+        for record in results.records:
+            if record.case == case:
+                for output, deviations in record.errors.items():
+                    _test(suite, record, output, deviations, suspected=results.blames_reference(record))
+        for name, engine, mode in results.missing:
+            if name == case:
+                test = ElementTree.SubElement(
+                    suite, "testcase", classname=f"{case}.{engine}.{mode}", name="never made", time="0.000000"
+                )
+                ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
+        said = [f"note: {note}" for named, note in notes(results.run) if named == case]
+        said += [f"suspect: {why}" for named, why in suspects(results) if named == case]
+        if said:
+            ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub("\ufffd", "\n".join(said))
+        for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            suite.set(count, str(sum(1 for _ in suite.iter(tag))))
+    ElementTree.indent(root)
+    for element in root.iter():
+        for key, text in element.attrib.items():
+            element.set(key, FORBIDDEN.sub("\ufffd", text))
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _test(suite: ElementTree.Element, record: Record, output: str, deviations: Deviations, *, suspected: bool = False) -> None:
+    seconds = record.seconds.warm if record.seconds and record.seconds.warm is not None else 0.0
+    test = ElementTree.SubElement(
+        suite,
+        "testcase",
+        classname=f"{record.case}.{record.engine}.{record.mode}",
+        name=output,
+        time=f"{seconds:.6f}",
+    )
+    verdict, message = _verdict(record, output, deviations)
+    if verdict:
+        message += f"; {SUSPECTED}" if suspected else ""
+        ElementTree.SubElement(test, verdict, message=message)
+
+
+def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
+    """Return the element a test case needs, none where it passed, and its message."""
+    if record.outcome in (Outcome.UNJUDGED, Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
+        return "skipped", f"{record.outcome.shown}: {record.message}"
+    if record.outcome is Outcome.FAIL:
+        (driver, values), *_ = record.driver.items()
+        unit = record.outputs[output].unit
+        off = [describe(output, quantity, each, driver, values, unit) for quantity, each in deviations.items() if not each.within]
+        if deviations.lost and not off:
+            off = [f"{output}: {deviations.reason}"]
+        if deviations.contradicted:
+            off.append(record.message)
+        # missing samples are missing from every output, and a residual is of all of them
+        of_all = record.solved != record.samples or all(each.sound for each in record.errors.values())
+        off += [record.message] if of_all and not off else []
+        if off:
+            return "failure", "; ".join(off)
+    elif record.outcome.bad:
+        return "error", f"{record.outcome}: {record.message}"
+    if not deviations.items():
+        return "skipped", f"{Outcome.UNJUDGED.shown}: {deviations.reason}"
+    return "", ""

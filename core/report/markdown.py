@@ -1,0 +1,27 @@
+"""Markdown in which foreign text is text: messages come from files and simulators."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from ..case.io.escape import visible
+
+
+def escaped(text: str) -> str:
+    """Text that Markdown shows as it is, on one line or in a cell: no mark-up, no links, no HTML, nobody notified."""
+    plain = visible(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    # an underscore inside a word, and brackets without a target, are text already
+    plain = re.sub(r"([\\`*~|]|(?<!\w)_|_(?!\w)|(?<=\])\()", r"\\\1", plain)
+    return re.sub(r"(?<!\w)@(?=\w)", "@\N{WORD JOINER}", plain)
+
+
+def code(name: str) -> str:
+    """A name as code, in which nothing but a bar can be escaped."""
+    shown = visible(name).replace("`", "'").replace("|", "\\|")
+    return f"`{shown}`"
+
+
+def row(cells: Iterable[str]) -> str:
+    """A row of a table."""
+    return f"| {' | '.join(cells)} |"

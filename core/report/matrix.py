@@ -1,0 +1,92 @@
+"""Every case against every engine, a cell each: the largest position, velocity and acceleration error, or why there is none."""
+
+from __future__ import annotations
+
+from typing import TextIO
+
+from rich.table import Table
+from rich.text import Text
+
+from ..trajectory import QUANTITIES
+from . import terminal
+from ..harness.labels import (against, motion_unit, notes, signs, suspects, unread)
+from .markdown import (code, escaped, row)
+from ..harness.record import (Outcome, Record, Results)
+from ..case.io.escape import visible
+from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
+
+NOT_ASKED = "–"
+
+
+def print_matrix(results: Results, file: TextIO) -> None:
+    """Print the signs of outputs that have a convention, a row per case and a column per engine, every message, and a count of
+    outcomes.
+    """
+    console = terminal.console(file)
+    print_signs(results.run, console)
+    table = Table(box=None, pad_edge=False, header_style="bold", caption=Text(visible(_reading(results))), caption_justify="left")
+    table.add_column("case", overflow="fold")
+    engines, rows = _laid_out(results)
+    for engine in engines:
+        table.add_column(Text(visible(engine)), no_wrap=True)
+    for case, records in rows.items():
+        cells = (_cell(records[engine]) if engine in records else Text(NOT_ASKED) for engine in engines)
+        table.add_row(Text(visible(case)), *cells)
+    console.print(table)
+    print_messages(results, console)
+
+
+def to_markdown(results: Results) -> str:
+    """The same in Markdown: the engines with their versions, and a line for every message but those of what passed."""
+    engines, rows = _laid_out(results)
+    versions = {record.engine: record.version for record in results.records if record.version}
+    head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
+    lines = [line for each in signs(results.run) for line in (escaped(f"{each}."), "")]
+    lines += [row(map(escaped, head)), row(["---"] * len(head))] if rows else []
+    for case, records in rows.items():
+        cells = (escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
+        lines.append(row([code(case), *cells]))
+    lines += ["", f"{escaped(_reading(results))}."]
+    lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
+    lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
+    lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
+    lines += [
+        escaped(f"{outcome.shown.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
+        for (engine, outcome, message), cases in messages(results).items()
+        if outcome is not Outcome.PASS
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def cell(record: Record) -> str:
+    """What an engine made of a case, in a few signs."""
+    errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
+    if errors:
+        verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: "
+        return verdict + " · ".join(f"{error.max_abs:.0e} {unit}".rstrip() for error, unit in errors)
+    if record.outcome is Outcome.UNJUDGED and record.residual_max is not None:
+        return f"{record.outcome.shown}, residual {record.residual_max:.0e}"
+    return record.outcome.shown
+
+
+def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]]:
+    """The engines, and the records by case and engine."""
+    rows: dict[str, dict[str, Record]] = {}
+    for record in results.records:
+        rows.setdefault(record.case, {})[record.engine] = record
+    return list(dict.fromkeys(record.engine for record in results.records)), rows
+
+
+def _reading(results: Results) -> str:
+    """How to read the cells."""
+    standards = sorted(
+        {each.against for record in results.records for errors in record.errors.values() for _, each in errors.items()}
+    )
+    if not standards:
+        return "No errors: nothing was compared with anything"
+    units = " · ".join(f"{quantity} [{motion_unit(LENGTH, quantity)}]" for quantity in QUANTITIES)
+    return f"Largest errors against {', '.join(map(against, standards))}: {units}"
+
+
+def _cell(record: Record) -> Text:
+    return Text(visible(cell(record)), COLOURS.get(record.outcome, "bold red"))

@@ -1,0 +1,215 @@
+"""The cases of a report as its page shows them: what is said of each, and which figures it has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..trajectory import QUANTITIES
+from ..case.case import Truth
+from ..harness.evidence import Evidence
+from ..harness.labels import (against, engine_name, motion_unit, number, output_label)
+from ..harness.record import (Deviation, OutputSeries, Record, Results)
+from .axis import Axis, driver_axis
+from .drawing import Drawing, drawing
+from .figures import Figure, Style, Values, band_is_thin, error_figure, output_figure
+from .figure_data import (Effort, Past, precision_figure, trend_figures)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One deviation and what it belongs to."""
+
+    record: Record
+    output: str
+    motion: str
+    deviation: Deviation
+
+    @property
+    def ratio(self) -> float:
+        """The error in tolerances."""
+        d = self.deviation
+        return d.max_abs / d.tolerance if d.tolerance > 0 else float("inf") if d.max_abs > 0 else 0.0
+
+    @property
+    def unit(self) -> str:
+        """The error's unit."""
+        series = self.record.outputs.get(self.output)
+        return motion_unit(series.unit, self.motion) if series else ""
+
+
+def judged(records: Sequence[Record]) -> list[Judged]:
+    """Every deviation of the records."""
+    return [Judged(r, output, motion, d) for r in records for output, e in r.errors.items() for motion, d in e.items()]
+
+
+def worst(deviations: Sequence[Judged]) -> Judged | None:
+    """The deviation closest to its tolerance, or beyond it most."""
+    return max(deviations, key=lambda each: each.ratio, default=None)
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure of the page: its key, a title to read aloud, and what is said under it."""
+
+    figure: str
+    title: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class OutputView:
+    """One output of a case, against the driver, and its errors by motion."""
+
+    name: str
+    label: str
+    plot: Plot
+    errors: list[Plot]
+
+
+@dataclass(frozen=True)
+class CaseView:
+    """One case of the page.
+
+    Attributes:
+        evidence: of the reference; None where there is none.
+        worst: the deviation closest to its tolerance, or beyond it most.
+        account: the degrees of freedom, counted as in the paper and by rank.
+        scene: the mechanism to be drawn; None where the results have none.
+        trends: error and time over earlier runs; empty where there is no history.
+        precision: error against time at several effort settings, by mode; empty where that was not measured.
+    """
+
+    name: str
+    anchor: str
+    truth: Truth
+    source: str
+    records: list[Record]
+    evidence: Evidence | None
+    axis: Axis
+    outputs: list[OutputView]
+    worst: Judged | None
+    account: Mapping[str, Any] | None
+    scene: Drawing | None
+    trends: list[Plot]
+    precision: list[Plot]
+
+    def by_engine(self, name: str) -> list[Record]:
+        """The records of the engine of that name."""
+        return [record for record in self.records if engine_name(record) == name]
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a report is made from: a run, what is known from elsewhere, by case, and further limits, each a title and a sentence."""
+
+    results: Results
+    history: Mapping[str, Sequence[Past]]
+    precision: Mapping[str, Sequence[Effort]]
+    limits: Sequence[tuple[str, str]] = ()
+
+
+def case_view(given: Material, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]) -> CaseView:
+    """One case of the page; its figures are added to `figures`."""
+    results = given.results
+    records = [record for record in results.records if record.case == name]
+    facts: Mapping[str, Any] = results.run.get("cases", {}).get(name, {})
+    deviations = judged(records)
+    axis = driver_axis(facts, records, (each.deviation.worst_step for each in deviations))
+    references = results.references.get(name, {})
+    outputs: list[OutputView] = []
+    for index, output in enumerate(dict.fromkeys(output for record in records for output in record.outputs)):
+        here = [each for each in deviations if each.output == output]
+        outputs.append(_output(output, f"{anchor}-{index}", here, records, axis, references, styles, figures))
+    return CaseView(
+        name=name,
+        anchor=anchor,
+        truth=Truth(records[0].truth),
+        source=" · ".join(filter(None, (facts.get("source", ""), facts.get("signs", "")))),
+        records=records,
+        evidence=next((record.evidence for record in records if record.evidence), None),
+        axis=axis,
+        outputs=outputs,
+        worst=worst(deviations),
+        account=next((r.details["dof_account"] for r in records if r.details.get("dof_account")), None),
+        scene=drawing(results.scenes[name], axis) if name in results.scenes else None,
+        trends=_trends(anchor, given.history.get(name, ()), styles, figures),
+        precision=_precision(anchor, given.precision.get(name, ()), styles, figures),
+    )
+
+
+def _output(
+    output: str,
+    key: str,
+    deviations: Sequence[Judged],
+    records: Sequence[Record],
+    axis: Axis,
+    references: Mapping[str, OutputSeries],
+    styles: Mapping[str, Style],
+    figures: dict[str, Figure],
+) -> OutputView:
+    curves = [(styles[engine_name(r)], r.outputs[output]) for r in records if output in r.outputs]
+    label, truth = output_label(output), references.get(output)
+    errors: list[Plot] = []
+    for motion in QUANTITIES:
+        here = [each for each in deviations if each.motion == motion]
+        values: Values | None = getattr(_standard(here, records, references), motion, None)
+        if values is None:
+            continue
+        found = [(styles[engine_name(j.record)], getattr(j.record.outputs[output], motion), j.deviation) for j in here]
+        title = f"{motion} error of {label} against {axis.name}, log axis"
+        errors.append(Plot(f"{key}-{motion}", title, _worst_caption(here, axis)))
+        figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, values)
+    positions = [each for each in deviations if each.motion == "position"]
+    standard = _standard(positions, records, references)
+    band = (standard, positions[0].deviation.tolerance) if standard else None
+    figures[key] = output_figure(output, axis, curves, truth, band)
+    said = [f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)]
+    said += [] if truth else ["No reference."]
+    said += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
+    plot = Plot(key, f"{label} against {axis.name}, all engines", " ".join([*said, axis.besides]).strip())
+    return OutputView(output, label, plot, errors)
+
+
+def _trends(anchor: str, history: Sequence[Past], styles: Mapping[str, Style], figures: dict[str, Figure]) -> list[Plot]:
+    runs = len(dict.fromkeys(each.run for each in history))
+    if runs < 2:  # the report's own
+        return []
+    made = trend_figures(history, styles)
+    figures.update({f"{anchor}-trend-{what}": figure for what, figure in made.items()})
+    return [Plot(f"{anchor}-trend-{what}", f"{what} over {runs} runs, log axis", f"{runs} runs, oldest first.") for what in made]
+
+
+def _precision(anchor: str, efforts: Sequence[Effort], styles: Mapping[str, Style], figures: dict[str, Figure]) -> list[Plot]:
+    plots: list[Plot] = []
+    for mode in dict.fromkeys(each.mode for each in efforts):
+        key = f"{anchor}-precision-{mode}"
+        figures[key] = precision_figure([each for each in efforts if each.mode == mode], styles)
+        caption = f"Mode {mode}. Left is faster, down is more exact; a point is one effort setting."
+        plots.append(Plot(key, f"{mode}: error against time per sample, both log axes", caption))
+    return plots
+
+
+def _standard(
+    deviations: Sequence[Judged], records: Sequence[Record], references: Mapping[str, OutputSeries]
+) -> OutputSeries | None:
+    """What one motion of one output was judged against: the reference, or the output of the engine named instead."""
+    if not deviations:
+        return None
+    output, standard = deviations[0].output, deviations[0].deviation.against
+    engines = {record.engine: record.outputs[output] for record in records if output in record.outputs}
+    return engines.get(standard) or references.get(output)
+
+
+def _band_caption(standard: OutputSeries, tolerance: float, whose: str) -> str:
+    band = "narrower than the line" if band_is_thin(standard, tolerance) else "the grey band"
+    unit = "" if standard.unit == "1" else f" {standard.unit}"
+    return f"Tolerance ±{number(tolerance)}{unit} around the {whose}: {band}."
+
+
+def _worst_caption(deviations: Sequence[Judged], axis: Axis) -> str:
+    largest = max(deviations, key=lambda each: each.deviation.max_abs)
+    d = largest.deviation
+    who = f"{engine_name(largest.record)}, sample {d.worst_step} ({axis.at(d.worst_step)})"
+    return f"Worst {number(d.max_abs)}: {who}. Tolerance {number(d.tolerance)}, against {against(d.against)}."

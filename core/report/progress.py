@@ -1,0 +1,75 @@
+"""What the command line says while it runs, and of engines that are not there."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+
+from ..harness.record import (Outcome, Record, Results)
+from ..case.io.escape import visible
+
+
+def complain(lines: Iterable[str]) -> None:
+    """Say what is wrong on standard error, a line each, as the tool."""
+    for line in lines:
+        print(f"kincheck: {visible(line)}", file=sys.stderr)
+
+
+def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
+    """Collects records, and tells of them on standard error: one line that changes on a terminal, plain lines elsewhere."""
+    terminal = sys.stderr.isatty()
+
+    def tell(record: Record, done: int, total: int) -> None:
+        records.append(record)
+        line = visible(f"[{done}/{total}] {record.case} {record.engine}: {record.outcome.shown}")
+        if terminal:
+            line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
+        print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
+    """Return what a required engine could not do, and which of the engines that were named are missing."""
+    lines = [
+        f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
+        if record.outcome is Outcome.UNAVAILABLE
+        else f"required engine {record.engine!r}: case {record.case!r} is unsupported: {record.message}"
+        for record in results.records
+        if record.engine in required and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
+    ]
+    lines += [
+        f"engine {record.engine!r} is named and missing: {record.message}; {how_to_install(record.engine)}"
+        for record in results.records
+        if record.engine in named and record.engine not in required and record.outcome is Outcome.UNAVAILABLE
+    ]
+    return list(dict.fromkeys(lines))
+
+
+def uncompared(results: Results) -> list[str]:
+    """Return that a run has compared nothing, and why: then no result deviates, and none is right."""
+    counts = Counter(record.outcome for record in results.records)
+    if any(outcome.judged for outcome in counts):
+        return []
+    if not counts[Outcome.UNJUDGED] and any(outcome.bad for outcome in counts):
+        return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
+    if not counts or results.missing:  # it was stopped, or its cases cannot be read, which is said already
+        return []
+    found = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
+    remedy = "give the case a reference, or run another engine beside the native one"
+    return [f"nothing was compared ({found}); {remedy if counts[Outcome.UNJUDGED] else 'run other engines'}"]
+
+
+def how_to_install(engine: str) -> str:
+    """The command that installs an engine's simulator, whose name is its own up to a hyphen, from kincheck's own metadata."""
+    import importlib.metadata  # rarely needed, and slow
+
+    wanted = [
+        requirement.split(";")[0].strip()
+        for requirement in importlib.metadata.requires("kincheck") or []
+        if re.search(rf"""extra == ['"]{engine.split("-")[0]}['"]""", requirement)
+    ]
+    return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"

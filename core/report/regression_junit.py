@@ -1,0 +1,46 @@
+"""The report as JUnit XML: one test case per case, engine and output, failed where the run has failed or something regressed."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+from ..harness.record import Results
+from .junit import (FORBIDDEN, to_junit)
+from ..history.regression.findings import (Finding, Kind, Regressions)
+
+
+def to_regression_junit(results: Results, found: Regressions) -> bytes:
+    """Write what `to_junit` writes, with a failure for every regression of what had passed.
+
+    What is about a pair and not about one of its outputs (a phase lost, a time) is a test case of its own, named by its kind.
+    """
+    root = ElementTree.fromstring(to_junit(results))
+    tests = {(test.get("classname"), test.get("name")): test for test in root.iter("testcase")}
+    suites = {suite.get("name"): suite for suite in root.iter("testsuite")}
+    unmade = set(results.missing)
+    for finding in found.regressions:
+        pair = (finding.case, finding.engine, finding.mode)
+        if finding.kind is Kind.FAILURE or pair in unmade:  # these are in there
+            continue
+        place = ".".join(pair)
+        name = finding.output or str(finding.kind)
+        if finding.case not in suites:  # a case that only the earlier run has
+            suites[finding.case] = ElementTree.SubElement(root, "testsuite", name=finding.case)
+        if (place, name) not in tests:
+            tests[place, name] = ElementTree.SubElement(
+                suites[finding.case], "testcase", classname=place, name=name, time="0.000000"
+            )
+        _fail(tests[place, name], finding)
+    for suite in suites.values():
+        for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            suite.set(count, str(sum(1 for _ in suite.iter(tag))))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _fail(test: ElementTree.Element, finding: Finding) -> None:
+    message = FORBIDDEN.sub("\ufffd", f"{finding.kind}: {finding.message}")
+    verdict = test.find("failure")
+    if verdict is None:
+        verdict = ElementTree.SubElement(test, "failure")
+    verdict.set("message", "; ".join(filter(None, (verdict.get("message"), message))))

@@ -1,0 +1,150 @@
+"""What a report says: its headline, its findings in groups, and the versions that changed, the same in every format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ..errors import shortened
+from ..harness.labels import (motion_unit, number, product, unread_count)
+from ..history.regression.findings import (Finding, Kind, Loose, Regressions, Step)
+
+LONGEST = 12
+"""Rows of a group that are shown; a broken engine has one for every case. The JSON has all."""
+
+NAMED = 4
+"""Cases that are named where a row is of several."""
+
+
+COUNTED: Mapping[Kind, str] = {
+    Kind.LOST: "with something lost",
+    Kind.GONE: "with values gone",
+    Kind.FREEDOM: "with another dof",
+    Kind.UNIT: "with another unit",
+    Kind.DRIFTED: "less accurate",
+    Kind.RESIDUAL: "with a larger residual",
+}
+"""What follows the number of pairs with a finding, where it is not the name of the kind."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One or several findings that say the same.
+
+    Attributes:
+        engine: the engine, or the engines.
+        more: how many further findings the pair has of that kind.
+    """
+
+    engine: str
+    cases: Sequence[str]
+    message: str
+    since: int | None
+    more: int = 0
+
+    @property
+    def where(self) -> str:
+        """The cases, the first of many."""
+        return shortened(self.cases, NAMED)
+
+    @property
+    def what(self) -> str:
+        """The message, and how many more the pair has."""
+        since = f" · since run {self.since}" if self.since is not None else ""
+        return self.message + (f" · and {self.more} more like it" if self.more else "") + since
+
+
+def headline(found: Regressions) -> str:
+    """The report in one sentence."""
+    if found.against is None:
+        judged = found.pairs - len(found.unjudged)
+        failing = f"{len(found.failing)} of {judged} not right" if found.failing else f"all {judged} right"
+        # with nothing to compare with there are no other regressions
+        never = _counted(found, Kind.LOST)
+        rest = [f"{len(found.unjudged)} not judged"] if found.unjudged else []
+        rest += [f"{never} never made"] if never else []
+        absent = _counted(found, Kind.ABSENT)
+        rest += [f"{absent} {Kind.ABSENT}"] if absent else []
+        rest += [unread_count(len(found.unread))] if found.unread else []
+        return f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing: {found.reason}"
+    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if found.fails(kind) and _counted(found, kind)]
+    counts += [unread_count(len(found.unread))] if found.unread else []
+    said = ", ".join(counts) or "nothing regressed"
+    fixed = len(pairs(found, Kind.FIXED))
+    known = len(found.failing) - len(pairs(found, Kind.FAILURE))
+    again = len(pairs(found, Kind.JUDGED))
+    rest = [f"{fixed} fixed"] if fixed else []
+    rest += [f"{again} judged again"] if again else []
+    rest += [f"{len(found.unjudged)} not judged"] if found.unjudged else []
+    absent = 0 if found.missing_is_failure else _counted(found, Kind.ABSENT)
+    rest += [f"{absent} {Kind.ABSENT}"] if absent else []
+    rest += [f"{known} not right before either"] if known > 0 else []
+    rest += [", ".join(map(str, versions(found)))] if versions(found) else []
+    return "; ".join([f"{found.run.name} against {found.against.name}: {said}", *rest])
+
+
+def versions(found: Regressions) -> list[str]:
+    """The versions that changed, those of the machine and the settings aside."""
+    return [str(change) for change in found.changes if change.what not in ("host", "processor", "platform", "commit", "tol")]
+
+
+def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
+    """The pairs that findings of a kind are about."""
+    return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
+
+
+def _counted(found: Regressions, kind: Kind) -> int:
+    """How many pairs findings of a kind are about; without those of a case that could not be read, which is one fault."""
+    return sum(case not in found.unread for case, _, _ in pairs(found, kind))
+
+
+def _plural(kind: Kind, found: Regressions) -> str:
+    if kind is Kind.FAILURE:
+        return "new failure" + ("s" if len(pairs(found, kind)) > 1 else "")
+    return COUNTED.get(kind, str(kind))
+
+
+def rows(findings: Iterable[Finding]) -> list[Row]:
+    """Findings of one kind: a pair once, with the worst of its ratios; cases, then engines, that say the same together."""
+    by_pair: dict[tuple[str, str, str], list[Finding]] = {}
+    for finding in findings:
+        by_pair.setdefault((finding.case, finding.engine, finding.mode), []).append(finding)
+    alike: dict[tuple[str, str, int | None, int], list[str]] = {}
+    for (case, engine, mode), each in by_pair.items():
+        first = max(each, key=lambda finding: finding.ratio or 0.0)
+        alike.setdefault((product(engine, mode), first.message, first.since, len(each) - 1), []).append(case)
+    engines: dict[tuple[tuple[str, ...], str, int | None, int], list[str]] = {}
+    for (engine, message, since, more), cases in alike.items():
+        engines.setdefault((tuple(cases), message, since, more), []).append(engine)
+    return [Row(", ".join(names), *said) for said, names in engines.items()]
+
+
+def step_says(step: Step) -> str:
+    """A step, its first run and what changed there."""
+    name = f"{step.output} {step.quantity} error" if step.output else step.quantity
+    if step.before is None or step.now is None:
+        what = "bad" if step.worse else "good again"
+    elif step.quantity == "time":
+        what = f"{number(1e3 * step.before)} → {number(1e3 * step.now)} ms a sweep"
+    else:
+        what = f"{number(step.before)} → {number(step.now)} {motion_unit(step.unit, step.quantity)}".rstrip()
+    changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
+    repaired = f", repaired in run {step.repaired}" if step.repaired is not None else ""
+    since = f"since run {step.first} ({step.started[:16].replace('T', ' ')}){repaired}"
+    return f"{name}: {what} {since}; after run {step.last}: {changed}"
+
+
+def loose_says(loose: Sequence[Loose]) -> list[str]:
+    """The tolerances that could be tightened, a line a case: by its output that allows least."""
+    by_case: dict[str, list[Loose]] = {}
+    for each in loose:
+        by_case.setdefault(each.case, []).append(each)
+    lines: list[str] = []
+    for case, each in by_case.items():
+        least = min(each, key=lambda one: one.factor or math.inf)
+        many = f"{len(each)} outputs" if len(each) > 1 else least.output
+        reason = f"; its reason: {least.why}" if least.why else ""
+        factor = f"{number(least.factor)} times or more" if least.factor else "as far as you like, all errors are zero"
+        lines.append(f"{case}: {many}, {factor}, by {least.runs} runs{reason}")
+    return lines

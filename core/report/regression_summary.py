@@ -1,0 +1,74 @@
+"""The report as Markdown, for a pull request, a job's page or a mail, and as one part of the HTML report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from ..harness.labels import product
+from .markdown import (escaped, row)
+from ..history.regression.findings import (WHY, Kind, Regressions, Step)
+from .regression_labels import (LONGEST, headline, loose_says, pairs, rows, step_says)
+
+
+def to_markdown(found: Regressions) -> str:
+    """What changed, the worst first; what is long is folded away."""
+    return "\n".join([f"## {escaped(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
+
+
+def to_markup(found: Regressions) -> Markup:
+    """The same as a part of an HTML page."""
+    here = FileSystemLoader(Path(__file__).parent)
+    environment = Environment(loader=here, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    groups = [
+        (kind, WHY[kind], len(pairs(found, kind)), rows(each for each in found.findings if each.kind is kind)) for kind in Kind
+    ]
+    return Markup(
+        environment.get_template("regressions.html").render(
+            headline=headline(found),
+            found=found,
+            groups=[group for group in groups if group[2]],
+            steps=[(product(step.engine, step.mode), step.case, step_says(step)) for step in found.steps],
+            loose=loose_says(found.loose),
+            longest=LONGEST,
+        )
+    )
+
+
+def _lines(found: Regressions) -> Iterator[str]:
+    if found.changes:
+        yield f"Changed: {escaped(', '.join(map(str, found.changes)))}."
+    elif found.against is not None:
+        yield "Neither versions nor machine nor commit changed."
+    yield ""
+    for kind in Kind:
+        group = rows(each for each in found.findings if each.kind is kind)
+        if not group:
+            continue
+        folded = not found.fails(kind) and kind not in (Kind.FIXED, Kind.JUDGED)
+        title = f"{kind.capitalize()} ({len(pairs(found, kind))}): {WHY[kind]}"
+        yield from [f"<details><summary>{escaped(title)}</summary>", ""] if folded else [f"**{escaped(title)}**", ""]
+        yield from ("| engine | case | what |", "| --- | --- | --- |")
+        for each in group[:LONGEST]:
+            yield row(map(escaped, (each.engine, each.where, each.what)))
+        yield ""
+        if len(group) > LONGEST:
+            yield from (f"and {len(group) - LONGEST} more, all in the JSON.", "")
+        yield from ["</details>", ""] if folded else []
+    if found.steps:
+        yield from ("**Steps in the history that still stand**", "")
+        yield from (f"- {escaped(_step(step))}" for step in found.steps[:LONGEST])
+        yield from [f"- and {len(found.steps) - LONGEST} more, all in the JSON"] if len(found.steps) > LONGEST else []
+        yield ""
+    if found.loose:
+        lines = loose_says(found.loose)
+        yield from (f"<details><summary>Tolerances that could be tightened ({len(lines)} cases)</summary>", "")
+        yield from (f"- {escaped(line)}" for line in lines)
+        yield from ("", "</details>", "")
+
+
+def _step(step: Step) -> str:
+    return f"{product(step.engine, step.mode)} on {step.case}: {step_says(step)}"

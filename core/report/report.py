@@ -1,0 +1,239 @@
+"""The report of a run: one HTML file that opens offline, the worst engine and its worst sample first."""
+
+from __future__ import annotations
+
+import base64
+import importlib
+import json
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from ..trajectory import QUANTITIES
+from ..harness.labels import (TRUTHS, against, engine_name, known, number, output_label, product, suspects, unread_count, unsound)
+from ..harness.record import (Outcome, Record, Results)
+from .caveats import ANSWERED, caveats
+from .figures import Figure, Style
+from .figure_data import (Effort, Past)
+from .page_model import (CaseView, Judged, Material, case_view, judged, worst)
+
+NOT_JUDGED = (Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
+BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
+
+WITHOUT_TRENDS = "No trends", "The history cannot be read, so that this page says nothing of earlier runs."
+"""Limit of a report whose history has a fault."""
+FAULTS = (
+    ("is", "are", "outside tolerance"),
+    ("contradicts", "contradict", "the native engine"),
+    ("has", "have", "outputs without a value"),
+    ("has", "have", "a residual above the tolerance"),
+    ("lacks", "lack", "samples"),
+)
+"""What is wrong with records that fail, as the headline says it of one and of several."""
+
+_HERE = Path(__file__).parent
+
+
+def write_report(
+    results: Results,
+    path: Path,
+    *,
+    history: Mapping[str, Sequence[Past]] | None = None,
+    precision: Mapping[str, Sequence[Effort]] | None = None,
+    changes: Markup | None = None,
+    limits: Sequence[tuple[str, str]] = (),
+) -> None:
+    """Write the report as one HTML file with all scripts, styles and data inside.
+
+    Args:
+        results: a run. Of `results.run`, "cases" may give each case's "source", "driver" (its name, type, point and direction)
+            and "motions" of further drivers by case name; everything else is printed as it is.
+        path: the file to write, in a folder that exists.
+        history: what the engines made of each case in earlier runs and this one, oldest first, by case name.
+        precision: error against time at several efforts, by case name.
+        changes: a section to come first: what changed since another run.
+        limits: further limits of the report, each a title and a sentence.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path.write_text(render(Material(results, history or {}, precision or {}, limits), changes), encoding="utf-8")
+
+
+def render(given: Material, changes: Markup | None = None) -> str:
+    """The report as HTML text."""
+    # Loaded here, for runs that write no report; the package has no types.
+    plotly: Any = importlib.import_module("plotly.offline")
+    records = given.results.records
+    never = {(case, product(engine, mode)) for case, engine, mode in given.results.missing}
+    names = dict.fromkeys([*(engine_name(record) for record in records), *sorted(name for _, name in never)])
+    styles = {name: Style.number(index, name) for index, name in enumerate(names)}
+    figures: dict[str, Figure] = {}
+    case_names = dict.fromkeys(record.case for record in records)
+    cases = [case_view(given, name, f"case-{index}", styles, figures) for index, name in enumerate(case_names)]
+    data = {
+        "drivers": {case.anchor: case.axis.shown for case in cases},
+        "figures": figures,
+        "scenes": {case.anchor: asdict(case.scene) for case in cases if case.scene},
+    }
+    return (
+        _environment()
+        .get_template("report.html")
+        .render(
+            headline=headline(given.results),
+            changes=changes,
+            worst=max(
+                ((case, case.worst) for case in cases if case.worst and case.name not in given.results.suspects),
+                key=lambda each: each[1].ratio,
+                default=None,
+            ),
+            counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
+            not_judged=_grouped(record for record in records if record.outcome in NOT_JUDGED),
+            suspects=suspects(given.results),
+            problems=_grouped(
+                record
+                for record in records
+                if record.outcome in (Outcome.FAIL, *BROKEN) and not given.results.blames_reference(record)
+            ),
+            circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
+            unread=given.results.unread,
+            settings=_settings(records),
+            styles=styles,
+            cases=cases,
+            references=given.results.references,
+            caveats=[*given.limits, *caveats(given.results)],
+            never=never,
+            truths=TRUTHS,
+            motions=QUANTITIES,
+            answered=ANSWERED,
+            validation=validation,
+            severity=severity,
+            searched=searched,
+            css=_source("report.css"),
+            scripts=[_source("scene.js"), _source("report.js")],
+            data=packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
+            plotlyjs=packed(plotly.get_plotlyjs()),
+        )
+    )
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    cast("dict[str, Any]", environment.filters).update(
+        number=number, label=output_label, engine=engine_name, against=against, model=_model, known=known, worst=_worst_of
+    )
+    return environment
+
+
+def _source(name: str) -> str:
+    return (_HERE / name).read_text("utf-8")
+
+
+def packed(text: str) -> str:
+    """Text as base64 of its zlib stream: a third of the size, and nothing in it can end the script element that holds it."""
+    return base64.b64encode(zlib.compress(text.encode())).decode("ascii")
+
+
+def headline(results: Results) -> str:
+    """The run in one sentence."""
+    records, unread = results.records, len(results.unread)
+    missing = sum(case not in results.unread for case, _, _ in results.missing)
+    # of a failure there may be no deviation at all: no sample, or no output, has a value
+    compared = [record for record in records if judged([record]) or record.outcome is Outcome.FAIL]
+    broken = _count(records, *BROKEN)
+    failed = [record for record in compared if record.outcome is Outcome.FAIL]
+    faults = Counter(_fault(record, results.run.get("tol", 0.0)) for record in failed)
+    counts = [
+        f"{n} of {len(compared)} comparisons {one if n == 1 else more} {what}" for one, more, what in FAULTS if (n := faults[what])
+    ]
+    if not compared:
+        said = "Nothing was compared"
+    elif failed:
+        said = ", ".join(counts)
+    else:
+        said = (
+            f"All {len(compared)} comparisons are within tolerance"
+            if len(compared) > 1
+            else "The one comparison is within tolerance"
+        )
+    said += f", {broken} could not be completed" if broken else ""
+    unjudged = _count(records, Outcome.UNJUDGED)
+    said += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
+    said += f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
+    said += f"; {unread_count(unread)}" if unread else ""
+    return said + (f"; the run ended before {missing} more" if missing else "")
+
+
+def _fault(record: Record, tol: float) -> str:
+    """Return what is wrong with a record that fails, one of `FAULTS`; where several are, the first."""
+    errors = record.errors.values()
+    holds = (
+        any(not each.within for each in errors),
+        any(each.contradicted for each in errors),
+        any(each.lost for each in errors),
+        record.solved == record.samples and (record.residual_max or 0.0) > tol,
+        True,
+    )
+    return next(what for (_, _, what), true in zip(FAULTS, holds, strict=True) if true)
+
+
+def _worst_of(record: Record, motion: str | None = None) -> Judged | None:
+    """The deviation of a record, of one motion or any, that is closest to its tolerance or beyond it most."""
+    return worst([each for each in judged([record]) if motion in (None, each.motion)])
+
+
+def severity(case: CaseView) -> float:
+    """What the overview sorts by: what could not be completed first, then errors in tolerances."""
+    broken = any(record.outcome in BROKEN for record in case.records)
+    return 1e300 if broken else min(case.worst.ratio, 1e299) if case.worst else -1.0
+
+
+def searched(case: CaseView) -> str:
+    """The words by which the overview finds a case."""
+    words = [case.name, case.source, TRUTHS[case.truth], *(output.name for output in case.outputs)]
+    words += [text for record in case.records for text in (record.engine, record.version or "", record.message)]
+    return " ".join(words).lower()
+
+
+def validation(record: Record) -> str:
+    """What may be called validated, if anything."""
+    if not record.validated:
+        return f"{said}: not validated" if record.outcome is Outcome.PASS and (said := unsound(record)) else ""
+    standards = {deviation.against for errors in record.errors.values() for _, deviation in errors.items()}
+    whole = standards == {record.truth} and all(len(errors.items()) == len(QUANTITIES) for errors in record.errors.values())
+    return "validated" if whole else "validated, positions only"
+
+
+def _model(record: Record) -> dict[str, Any]:
+    """What an engine tells of the model it made, beyond what has a table of its own."""
+    return {key: value for key, value in record.details.items() if key not in ("dof_account", "program")}
+
+
+def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[str]]]:
+    """Outcome, engine and message, with the cases they were the same for."""
+    groups: dict[tuple[Outcome, str, str], list[str]] = {}
+    for record in records:
+        groups.setdefault((record.outcome, engine_name(record), record.message), []).append(record.case)
+    return [(*key, cases) for key, cases in groups.items()]
+
+
+def _settings(records: Sequence[Record]) -> list[tuple[str, dict[str, Any], list[str]]]:
+    """Each engine's distinct settings, with the cases they were the same for."""
+    groups: dict[str, tuple[str, dict[str, Any], list[str]]] = {}
+    for record in records:
+        group = groups.setdefault(f"{engine_name(record)} {record.settings}", (engine_name(record), record.settings, []))
+        group[2].append(record.case)
+    return list(groups.values())
+
+
+def _count(records: Sequence[Record], *outcomes: Outcome) -> int:
+    counts = Counter(record.outcome for record in records)
+    return sum(counts[outcome] for outcome in outcomes)

@@ -1,0 +1,127 @@
+"""Benchmarks: figures of the program itself, shown as tables on the terminal, as JSON and as a page."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO, cast
+
+import msgspec
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from rich.table import Table
+from rich.text import Text
+
+from ..errors import KincheckError
+from . import terminal
+from ..harness.labels import (known, number)
+from ..harness.record import to_json
+from .figures import (Figure, Style)
+from .report import packed
+from .page_model import Plot
+from ..case.io.atomic_files import (to_standard_output, write_all)
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """A figure, what is said of it, and the styles of its curves."""
+
+    plot: Plot
+    figure: Figure
+    styles: Sequence[Style]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of a benchmark, and what follows from it.
+
+    Attributes:
+        verdict: what the figures say, in sentences.
+        notes: how the figures were made.
+        columns: headings; the first `labels` of them are over words, the others over numbers.
+        diagrams: drawn above the table, on the page only.
+    """
+
+    title: str
+    verdict: Sequence[str]
+    notes: Sequence[str]
+    columns: Sequence[str]
+    labels: int
+    rows: Sequence[Sequence[str]]
+    diagrams: Sequence[Diagram] = ()
+
+
+@dataclass(frozen=True)
+class Report:
+    """A benchmark's results for people. `name` is also that of its files."""
+
+    name: str
+    headline: str
+    facts: Sequence[str]
+    sections: Sequence[Section]
+
+
+def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: str | None) -> None:
+    """Print the tables and write what was asked for.
+
+    Args:
+        out: folder for NAME.json and NAME.html.
+        json: a file, or "-" for standard output, which then has nothing else.
+
+    Raises:
+        KincheckError: a file cannot be written.
+    """
+    contents = [(Path(json), to_json(results))] if json not in (None, "-") else []
+    if out is not None:
+        contents += [(out / f"{report.name}.json", to_json(results)), (out / f"{report.name}.html", page(report).encode())]
+    problems = write_all(contents)  # before anything is printed: who reads it may have gone
+    print_report(report, sys.stderr if json == "-" else sys.stdout)
+    if json == "-":
+        to_standard_output(to_json(results))
+    if problems:
+        raise KincheckError("\n".join(problems))
+
+
+def print_report(report: Report, file: TextIO) -> None:
+    """Print the tables, each with its verdict and notes below."""
+    console = terminal.console(file)
+    console.print(Text(report.headline, style="bold"))
+    console.print(Text(" · ".join(report.facts)), soft_wrap=True)
+    for section in report.sections:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for column, heading in enumerate(section.columns):
+            table.add_column(Text(heading), justify="left" if column < section.labels else "right")
+        for row in section.rows:
+            table.add_row(*(Text(cell) for cell in row))
+        console.print()
+        console.print(Text(section.title, style="bold"))
+        console.print(table)
+        for sentence in section.verdict:
+            console.print(Text(f"- {sentence}"), soft_wrap=True)
+        for note in section.notes:
+            console.print(Text(f"  {note}", style="dim"), soft_wrap=True)
+
+
+def page(report: Report) -> str:
+    """The report as one HTML file, in the look of a run's."""
+    here = Path(__file__).parent
+    reporting = here.parent / "reporting"  # its style sheet, macros and script, so that there is one of each
+    environment = Environment(
+        loader=FileSystemLoader([here, reporting]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    cast("dict[str, Any]", environment.filters).update(number=number, known=known)  # which the macros use
+    figures = {diagram.plot.figure: diagram.figure for section in report.sections for diagram in section.diagrams}
+    shown: dict[str, str] = {}
+    if figures:
+        plotly: Any = importlib.import_module("plotly.offline")
+        data = json.dumps({"drivers": {}, "figures": figures, "scenes": {}}, allow_nan=False, separators=(",", ":"))
+        shown = {
+            "data": packed(data),
+            "plotlyjs": packed(plotly.get_plotlyjs()),
+            "script": (reporting / "report.js").read_text("utf-8"),
+        }
+    css = (reporting / "report.css").read_text("utf-8")
+    return environment.get_template("bench.html").render(report=report, css=css, shown=shown)

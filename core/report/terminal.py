@@ -1,0 +1,68 @@
+"""Answers for people, as text and tables, and the same for programs, as JSON: commands print the one and write the other."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any, TextIO
+
+import msgspec
+from rich.console import Console
+from rich.table import Table
+
+from ..harness.record import to_json
+from ..case.io.atomic_files import (to_standard_output, write)
+
+# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
+LOG_WIDTH = 200
+
+
+class _Console(Console):
+    """One whose reader may go: what is left goes nowhere, and the command on, whose status is that of its results."""
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+        print_no_more(self.file)
+
+
+def print_no_more(file: IO[str]) -> None:
+    """Let what is left for a stream go to nowhere: the interpreter would complain of it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), file.fileno())
+
+
+def console(file: TextIO) -> Console:
+    """Where to print text as it is: names may have square brackets or colons, which rich takes for colours and pictures."""
+    return _Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False, emoji=False)
+
+
+def page(json: str | None) -> Console:
+    """Where to print: standard output, unless the JSON has it."""
+    return console(sys.stderr if json == "-" else sys.stdout)
+
+
+def columns(*heads: str, title: str | None = None) -> Table:
+    """A table without lines; columns whose heads begin with ">" stand right."""
+    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left", title_style="bold")
+    for head in heads:
+        right = head.startswith(">")
+        table.add_column(head.removeprefix(">"), justify="right" if right else "left", overflow="fold", no_wrap=right)
+    return table
+
+
+def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> None:
+    """Write the answer as JSON to a file, or for "-" to standard output. Before it is printed: who reads that may have gone.
+
+    Raises:
+        KincheckError: the file cannot be written.
+    """
+    if json == "-":
+        to_standard_output(to_json(found))
+    elif json is not None:
+        write("--json", Path(json), to_json(found))
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names, one after the other."""
+    return ", ".join(names) or "none"

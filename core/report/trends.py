@@ -1,0 +1,36 @@
+"""Trends of a history as the report draws them: errors and times of each engine on each case, over the runs."""
+
+from __future__ import annotations
+
+from ..harness.labels import product
+from .figure_data import Past
+from ..history.queries import (Entry, History, unit_of)
+from ..history.store import RunRow
+
+
+def trends(history: History) -> dict[str, list[Past]]:
+    """What each engine made of each case, by case, in the order of the runs."""
+    found: dict[str, list[Past]] = {}
+    place = {run: k for k, run in enumerate(history.runs)}
+    for (case, engine, mode), entries in history.pairs.items():
+        name = product(engine, mode)
+        for entry in entries:
+            row = history.runs[entry.run]
+            found.setdefault(case, []).append(Past(run_name(row), name, largest_length(entry, case, row), entry.us_per_step))
+    names = {run_name(row): place[row.id] for row in history.runs.values()}
+    return {case: sorted(each, key=lambda past: names[past.run]) for case, each in found.items()}
+
+
+def run_name(row: RunRow) -> str:
+    """A run on an axis: its date, and its number, for there may be several a minute."""
+    return f"{row.started[:16].replace('T', ' ')} #{row.id}"
+
+
+def largest_length(entry: Entry, case: str, row: RunRow) -> float | None:
+    """The largest position error of the outputs that are lengths [m]; None where none was compared."""
+    lengths = [
+        deviations.position.max_abs
+        for name, deviations in entry.errors.items()
+        if deviations.position is not None and unit_of(row, case, name) == "m"
+    ]
+    return max(lengths, default=None)

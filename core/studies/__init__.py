@@ -1,0 +1,1 @@
+"""Studies: joint checks, tolerance studies, benchmarks, stress tests, diagnosis, and the paper's own figures."""

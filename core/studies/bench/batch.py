@@ -1,0 +1,122 @@
+"""Cost against batch size: variants of a mechanism's hardpoints, solved together, lanes being variants."""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import dataclass, field
+
+import msgspec
+import numpy as np
+
+from ...case.case import Case, size
+from ...harness.compare import output_series
+from ...joints import Kind
+from ...kinematics.compiled.compiled_model import Model, compile_model
+from ...kinematics.compiled.request import Request
+from ...kinematics.compiled.samples import Route
+from ...kinematics.design_batch import Variants, solve_variants
+from ...kinematics.formulation.parameters import kinds, places
+from ...program.llvm.compiler import available
+from ...trajectory import QUANTITIES, Array, PointMotion, Trajectory
+from .native_breakdown import MOTIONS, flops_of
+from .peak import Peak
+from .rounds import Spread, Work, take_turns
+
+SIZES = (1, 4, 16, 64, 256, 1024, 4096)
+# Standard deviation of the hardpoints' coordinates, relative to the mechanism's size: that of a tolerance study.
+SCATTER = 1e-3
+SEED = 943745
+
+
+class Batch(msgspec.Struct, frozen=True, kw_only=True):
+    """So many variants solved together.
+
+    Attributes:
+        solved: part of all samples that were reached; retried: variants that were solved again alone.
+        error: of the first variant, which is the case itself: largest position error of the outputs that are lengths [m].
+        us_per_sample: by sample and variant.
+        flops_per_sample, gflops: of the programs, for accepted samples; and by nanosecond.
+        of_peak: part of the measured peak of a core; null where that is not known.
+    """
+
+    case: str
+    variants: int
+    loop: str
+    solved: float
+    retried: int
+    error: float | None
+    us_per_sample: Spread
+    flops_per_sample: float
+    gflops: float
+    of_peak: float | None
+
+
+@dataclass
+class _Batch:
+    """A batch to be timed, and what its last solution was."""
+
+    route: Route
+    geometry: Array
+    tol: float
+    found: list[Variants] = field(default_factory=list[Variants])
+
+    def __call__(self) -> None:
+        self.found = [solve_variants(self.route, self.geometry, self.tol)]
+
+
+def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[Batch]:
+    """Solve batches of all sizes, the peak kernel taking turns with them.
+
+    Args:
+        case: with its truth.
+    """
+    values = places(case.mechanism)
+    varied = tuple(name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION)
+    path = case.sweep.path
+    model = compile_model(case.mechanism, Request(tuple(path.motions), case.points, varied=varied))
+    nominal = np.array([number for name in varied for number in values[name]])
+    scatter = np.random.default_rng(SEED).normal(size=(len(nominal), max(SIZES))) * SCATTER * size(case)
+    scatter[:, 0] = 0.0
+    batches = {str(count): _Batch(Route(model, path), nominal[:, None] + scatter[:, :count], tol) for count in SIZES}
+    work: dict[str, Work] = {**batches}
+    if peak is not None:
+        work["peak"] = peak
+    seconds = take_turns(work, rounds)
+    most = None if peak is None else peak.rate(seconds["peak"])
+    return [_batch(case, model, each, seconds[name], most) for name, each in batches.items()]
+
+
+def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float | None) -> Batch:
+    (found,) = batch.found
+    n, count = found.solved.shape
+    reached = int(found.solved.sum())
+    taken: list[float] = found.kept[model.rows["iterations"].start][found.solved].tolist()
+    iterations = statistics.fmean(taken) if taken else 0.0
+    flops = flops_of(model, iterations, MOTIONS)
+    rate = flops * reached / seconds.median
+    return Batch(
+        case=case.name,
+        variants=count,
+        loop="compiled" if available() else "python",
+        solved=reached / (n * count),
+        retried=found.retried,
+        error=_error(case, model, found),
+        us_per_sample=seconds.times(1e6 / (n * count)),
+        flops_per_sample=flops,
+        gflops=1e-9 * rate,
+        of_peak=None if peak is None else rate / peak,
+    )
+
+
+def _error(case: Case, model: Model, found: Variants) -> float | None:
+    """Of the first variant."""
+    kept = found.kept[:, :, 0]
+    points = {name: PointMotion(*(kept[model.rows[f"{label} {name}"]].T for label in QUANTITIES)) for name in case.points}
+    solved = found.solved[:, 0]
+    whole = Trajectory(points, solved, np.zeros_like(solved, dtype=np.int64), 0.0, "", {})
+    errors = [
+        np.abs(output_series(case, output, whole).position - case.reference[output.name].position)
+        for output in case.outputs
+        if output.unit == "m" and output.name in case.reference
+    ]
+    return float(np.max(errors)) if errors and np.isfinite(errors).all() else None

@@ -1,0 +1,43 @@
+"""What a process of its own does to time the first use of the native engine, stage by stage."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import sys
+from collections.abc import Sequence
+from itertools import pairwise
+from time import perf_counter
+
+from ...kinematics.solver_selection import prepare
+from .native_breakdown import Level
+
+STAGES = ("import numpy", "import kincheck", "build", "first solve", "second solve", "ten more", "solve anew")
+FIRST = STAGES[1:4]
+"""Those to the first solution, beyond numpy."""
+
+
+def first_use(clock: Sequence[float]) -> None:
+    """Build and solve the pickled case on standard input; print the seconds of all stages as a line of JSON.
+
+    Solved anew is what was solved before, asked for again as of `solve`.
+
+    Args:
+        clock: when the process began, had imported numpy and then what it takes to solve.
+    """
+    case, tol = pickle.load(sys.stdin.buffer)
+    begin = perf_counter()
+    level = Level()
+    model = level.build(case)
+    now = [begin, perf_counter()]
+    for solves in (1, 1, 10):  # in the course of ten more, programs are compiled
+        for _ in range(solves):
+            level.solve(model, case, tol)
+        now.append(perf_counter())
+    anew = 0.0
+    for _ in range(2):  # the first time nothing of it is among what is kept
+        begin = perf_counter()
+        prepare(case.mechanism, level.request(case), case.sweep.path)(tol)
+        anew = perf_counter() - begin
+    stages = [*(b - a for each in (clock, now) for a, b in pairwise(each)), anew]
+    print(json.dumps(dict(zip(STAGES, stages, strict=True))))

@@ -1,0 +1,248 @@
+"""The benchmark of run time against error, and of what else time and memory depend on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from ...case.case import Case
+from ...errors import KincheckError
+from ...harness.engine import Engine
+from ...harness.provenance import THREADS, circumstances
+from ...harness.run import NATIVE
+from ...program.llvm import compiler
+from ...program.llvm.jit import compiled_at_once
+from ...report.figure_data import Effort
+from ..paper.formulation import Formulation
+from . import native_breakdown, scaling
+from .batch import Batch, measure_batches
+from .peak import Peak, prepare
+from .precision import Contestant, Entry, FloorOf, Needed, contestants, efforts_of, floors, needed, with_truth
+from .processes import Process, measure_processes
+from .rounds import Spread, Work, take_turns
+from .scaling import Scaling
+from .size import Size, measure_sizes
+from .study_throughput import StudyRate, measure_studies
+
+NAME = "bench"
+PARTS = ("work", "batch", "study", "size", "processes")
+"""What may be measured: work against precision, cost of batches, of a study, and against mechanism size, first use and memory."""
+
+# Sizes of chain and ring as one sparse system. A round of them takes seconds, which few interruptions are long against.
+LARGE, LARGE_ROUNDS = (100, 1000), 3
+
+
+class Rate(msgspec.Struct, frozen=True, kw_only=True):
+    """Arithmetic by time.
+
+    Attributes:
+        us_per_sample: median; null for the peak.
+        flops_per_sample: of the programs, for accepted samples.
+        gflops: a nanosecond; of_peak: part of the peak in the same rounds.
+    """
+
+    case: str
+    what: str
+    us_per_sample: float | None
+    flops_per_sample: float | None
+    gflops: float
+    of_peak: float
+
+
+class Bench(msgspec.Struct, frozen=True, kw_only=True):
+    """The results of this benchmark; a part that was not asked for is empty.
+
+    Attributes:
+        run: circumstances; load: of the machine, as it tells them for the last minute, before and after.
+        vector_width: doubles in a vector of the compiled code; null without a compiler.
+        entries: engines at their efforts, on each case; levels: the native engine in detail.
+    """
+
+    schema: Literal["kincheck-bench/1"] = "kincheck-bench/1"
+    run: dict[str, Any]
+    rounds: int
+    vector_width: int | None
+    entries: list[Entry] = []
+    needed: list[Needed] = []
+    floors: list[FloorOf] = []
+    levels: list[Entry] = []
+    rates: list[Rate] = []
+    batches: list[Batch] = []
+    studies: list[StudyRate] = []
+    sizes: list[Size] = []
+    scalings: list[Scaling] = []
+    processes: list[Process] = []
+    formulation: Formulation | None = None
+
+
+@compiled_at_once()
+def measure(
+    cases: Mapping[str, Case],
+    engines: Sequence[Engine],
+    *,
+    tol: float,
+    rounds: int,
+    parts: Collection[str],
+    command: str,
+    tell: Callable[[str], object],
+) -> Bench:
+    """Measure the parts asked for. Batches, studies and processes are of the first case.
+
+    Args:
+        cases: by name as on the command line; at least one.
+        engines: in both modes.
+        tol: largest accepted constraint residual, as for `Engine.solve`.
+        tell: told what is being measured.
+
+    Raises:
+        KincheckError: a case has no reference and cannot be given one.
+    """
+    started, before = datetime.now(UTC), _load()
+    found: dict[str, list[Any]] = {}
+
+    def add(what: str, rows: Sequence[Any]) -> None:
+        found.setdefault(what, []).extend(rows)
+
+    peak = prepare() if compiler.available() else None
+    true = {name: with_truth(case, tol) for name, case in cases.items()}
+    if "work" in parts:
+        for case in true.values():
+            _measure_work(case, engines, tol, rounds, peak, add, tell)
+    name, first = next(iter(true.items()))
+    projections = [engine for engine in engines if engine.mode == "projection"]
+    if "batch" in parts:
+        tell(f"{first.name}: batches of variants")
+        add("batches", measure_batches(first, tol, rounds, peak))
+    if "study" in parts:
+        tell(f"{first.name}: a study by threads")
+        add("studies", measure_studies(first, tol, rounds, peak))
+    if "size" in parts:
+        tell("chains and rings of loops")
+        add("sizes", measure_sizes(projections, tol, rounds))
+        if any(engine.name == NATIVE for engine in engines):
+            tell("large mechanisms")
+            add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
+    if "processes" in parts:
+        tell(f"{first.name}: processes of their own")
+        names = {engine.name for engine in projections}  # variants of a simulator take the memory that it takes
+        add("processes", measure_processes(first, name, [engine for engine in engines if engine.name in names], tol, rounds))
+    run = circumstances([*true.values()], started=started, tol=tol, command=command)
+    run |= {"cores": os.cpu_count(), "load_before": before, "load_after": _load(), "linear_algebra_threads": _threads()}
+    facts: dict[str, Any] = {"run": run, "rounds": rounds, "vector_width": peak and peak.width, **found}
+    return Bench(**facts)
+
+
+def _measure_work(
+    case: Case,
+    engines: Sequence[Engine],
+    tol: float,
+    rounds: int,
+    peak: Peak | None,
+    add: Callable[[str, Sequence[Any]], object],
+    tell: Callable[[str], object],
+) -> None:
+    """A case's work and precision, its floors, and the native engine in detail: all in the same rounds."""
+    entering: dict[tuple[str, str], Contestant] = {}
+    for engine in engines:
+        for each in contestants(case, efforts_of(engine), tol):
+            entering[f"{engine.name} {engine.mode}", each.entry.setting] = each
+    detailed = any(engine.name == NATIVE for engine in engines)
+    if detailed:
+        for each in contestants(case, native_breakdown.LEVELS, tol):
+            entering["levels", each.entry.setting] = each
+    work: dict[tuple[str, str], Work] = {key: each.work for key, each in entering.items() if each.work is not None}
+    if detailed and compiler.available():
+        work["levels", native_breakdown.ALONE] = native_breakdown.loops_alone(case, tol)
+    if peak is not None:
+        work["peak", ""] = peak
+    tell(f"{case.name}: {len(work)} contestants, {rounds} rounds")
+    seconds = take_turns(work, rounds)
+    timed = {key: each.timed(seconds.get(key)) for key, each in entering.items()}
+    entries = [entry for (kind, _), entry in timed.items() if kind != "levels"]
+    native = {setting: entry for (kind, setting), entry in timed.items() if kind == "levels"}
+    if ("levels", native_breakdown.ALONE) in seconds:
+        whole = native[native_breakdown.EVERYTHING]
+        alone = seconds["levels", native_breakdown.ALONE].times(1e6 / whole.samples)
+        native[native_breakdown.ALONE] = msgspec.structs.replace(whole, setting=native_breakdown.ALONE, us_per_sample=alone)
+    add("entries", entries)
+    add("needed", needed(entries))
+    add("levels", [*native.values()])
+    tell(f"{case.name}: floors")
+    add("floors", floors(case, engines))
+    if peak is not None:
+        add("rates", _rates(case, native, peak, seconds["peak", ""]))
+
+
+def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread) -> list[Rate]:
+    most = 1e-9 * peak.rate(seconds)
+    vectors = f"vectors of {peak.width} doubles"
+    rates = [
+        Rate(
+            case=case.name,
+            what=f"peak of one core: multiply and add, {vectors}",
+            us_per_sample=None,
+            flops_per_sample=None,
+            gflops=most,
+            of_peak=1.0,
+        )
+    ]
+    for setting in (native_breakdown.EVERYTHING, native_breakdown.ALONE):
+        entry = native.get(setting)
+        if entry is None or entry.us_per_sample is None:
+            continue
+        flops = native_breakdown.flops_of(native_breakdown.Level().build(case).model, entry.iterations or 0.0)
+        us = entry.us_per_sample.median
+        rates.append(
+            Rate(
+                case=case.name,
+                what=f"one sweep, {setting}",
+                us_per_sample=us,
+                flops_per_sample=flops,
+                gflops=1e-3 * flops / us,
+                of_peak=1e-3 * flops / us / most,
+            )
+        )
+    return rates
+
+
+def _load() -> float | None:
+    """Processes that want to run, over the last minute; None where the system does not tell."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
+def _threads() -> str:
+    return os.environ.get(THREADS[0], "as many as it likes")
+
+
+def efforts_in(file: Path) -> dict[str, list[Effort]]:
+    """What a file of this benchmark has for the diagrams of a run's report: error and time of each engine's efforts, by case.
+
+    Raises:
+        KincheckError: it cannot be read or is none.
+    """
+    try:
+        found = msgspec.json.decode(file.read_bytes(), type=Bench)
+    except (OSError, msgspec.DecodeError) as error:
+        raise KincheckError(f"--bench {file}: {error}; give a bench.json that kincheck bench wrote") from None
+    efforts: dict[str, list[Effort]] = {}
+    for entry in found.entries:
+        efforts.setdefault(entry.case, []).extend(effort(entry))
+    return efforts
+
+
+def effort(entry: Entry) -> list[Effort]:
+    """The entry's point in a diagram of error against time; none where it has no time or no error."""
+    if entry.us_per_sample is None or entry.errors.position is None:
+        return []
+    name = entry.engine if entry.mode == "projection" else f"{entry.engine} · {entry.mode}"
+    return [Effort(name, entry.setting, entry.errors.position, entry.us_per_sample.median, entry.mode)]
+
+
+def with_formulation(found: Bench, formulation: Formulation) -> Bench:
+    """The results with those of the formulation's benchmark."""
+    return msgspec.structs.replace(found, formulation=formulation)

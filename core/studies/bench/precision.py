@@ -1,0 +1,220 @@
+"""Work and precision: what each engine reaches on a case at each of its efforts, judged as a run judges, and by how much work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ...case.case import Case, Truth
+from ...case.io.reference_file import series
+from ...harness.engine import Engine, Measurable
+from ...harness.record import Outcome, Record
+from ...harness.run import run
+from ...trajectory import Trajectory
+from ..verified_reference import prove_case
+from .rounds import Spread
+
+# Digits to which a case without a reference is proved: more than a double has.
+DIGITS = 20
+
+REQUIRED = (1e-3, 1e-6, 1e-9, 1e-12)
+"""Position errors [m] for which the least time is looked up."""
+
+
+class Errors(msgspec.Struct, frozen=True, kw_only=True):
+    """Largest errors over all samples and all outputs that are lengths [m, m/s, m/s^2]; null where nothing was compared."""
+
+    position: float | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+
+
+class Entry(msgspec.Struct, frozen=True, kw_only=True):
+    """What an engine made of a case at one effort.
+
+    Attributes:
+        setting: the effort, in words; settings: all that the engine says of itself.
+        outcome, message: as in a run, by the tolerances of the case: a coarse effort is expected to fail them.
+        against: what the errors are of.
+        residual: the engine's own largest constraint residual [m or -].
+        iterations: by sample: Newton's; in simulate mode, steps.
+        us_per_sample: warm; null where not all samples were reached.
+    """
+
+    case: str
+    engine: str
+    mode: str
+    loop: str
+    version: str | None
+    setting: str
+    settings: dict[str, Any]
+    outcome: Outcome
+    message: str
+    against: str | None
+    errors: Errors
+    solved: int | None
+    samples: int
+    residual: float | None
+    iterations: float | None
+    us_per_sample: Spread | None = None
+
+
+class Needed(msgspec.Struct, frozen=True, kw_only=True):
+    """The least time in which an engine meets a required error; null, and why, where it does not.
+
+    Attributes:
+        required: largest position error allowed [m].
+    """
+
+    case: str
+    engine: str
+    mode: str
+    loop: str
+    required: float
+    setting: str | None
+    us_per_sample: float | None
+    reason: str | None = None
+
+
+class FloorOf(msgspec.Struct, frozen=True, kw_only=True):
+    """A simulator's floor on a case; see `Floor`."""
+
+    case: str
+    engine: str
+    mode: str
+    us_per_sample: float
+    counted: str
+    parts: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """An entry, and its work: one warm solve of all samples. None where there is nothing to be timed."""
+
+    entry: Entry
+    work: Callable[[], Trajectory] | None
+
+    def timed(self, seconds: Spread | None) -> Entry:
+        """The entry with the time of its work."""
+        if seconds is None:
+            return self.entry
+        return msgspec.structs.replace(self.entry, us_per_sample=seconds.times(1e6 / self.entry.samples))
+
+
+def with_truth(case: Case, tol: float) -> Case:
+    """The case with a reference for its positions: its own, or one that is proved here.
+
+    Raises:
+        KincheckError: there is none, and python-flint, which proves one, is not installed.
+    """
+    if all(output.name in case.reference for output in case.outputs):
+        return case
+    proved, _ = prove_case(case, digits=DIGITS, numbers="double", tol=tol)
+    truth = series(Path(f"{case.name} as proved"), proved, case.sweep.values, case.outputs)
+    return replace(case, truth=Truth.IN_HOUSE_ORACLE, reference=truth)
+
+
+def efforts_of(engine: Engine) -> Mapping[str, Engine]:
+    """The engine at all its efforts; one that has none to choose is taken as it comes."""
+    return engine.efforts() if isinstance(engine, Measurable) else {"as it comes": engine}
+
+
+def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[Contestant]:
+    """An engine at several efforts, each having solved the case; one alone where it cannot.
+
+    Args:
+        case: with its truth.
+    """
+    found: list[Contestant] = []
+    for setting, engine in engines.items():
+        (record,) = run([case], [engine], tol=tol, residuals=False).records
+        entry = _entry(case, record, setting)
+        found.append(Contestant(entry, _work(case, engine, tol) if record.us_per_step is not None else None))
+        if record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
+            break
+    return found
+
+
+def _work(case: Case, engine: Engine, tol: float) -> Callable[[], Trajectory]:
+    model = engine.build(case)
+    return lambda: engine.solve(model, case, tol)
+
+
+def _entry(case: Case, record: Record, setting: str) -> Entry:
+    lengths = {output.name for output in case.outputs if output.unit == "m"}
+    largest: dict[str, float] = {}
+    against: list[str] = []
+    for name, each in record.errors.items():
+        for quantity, deviation in each.items() if name in lengths else []:
+            largest[quantity] = max(largest.get(quantity, 0.0), deviation.max_abs)
+            against.append(deviation.against)
+    return Entry(
+        case=case.name,
+        engine=record.engine,
+        mode=record.mode,
+        loop=record.loop,
+        version=record.version,
+        setting=setting,
+        settings=record.settings,
+        outcome=record.outcome,
+        message=record.message,
+        against=", ".join(dict.fromkeys(against)) or None,
+        errors=Errors(**largest),
+        solved=record.solved,
+        samples=len(case.sweep.values),
+        residual=record.residual_max,
+        iterations=record.iterations / record.solved if record.iterations is not None and record.solved else None,
+    )
+
+
+def needed(entries: Sequence[Entry]) -> list[Needed]:
+    """The fastest effort of each engine that meets each required error, on each case."""
+    found: list[Needed] = []
+    for key in dict.fromkeys((e.case, e.engine, e.mode) for e in entries):
+        mine = [e for e in entries if (e.case, e.engine, e.mode) == key]
+        for required in REQUIRED:
+            found.append(_fastest(mine, required))
+    return found
+
+
+def _fastest(mine: Sequence[Entry], required: float) -> Needed:
+    timed = [(e.us_per_sample.median, e) for e in mine if e.us_per_sample is not None]
+    meeting = [(us, e) for us, e in timed if e.errors.position is not None and e.errors.position <= required]
+    first = mine[0]
+    of: dict[str, Any] = {"case": first.case, "engine": first.engine, "mode": first.mode, "loop": first.loop, "required": required}
+    if meeting:
+        us, best = min(meeting, key=lambda each: each[0])
+        return Needed(**of, setting=best.setting, us_per_sample=us)
+    errors = [e.errors.position for _, e in timed if e.errors.position is not None]
+    if errors:
+        reason = f"none of its efforts: the best has {min(errors):.1e} m"
+    elif timed:
+        reason = "no position error is known"
+    else:
+        reason = f"{first.outcome}: {first.message}"
+    return Needed(**of, setting=None, us_per_sample=None, reason=reason)
+
+
+def floors(case: Case, engines: Iterable[Engine]) -> list[FloorOf]:
+    """The floors of those engines that have one on the case."""
+    found: list[FloorOf] = []
+    for engine in engines:
+        if not isinstance(engine, Measurable) or engine.version() is None or engine.unsupported(case):
+            continue
+        if (floor := engine.floor(case)) is None:
+            continue
+        found.append(
+            FloorOf(
+                case=case.name,
+                engine=engine.name,
+                mode=engine.mode,
+                us_per_sample=floor.us_per_sample,
+                counted=floor.counted,
+                parts=dict(floor.parts),
+            )
+        )
+    return found

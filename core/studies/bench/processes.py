@@ -1,0 +1,145 @@
+"""What the first use costs, and memory: each figure is that of a fresh process, the kinds of processes taking turns."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+import msgspec
+
+from ...case.case import Case
+from ...harness.engine import Engine
+from .cold_start import FIRST, STAGES
+from .rounds import Spread, spread
+
+# A process takes a second: as many rounds as of solves would take minutes.
+MOST_ROUNDS = 5
+
+NUMPY = "import numpy"
+EMPTY, CACHED = "native, first use, empty code cache", "native, first use, code from the cache"
+# On Linux; getrusage there counts the memory of the process that it was started from as well.
+_TELL = """
+try:
+    with open("/proc/self/status") as lines:
+        print(*(line.split()[1] for line in lines if line.startswith("VmHWM")))
+except OSError:
+    print()
+"""
+_IMPORT_NUMPY = f"import numpy{_TELL}"
+_FIRST_USE = f"""
+from time import perf_counter
+clock = [perf_counter()]
+import numpy
+clock.append(perf_counter())
+from kincheck.core import solve
+clock.append(perf_counter())
+from kincheck.core.studies.bench import cold_start
+cold_start.first_use(clock){_TELL}"""
+# what the console script does, with everything in one process, so that its memory is all there is
+_RUN = f"""
+import sys
+from kincheck.core.cli.main import main
+status = main(sys.argv[1:]){_TELL}sys.exit(status)"""
+
+
+class Process(msgspec.Struct, frozen=True, kw_only=True):
+    """A kind of process.
+
+    Attributes:
+        seconds: from its start to its end.
+        status: exit status of the last: of a run, 1 is a deviation.
+        stages: seconds of its parts, for the first use of the native engine.
+        peak_mb: the most memory held [MB]; null where the system does not tell.
+    """
+
+    what: str
+    seconds: Spread
+    status: int
+    stages: dict[str, Spread]
+    peak_mb: float | None
+
+    @property
+    def beyond_numpy(self) -> float | None:
+        """Seconds from the import of numpy to the first solution."""
+        return sum(self.stages[name].median for name in FIRST) if self.stages else None
+
+
+@dataclass
+class _Kind:
+    """How to start it, and what was found so far."""
+
+    what: str
+    code: str
+    arguments: Sequence[str] = ()
+    given: bytes = b""
+    folder: Path | None = None
+    rounds: int = 1
+    seconds: list[float] = field(default_factory=list[float])
+    stages: list[Mapping[str, float]] = field(default_factory=list[Mapping[str, float]])
+    peaks: list[float | None] = field(default_factory=list[float | None])
+    status: int = 0
+
+
+def measure_processes(case: Case, name: str, engines: Sequence[Engine], tol: float, rounds: int) -> list[Process]:
+    """Start processes: importing numpy, the first use of the native engine, and `kincheck run` with each engine.
+
+    Args:
+        name: of the case, as on the command line.
+    """
+    rounds = min(rounds, MOST_ROUNDS)
+    given = pickle.dumps((case, tol))
+    with tempfile.TemporaryDirectory() as folder:
+        kept = Path(folder) / "kept"
+        kinds = [
+            _Kind(NUMPY, _IMPORT_NUMPY, rounds=rounds),
+            _Kind(EMPTY, _FIRST_USE, given=given, rounds=rounds),
+            _Kind(CACHED, _FIRST_USE, given=given, folder=kept, rounds=rounds),
+        ]
+        for engine in engines:
+            mode = "" if engine.mode == "projection" else f" --mode {engine.mode}"
+            asked = f"--engine {engine.name}{mode}"
+            arguments = ["run", name, *asked.split(), "--jobs", "0"]
+            kinds.append(_Kind(f"kincheck run {asked}", _RUN, arguments, rounds=rounds if engine.name == "native" else 1))
+        _once(_Kind(CACHED, _FIRST_USE, given=given, folder=kept), kept)  # fills the cache, and the system's of files
+        for turn in range(rounds):
+            for kind in kinds:
+                if turn < kind.rounds:
+                    _once(kind, kind.folder or Path(folder) / f"new {turn}")
+    return [_process(kind) for kind in kinds]
+
+
+def _once(kind: _Kind, cache: Path) -> None:
+    environment = {key: value for key, value in os.environ.items() if key != "KINCHECK_HISTORY"}
+    if kind.given:  # `kincheck run` is timed as a user has it, with the user's own cache
+        environment["XDG_CACHE_HOME"] = str(cache)
+    begin = perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-c", kind.code, *kind.arguments], input=kind.given, capture_output=True, env=environment, check=False
+    )
+    kind.seconds.append(perf_counter() - begin)
+    kind.status = done.returncode
+    lines = done.stdout.decode("utf-8", "replace").splitlines()
+    if done.returncode not in (0, 1) or not lines:
+        raise RuntimeError(f"{kind.what}: exit status {done.returncode}\n{done.stderr.decode('utf-8', 'replace')[-2000:]}")
+    kind.peaks.append(float(lines[-1]) / 1024.0 if lines[-1] else None)
+    if kind.given:
+        kind.stages.append(json.loads(lines[-2]))
+
+
+def _process(kind: _Kind) -> Process:
+    peaks = [each for each in kind.peaks if each is not None]
+    return Process(
+        what=kind.what,
+        seconds=spread(kind.seconds),
+        status=kind.status,
+        stages={name: spread([each[name] for each in kind.stages]) for name in STAGES} if kind.stages else {},
+        peak_mb=max(peaks, default=None),
+    )

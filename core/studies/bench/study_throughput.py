@@ -1,0 +1,100 @@
+"""Cost of a tolerance study by threads: variants drawn, solved and reduced, as `kincheck sweep` does it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from time import perf_counter
+
+import msgspec
+import numpy as np
+
+from ...case.case import Case, size
+from ...case.variation.variation import Coordinate, Law, Mode, Variation
+from ...joints import Kind
+from ...kinematics.formulation.parameters import kinds, places
+from ..tolerance.sweep import sweep_designs
+from .batch import SCATTER, SEED
+from .peak import Peak
+from .rounds import Spread, spread
+
+# Chunks as large as those of a million variants, and as many for each thread to end beside the other.
+VARIANTS = 262_144
+# Of some seconds each: their median is known well.
+MOST_ROUNDS = 8
+# Of the peak kernel in a round: as long as some chunks of a study take.
+CALLS = 1000
+
+
+class StudyRate(msgspec.Struct, frozen=True, kw_only=True):
+    """A study on so many threads.
+
+    Attributes:
+        us_per_sample: of the whole machine, by sample and variant.
+        times: as fast as on one thread, by round; that of one thread is one.
+        peak_times: the same of the peak kernel, which needs no memory: what the machine gives; null where that is not known.
+        unsolved: variants without a solution somewhere.
+    """
+
+    case: str
+    variants: int
+    jobs: int
+    us_per_sample: Spread
+    times: Spread
+    peak_times: Spread | None
+    unsolved: int
+
+
+def measure_studies(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[StudyRate]:
+    """Sweep over designs on one thread and on two, in turns; on one only where there is no second processor."""
+    variation, jobs = _every_hardpoint(case), range(1, 1 + min(2, os.cpu_count() or 1))
+    seconds: dict[int, list[float]] = {each: [] for each in jobs}
+    kernel: dict[int, list[float]] = {each: [] for each in jobs}
+    found = {each: sweep_designs(case, variation, samples=VARIANTS // 8, seed=SEED, tol=tol, jobs=each) for each in jobs}  # warm
+    for _ in range(min(rounds, MOST_ROUNDS)):
+        for each in jobs:
+            found[each] = sweep_designs(case, variation, samples=VARIANTS, seed=SEED, tol=tol, jobs=each)
+            seconds[each].append(found[each].measured["seconds"])
+            if peak is not None:
+                kernel[each].append(_side_by_side(peak, each) / each)
+    points = VARIANTS * len(case.sweep.values)
+    return [
+        StudyRate(
+            case=case.name,
+            variants=VARIANTS,
+            jobs=each,
+            us_per_sample=spread(seconds[each]).times(1e6 / points),
+            times=_times(seconds, each),
+            peak_times=_times(kernel, each) if peak is not None else None,
+            unsolved=found[each].unsolved,
+        )
+        for each in jobs
+    ]
+
+
+def _times(seconds: dict[int, list[float]], jobs: int) -> Spread:
+    return spread([one / several for one, several in zip(seconds[1], seconds[jobs], strict=True)])
+
+
+def _side_by_side(work: Callable[[], object], jobs: int) -> float:
+    """Seconds of as many calls in each of some threads."""
+    begin = perf_counter()
+    with ThreadPoolExecutor(jobs) as pool:
+        for done in [pool.submit(lambda: [work() for _ in range(CALLS)]) for _ in range(jobs)]:
+            done.result()
+    return perf_counter() - begin
+
+
+def _every_hardpoint(case: Case) -> Variation:
+    """All points and lengths by themselves, as in batches."""
+    known, scale = places(case.mechanism), SCATTER * size(case)
+    varied = [name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION]
+    coordinates = [
+        Coordinate(name, axis, "m", Law.NORMAL, scale)
+        for name in varied
+        for axis in ("xyz" if len(known[name]) == 3 else ("",))
+    ]  # fmt: skip
+    nominal = np.array([number for name in varied for number in known[name]])
+    sizes = {name: len(known[name]) for name in varied}
+    return Variation(Mode.MONTE_CARLO, tuple(coordinates), sizes, nominal, np.eye(len(nominal)))

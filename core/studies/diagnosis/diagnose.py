@@ -1,0 +1,193 @@
+"""The diagnosis of a case: freedom and rank by name, conditioning along the sweep, what its outputs depend on."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from ...case.case import MARKER, ORDERS, Case
+from ...case.notes import notes
+from ...errors import SolveError, shortened
+from ...kinematics.diagnosis.conditioning import Conditioning, conditioning
+from ...kinematics.diagnosis.instantaneous_screws import Screw, described
+from ...kinematics.diagnosis.rank import Blocked, ComponentCount, Dependency, NamedRow, Ranks, Violation
+from ...kinematics.formulation.parameters import places
+from ..explain import explain
+from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
+
+SCHEMA = "kincheck-explain/1"
+
+
+class Freedom(msgspec.Struct, frozen=True):
+    """The count of the degrees of freedom. paper: by the paper's count (Table 5)."""
+
+    dof: int
+    drivers: list[str]
+    coordinates: int
+    rows: int
+    rank: int
+    paper: str
+
+
+class Nearly(msgspec.Struct, frozen=True):
+    """Rows of which a combination nearly vanishes: its size, which is a singular value of the joint rows."""
+
+    size: float
+    rows: list[NamedRow]
+
+
+class Sample(msgspec.Struct, frozen=True):
+    """How well a pose of the sweep is determined; see `PoseConditioning`. condition is null where it is singular."""
+
+    value: float
+    smallest: float
+    largest: float
+    condition: float | None
+    orientation: float
+    direction: list[Screw]
+
+
+class Diagnosis(msgspec.Struct, frozen=True):
+    """All that is found. findings: why the case cannot be solved as described; empty where it can.
+
+    Attributes:
+        notes: what is to be known of the joints' geometry.
+        binding: numbers of the geometry that cannot be changed alone without contradiction.
+        signs: the convention of the outputs that have one, in words; empty without.
+        not_derived: outputs that are not functions of the pose alone, and have no budget and sensitivities.
+        programs: what the native engine computes, and leaves out, in lines to read.
+    """
+
+    schema: str
+    case: str
+    findings: list[str]
+    notes: list[str]
+    freedom: Freedom
+    components: list[ComponentCount]
+    redundant: list[Dependency]
+    nearly_redundant: list[Nearly]
+    free: list[list[Screw]]
+    blocked: list[Blocked]
+    contradictions: list[Violation]
+    swept: str
+    reached: int
+    samples: list[Sample]
+    redundant_residual: float | None
+    budgets: list[Budget]
+    sensitivities: list[Sensitivity]
+    binding: list[str]
+    signs: str
+    not_derived: list[str]
+    programs: list[str]
+
+    @property
+    def worst(self) -> Sample | None:
+        """The sample with the smallest singular value."""
+        return min(self.samples, key=lambda each: each.smallest, default=None)
+
+
+def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
+    """Diagnose a case; one that cannot be solved is diagnosed as far as it goes.
+
+    Args:
+        samples: of the sweep to look at.
+        tol: residuals that engines leave, relative to the mechanism's size.
+
+    Raises:
+        SolveError: no body can move.
+    """
+    mechanism = case.mechanism
+    if not mechanism.moving:
+        raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
+    ranks = Ranks(mechanism)
+    account = ranks.account
+    findings = _findings(ranks)
+    swept: Conditioning | None = None
+    programs: list[str] = []
+    if not findings:
+        try:
+            programs = explain(case)
+            varied = [place for place in places(mechanism) if not place.startswith(f"points.{MARKER}")]
+            swept = conditioning(mechanism, case.sweep.path, case.sweep.values, read_points(case), varied, samples, tol)
+            findings += [swept.trajectory.message] * bool(swept.trajectory.message)
+        except SolveError as error:
+            findings.append(str(error))
+    freedom = Freedom(
+        account.dof,
+        [driver.name for driver in mechanism.drivers],
+        account.moving_coordinates,
+        account.rows,
+        account.rank,
+        account.counted,
+    )
+    design = {name: np.array(mechanism.point(name).position) for name in read_points(case)}
+    derived = swept is not None and bool(swept.poses)
+    return Diagnosis(
+        schema=SCHEMA,
+        case=case.name,
+        findings=findings,
+        notes=notes(case),
+        freedom=freedom,
+        components=ranks.components,
+        redundant=ranks.dependencies,
+        nearly_redundant=[Nearly(size, rows) for size, rows in ranks.nearly],
+        free=ranks.free,
+        blocked=ranks.blocked,
+        contradictions=ranks.contradictions,
+        swept=case.sweep.driver,
+        reached=int(swept.trajectory.solved.sum()) if swept else 0,
+        samples=_samples(swept) if swept else [],
+        redundant_residual=swept.trajectory.details["redundant_residual"] if swept else None,
+        budgets=budgets(case, swept, tol, design) if swept and derived else [],
+        sensitivities=sensitivities(case, swept, design) if swept and derived else [],
+        binding=binding(swept) if swept and derived else [],
+        signs=case.signs,
+        not_derived=[output.name for output in case.outputs if output.orders != ORDERS],
+        programs=programs,
+    )
+
+
+def _samples(swept: Conditioning) -> list[Sample]:
+    return [
+        Sample(p.value, p.smallest, p.largest, p.condition if p.smallest else None, p.orientation, p.direction) for p in swept.poses
+    ]
+
+
+def _findings(ranks: Ranks) -> list[str]:
+    """Why the mechanism cannot be solved as described."""
+    found: list[str] = []
+    count, drivers = ranks.account.dof, len(ranks.mechanism.drivers)
+    if ranks.contradictions:
+        found.append(
+            f"it does not close at the design: in the nearest pose these rows are off: {_violations(ranks.contradictions)}; "
+            "check the points, axes and lengths of these joints"
+        )
+    for each in ranks.blocked:
+        found.append(
+            f"driver {each.driver!r} cannot move what it drives: for each unit of it other rows would have to give way, at "
+            f"the least {_violations(each.rows)}; {_remedy(ranks)}"
+        )
+    if ranks.free and count > drivers:
+        motions = "; ".join(described(motion) for motion in ranks.free)
+        found.append(
+            f"{len(ranks.free)} motion{'s are' if len(ranks.free) > 1 else ' is'} left free with the drivers held: {motions}; add "
+            "a driver for each, or join what spins freely (a rod between two balls: use distance)"
+        )
+    elif ranks.free:
+        found.append(
+            f"at the design the drivers do not determine the motion (lock-up or dead centre), it can still move: "
+            f"{'; '.join(described(motion) for motion in ranks.free)}; drive another coordinate or shift the design"
+        )
+    return found
+
+
+def _remedy(ranks: Ranks) -> str:
+    if ranks.nearly:
+        size, rows = ranks.nearly[0]
+        owners = ", ".join(dict.fromkeys(row.owner for row in rows))
+        return f"a combination of rows of {owners} nearly vanishes ({size:.1e}): make their geometry exactly parallel or aligned"
+    return "remove a driver or free the mechanism"
+
+
+def _violations(rows: tuple[Violation, ...] | list[Violation], most: int = 4) -> str:
+    return shortened([f"{each.row} by {abs(each.amount):.2g} {'m' if 'along' in each.row.holds else 'rad'}" for each in rows], most)

@@ -1,0 +1,153 @@
+"""What outputs depend on: residuals that solvers leave, hence the tolerance that makes sense, and hardpoints."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+
+from ...algebra import Vec3, vec
+from ...case.case import ORDERS, Case, Quantity
+from ...jet import Jet
+from ...joints import Kind
+from ...kinematics.diagnosis.conditioning import Conditioning, Gradient, PoseConditioning
+from ...kinematics.formulation.parameters import kinds
+from ...trajectory import Array
+
+# The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for accelerations, whose rows carry rates.
+MARGIN = 100.0
+# Derivatives are of size one; below this they are round-off, a hundred times of a condition of 1e5.
+NOTHING = 1e-9
+ROUND_OFF = float(np.finfo(np.float64).eps)
+
+
+class Budget(msgspec.Struct, frozen=True):
+    """What residuals do to an output, and the tolerance that follows.
+
+    Attributes:
+        shift: by residuals of the tolerance in every row, at most over the samples [unit].
+        round_off: by residuals and a result rounded to double precision [unit].
+        at: driver value of the largest shift.
+        row: the row with the largest share in it, and that share of the whole.
+        suggested: tolerance by the house formula [unit].
+        atol: the case's.
+    """
+
+    output: str
+    unit: str
+    shift: float
+    round_off: float
+    at: float
+    row: str
+    share: float
+    suggested: float
+    why: str
+    atol: float
+
+
+class Sensitivity(msgspec.Struct, frozen=True):
+    """Derivative of an output by one number of the geometry, drivers held.
+
+    Attributes:
+        number: "joints.NAME.point x", "joints.NAME.length".
+        unit: the output's unit by m, or by rad where the place is a direction.
+        by_sample: at the samples that were looked at.
+    """
+
+    output: str
+    number: str
+    unit: str
+    by_sample: list[float]
+
+    @property
+    def largest(self) -> float:
+        """The largest over the samples, with its sign."""
+        return max(self.by_sample, key=abs)
+
+
+def budgets(case: Case, found: Conditioning, tol: float, design: dict[str, Array]) -> list[Budget]:
+    """The budget of every output that is a function of the pose alone."""
+    return [_budget(output, found, tol, design) for output in case.outputs if output.orders == ORDERS]
+
+
+def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str, Array]) -> Budget:
+    by_rows = [np.abs(_derivative(output, pose, design, "by_residuals")[1]) for pose in found.poses]
+    shifts = [float(rows.sum()) for rows in by_rows]
+    k = int(np.argmax(shifts))
+    row = int(by_rows[k].argmax())
+    size = max(float(np.abs(_derivative(output, pose, design, "by_residuals")[0]).max()) for pose in found.poses)
+    shift = tol * shifts[k]
+    suggested = _two_digits(MARGIN * shift)
+    why = (
+        f"100 times what residuals of {tol:g} in every row shift it by, at most {shift:.3g} {output.unit}: 10 for rows scaled "
+        "otherwise, 10 for accelerations"
+    )
+    share = float(by_rows[k][row]) / shifts[k] if shifts[k] else 0.0
+    name = "{}: {}".format(*found.poses[k].owners[row])
+    floor = ROUND_OFF * (shifts[k] + size)
+    return Budget(output.name, output.unit, shift, floor, found.poses[k].value, name, share, suggested, why, output.atol)
+
+
+def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> list[Sensitivity]:
+    """The derivatives that are not zero throughout, the largest of each output first."""
+    scales = np.array([scale for _, _, scale in found.numbers])
+    names, turning = _names(found), [place for place, kind in kinds(case.mechanism).items() if kind is Kind.DIRECTION]
+    result: list[Sensitivity] = []
+    for output in case.outputs:
+        if output.orders != ORDERS:
+            continue
+        table = np.array([_derivative(output, pose, design, "by_geometry")[1] * scales for pose in found.poses])
+        own: list[Sensitivity] = []
+        for k, (place, _, _) in enumerate(found.numbers):
+            if np.abs(table[:, k]).max() > NOTHING:
+                by = f"{output.unit}/{'rad' if place in turning else 'm'}"
+                own.append(Sensitivity(output.name, names[k], by, table[:, k].tolist()))
+        result += sorted(own, key=lambda each: -abs(each.largest))
+    return result
+
+
+def binding(found: Conditioning) -> list[str]:
+    """The numbers of the geometry that cannot be changed alone: redundant rows would then contradict the others."""
+    contradicted = np.max([np.abs(pose.contradicted).max(axis=0, initial=0.0) for pose in found.poses], axis=0)
+    return [name for name, rate in zip(_names(found), contradicted, strict=True) if rate > NOTHING]
+
+
+def _names(found: Conditioning) -> list[str]:
+    """The numbers of the geometry by name; a length has no components."""
+    count = Counter(place for place, _, _ in found.numbers)
+    return [place if count[place] == 1 else f"{place} {'xyz'[component]}" for place, component, _ in found.numbers]
+
+
+def _derivative(output: Quantity, pose: PoseConditioning, design: dict[str, Array], by: str) -> tuple[Array, Array]:
+    """Value and derivatives of an output by what its points move by."""
+    at = {name: _jets(gradient.position, getattr(gradient, by)) for name, gradient in pose.points.items()}
+    still = {name: _design(gradient, design[name], by) for name, gradient in pose.points.items()}
+    jet = output.of(at, still)
+    return jet.x, np.broadcast_to(jet.v, next(iter(at.values())).x.v.shape)
+
+
+def _design(gradient: Gradient, position: Array, by: str) -> Vec3:
+    """Where a point is at design: residuals do not shift it, hardpoints do."""
+    moved = gradient.design_by_geometry if by == "by_geometry" else np.zeros_like(gradient.by_residuals)
+    return _jets(position, moved)
+
+
+def _jets(position: Array, derivatives: Array) -> Vec3:
+    """A position as jets, what it is derived by in the place of time."""
+    return vec([Jet(np.full_like(d, x), d, np.zeros_like(d)) for x, d in zip(position, derivatives, strict=True)])
+
+
+def _two_digits(x: float) -> float:
+    """Rounded up to two digits."""
+    if not (x > 0.0 and math.isfinite(x)):
+        return x
+    digit = 10.0 ** (math.floor(math.log10(x)) - 1)
+    return float(f"{math.ceil(x / digit * (1.0 - 1e-12)) * digit:.1e}")
+
+
+def read_points(case: Case) -> Sequence[str]:
+    """The points that outputs which are functions of the pose read."""
+    return tuple(dict.fromkeys(point for output in case.outputs if output.orders == ORDERS for point in output.points))

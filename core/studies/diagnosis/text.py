@@ -1,0 +1,137 @@
+"""A diagnosis as text and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ...kinematics.diagnosis.instantaneous_screws import described
+from ...kinematics.diagnosis.rank import NamedRow
+from ...report.terminal import columns, listed
+from .diagnose import Diagnosis, Sample
+
+# Lines of tables that are only to show where to look; the JSON has all.
+SAMPLES, PLACES, TERMS = 9, 5, 6
+
+
+def print_diagnosis(found: Diagnosis, console: Console) -> None:
+    """Print all of it: findings first."""
+    for each in _parts(found):
+        console.print(each, soft_wrap=isinstance(each, Text))
+
+
+def _parts(found: Diagnosis) -> Iterator[Text | Table]:
+    yield Text(found.case, "bold")
+    for finding in found.findings:
+        yield Text(f"finding: {finding}", "bold red")
+    for note in found.notes:
+        yield Text(f"note: {note}", "yellow")
+    yield from _freedom(found)
+    if found.samples:
+        yield from _conditioning(found)
+    if found.budgets:
+        yield from _budgets(found)
+    if found.sensitivities:
+        yield from _sensitivities(found)
+    if found.not_derived and found.samples:
+        yield Text(f"not functions of the pose alone, so without tolerance and sensitivities here: {listed(found.not_derived)}")
+    if found.programs:
+        yield _head("what the native engine computes")
+        yield from map(Text, found.programs)
+
+
+def _head(line: str) -> Text:
+    return Text(f"\n{line}", "bold")
+
+
+def _freedom(found: Diagnosis) -> Iterator[Text | Table]:
+    freedom = found.freedom
+    yield _head(
+        f"freedom: {freedom.coordinates} coordinates - rank {freedom.rank} of {freedom.rows} joint rows = {freedom.dof}; "
+        f"drivers: {listed(freedom.drivers)}"
+    )
+    yield Text(f"by the paper's count {freedom.paper}")
+    table = columns("component", ">unknowns", ">rows", ">rank", ">freedom", "drivers")
+    for each in found.components:
+        numbers = (f"{n}" for n in (each.unknowns, each.rows, each.rank, each.dof))
+        table.add_row(listed(each.bodies), *numbers, listed(each.drivers))
+    yield table
+    if not found.redundant:
+        yield Text("redundant rows: none")
+    for each in found.redundant:
+        yield Text(f"redundant: {each.row} = {_sum(each.repeats)}")
+    if found.redundant_residual is not None and found.redundant:
+        yield Text(f"  along the sweep they hold to {found.redundant_residual:.1e} m")
+    for each in found.nearly_redundant:
+        yield Text(f"nearly redundant ({each.size:.1e}): {', '.join(map(str, each.rows))}", "yellow")
+
+
+def _sum(terms: Sequence[tuple[float, NamedRow]]) -> str:
+    if len(terms) > TERMS:
+        return f"a sum of {len(terms)} rows of {listed(list(dict.fromkeys(row.owner for _, row in terms)))}"
+    parts = [f"{'-' if w < 0.0 else '+'} {abs(w):.3g} [{row}]" for w, row in terms]
+    return " ".join(parts).removeprefix("+ ") or "0"
+
+
+def _conditioning(found: Diagnosis) -> Iterator[Text | Table]:
+    worst, count = found.worst, len(found.samples)
+    yield _head(f"conditioning along the sweep, {count} samples looked at, {found.reached} reached")
+    table = columns(f">{found.swept}", ">smallest sv", ">condition", "det", "least determined")
+    shown = {round(k * (count - 1) / (SAMPLES - 1)) for k in range(SAMPLES)}
+    for k, each in enumerate(found.samples):
+        if k in shown or each is worst:
+            condition = "singular" if each.condition is None else f"{each.condition:.3g}"
+            sign = "+" if each.orientation > 0 else "-" if each.orientation < 0 else "0"
+            moving = described(each.direction, 1)
+            table.add_row(
+                f"{each.value:.6g}", f"{each.smallest:.4g}", condition, sign, moving, style="bold" if each is worst else None
+            )
+    yield table
+    if worst is not None:
+        yield Text(f"worst at {found.swept} = {worst.value:.9g}: {described(worst.direction)}")
+    yield from _changes(found.samples, found.swept)
+
+
+def _changes(samples: Sequence[Sample], swept: str) -> Iterator[Text]:
+    for before, after in pairwise(samples):
+        if before.orientation * after.orientation < 0.0:
+            where = f"between {swept} = {before.value:.6g} and {after.value:.6g}"
+            yield Text(f"the determinant changes its sign {where}: there is a singular pose", "yellow")
+
+
+def _budgets(found: Diagnosis) -> Iterator[Text | Table]:
+    yield _head("round-off budget: what residuals that engines leave shift outputs by, and the tolerance that follows")
+    yield from _signs(found)
+    table = columns("output", ">shift", ">at", ">double precision", ">suggested", ">case has", "unit", "largest share")
+    for each in found.budgets:
+        numbers = f"{each.shift:.3g}", f"{each.at:.4g}", f"{each.round_off:.1e}", f"{each.suggested:.2g}", f"{each.atol:.3g}"
+        table.add_row(each.output, *numbers, each.unit, f"{each.row} ({each.share:.0%})")
+    yield table
+    yield Text(f'why = "{max(found.budgets, key=lambda each: each.shift).why}"')
+
+
+def _signs(found: Diagnosis) -> Iterator[Text]:
+    if found.signs:
+        yield Text(f"signs: {found.signs}")
+
+
+def _sensitivities(found: Diagnosis) -> Iterator[Text | Table]:
+    yield _head(f"sensitivity of the outputs to the geometry, drivers held: the {PLACES} largest of each")
+    yield from _signs(found)
+    table = columns("output", "number", ">largest", "unit", f">at {found.swept}")
+    shown: dict[str, int] = {}
+    for each in found.sensitivities:
+        shown[each.output] = shown.get(each.output, 0) + 1
+        if shown[each.output] > PLACES:
+            continue
+        at = found.samples[each.by_sample.index(each.largest)].value
+        name = each.output if shown[each.output] == 1 else ""
+        table.add_row(name, each.number, f"{each.largest:+.4g}", each.unit, f"{at:.4g}")
+    yield table
+    if found.binding:
+        places = dict.fromkeys(number.removesuffix(" " + number[-1]) for number in found.binding)
+        yield Text(f"changed alone, numbers of these bind (redundant rows contradict the others): {listed(list(places))}", "yellow")

@@ -1,0 +1,138 @@
+"""What a check of a joint type found, as data and as a table."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from io import StringIO
+from typing import TextIO
+
+import numpy as np
+
+from ...trajectory import Array
+
+
+class Verdict(StrEnum):
+    """What became of a check. A check that was not made is a row with its reason."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    SKIP = "skip"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check.
+
+    Attributes:
+        figure: the worst number found, and `limit` the largest accepted one; None where there is nothing to measure or to exceed.
+        why: the reason of the limit.
+        specimen, pose: numbers of the specimen and of the pose at which the worst was found; the seed reproduces them.
+        row: the equation it was found in, as "Dot11 row 2".
+        message: what the figure does not say; of a failure, what to do.
+    """
+
+    check: str
+    verdict: Verdict
+    figure: float | None = None
+    limit: float | None = None
+    why: str = ""
+    specimen: int | None = None
+    pose: int | None = None
+    row: str = ""
+    message: str = ""
+
+    @property
+    def badness(self) -> tuple[int, float]:
+        """For choosing the worst of several findings of one check."""
+        order = {Verdict.SKIP: 0, Verdict.PASS: 1, Verdict.FAIL: 2}
+        return order[self.verdict], self.figure if self.figure is not None else 0.0
+
+
+def judged(
+    check: str, figures: Array, limit: float, why: str, names: Sequence[str] = ("",), message: str = "", remedy: str = ""
+) -> Finding:
+    """The finding of figures by row and pose, shape (len(names), poses); what is not a number fails.
+
+    Args:
+        message: said whatever the verdict.
+        remedy: said of a failure.
+    """
+    figures = np.where(np.isnan(figures), math.inf, np.atleast_2d(figures))
+    row, pose = np.unravel_index(int(figures.argmax()), figures.shape)
+    worst = float(figures[row, pose])
+    good = worst <= limit
+    where = int(pose) if worst else None
+    said = "; ".join(each for each in (message, "" if good else remedy) if each)
+    return Finding(
+        check, Verdict.PASS if good else Verdict.FAIL, worst, limit, why, None, where, names[int(row)] if worst else "", said
+    )
+
+
+@dataclass(frozen=True)
+class Report:
+    """The checks of a joint type.
+
+    Attributes:
+        joint: the name of the class.
+        specimens: the joints that were examined, as text.
+        seed: of all random numbers.
+    """
+
+    joint: str
+    specimens: tuple[str, ...]
+    seed: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed."""
+        return not self.failures
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Names of the checks that failed."""
+        return tuple(each.check for each in self.findings if each.verdict is Verdict.FAIL)
+
+    def __getitem__(self, check: str) -> Finding:
+        return next(each for each in self.findings if each.check == check)
+
+    def __str__(self) -> str:
+        text = StringIO()
+        self.print(text)
+        return text.getvalue()
+
+    def print(self, file: TextIO) -> None:
+        """Print one line per check, then what was said of failures and skips, then a count."""
+        from rich.table import Table
+        from rich.text import Text
+
+        from ...report import terminal
+
+        console = terminal.console(file)
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for name in ("check", "verdict", "worst", "limit", "at"):
+            table.add_column(name, justify="right" if name in ("worst", "limit") else "left", no_wrap=name != "at")
+        table.add_column("limit because", overflow="fold")
+        colours = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIP: "yellow"}
+        for each in self.findings:
+            numbers = ("–" if x is None else f"{x:.3g}" for x in (each.figure, each.limit))
+            table.add_row(each.check, Text(each.verdict, colours[each.verdict]), *numbers, _where(each), each.why)
+        console.print(table)
+        for each in self.findings:
+            if each.message:
+                console.print(Text(f"{each.check}: {each.message}"), soft_wrap=True)
+        for k, specimen in enumerate(self.specimens):
+            console.print(Text(f"specimen {k}: {specimen}"), soft_wrap=True)
+        counts = Counter(each.verdict for each in self.findings)
+        summary = ", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict])
+        console.print(Text(f"{self.joint}: {summary} (seed {self.seed})"))
+
+
+def _where(finding: Finding) -> str:
+    parts = [f"specimen {finding.specimen}" if finding.specimen is not None else ""]
+    parts += [f"pose {finding.pose}" if finding.pose is not None else "", finding.row]
+    return ", ".join(part for part in parts if part)

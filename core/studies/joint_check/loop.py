@@ -1,0 +1,157 @@
+"""A joint in a small closed loop: solved natively, and by every engine given, on the joint itself or on its equivalent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...case.case import Case, Series
+from ...case.joint_probe import alternatives
+from ...harness.compare import describe, deviations, output_series
+from ...harness.engine import Engine
+from ...harness.execution import check
+from ...harness.record import Deviation
+from ...harness.run import NATIVE
+from ...harness.verdict import excess
+from ...joints import Joint
+from ...kinematics.solve import solve
+from ...trajectory import Array, Trajectory
+from .checks import ROUND_OFF
+from .findings import Finding, Verdict, judged
+
+# Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates, x1000.
+TOL = 1e-12
+# The probe's rods may lock a joint that they were not chosen for before the end of its sweep: others are tried, and where all do
+# it is halved, so often.
+HALVINGS = 3
+# Weights of sixth-order differences over seven samples.
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
+# Samples for the differences, between each two of the probe's.
+FINER = 4
+RATES_WHY = "what the differences change by as their step is doubled: 63 times their error"
+AGREE_WHY = "error over the tolerance of the probe's outputs"
+
+
+def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Finding]:
+    """The probe of a joint, or of a type, in the native engine and in the others."""
+    try:
+        case, native = _unlocked(tested)
+    except Exception as error:  # whatever the joint's own code raises
+        yield Finding("loop", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+        return
+    solved = f"{native.solved.sum()} of {len(native.solved)} samples solved, to {case.sweep.values.max():.3g} rad"
+    if not native.solved.all():
+        yield Finding("loop", Verdict.FAIL, message=f"{solved}: {native.message}")
+        return
+    yield Finding("loop", Verdict.PASS, native.residual, TOL, "round-off of metre-sized coordinates, x1000", message=solved)
+    yield from _rates(case)
+    reference = {output.name: output_series(case, output, native) for output in case.outputs}
+    other: Case | None = None
+    without = "there is no equivalent() to solve instead"
+    try:
+        other = _equivalent(case)
+        if other is not None:
+            yield _compared("loop: native, equivalent", other, _solved(other), reference)
+    except Exception as error:
+        other, without = None, "equivalent() fails, see native"
+        yield Finding("loop: native, equivalent", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+    if not engines:
+        yield Finding("loop: simulators", Verdict.SKIP, message="no engines were given")
+    for engine in engines:
+        if engine.name != NATIVE:
+            yield _simulated(engine, case, other or without, reference)
+
+
+def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
+    """The first probe that is solved whole; the last that was tried, if none is."""
+    first, *others = alternatives(tested)
+    shorter = [replace(first, sweep=replace(first.sweep, values=0.5**k * first.sweep.values)) for k in range(1, HALVINGS + 1)]
+    case, native = first, _solved(first)
+    for other in (*others, *shorter):
+        if native.solved.all():
+            break
+        case, native = other, _solved(other)
+    return case, native
+
+
+def _solved(case: Case) -> Trajectory:
+    return solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate, tol=TOL)
+
+
+def _rates(case: Case) -> Iterator[Finding]:
+    """Velocities and accelerations against differences, which know nothing of rows and right-hand sides."""
+    first, *_, last = grid = case.sweep.values.tolist()
+    values: Array = np.linspace(first, last, FINER * (len(grid) - 1) + 1, dtype=np.float64)
+    fine = solve(case.mechanism, case.sweep.driver, values, rate=case.sweep.rate, tol=TOL)
+    dt, motion = float(values[1] - values[0]) / case.sweep.rate, fine.points[case.points[0]]
+    assert motion.velocity is not None
+    assert motion.acceleration is not None
+    pairs = ((motion.position, motion.velocity, "velocity"), (motion.velocity, motion.acceleration, "acceleration"))
+    for before, rates, name in pairs:
+        slopes, coarse = _differences(before, dt), _differences(before[::2], 2.0 * dt)
+        limit = float(np.abs(coarse - slopes[3:-3:2]).max()) + ROUND_OFF / dt
+        remedy = "the solution's rates are not those of its positions: see rows, nu and gamma"
+        yield judged(f"loop: {name}", np.abs(slopes - rates[3:-3]).max(axis=1), limit, RATES_WHY, [name], remedy=remedy)
+
+
+def _differences(values: Array, dt: float) -> Array:
+    windows = np.lib.stride_tricks.sliding_window_view(values, len(WEIGHTS), axis=0)
+    return np.asarray(windows @ WEIGHTS / dt)
+
+
+def _equivalent(case: Case) -> Case | None:
+    """The case with the tested joint replaced by the bodies and joints it says it is equivalent to."""
+    tested = next(joint for joint in case.mechanism.joints if joint.type == case.name)
+    offered = getattr(tested, "equivalent", None)
+    if offered is None:
+        return None
+    bodies, joints = offered()
+    others = [joint for joint in case.mechanism.joints if joint is not tested]
+    mechanism = replace(case.mechanism, bodies=[*case.mechanism.bodies, *bodies], joints=[*others, *joints])
+    return replace(case, name=f"{case.name}_equivalent", mechanism=mechanism)
+
+
+def _simulated(engine: Engine, case: Case, other: Case | str, reference: dict[str, Series]) -> Finding:
+    """An engine's answer compared with the native one, or why there is none; `other` is the equivalent, or why there is none."""
+    name = f"loop: {engine.name}"
+    if engine.version() is None:
+        return Finding(name, Verdict.SKIP, message="not installed")
+    reason = engine.unsupported(case)
+    chosen = case
+    if reason is not None:
+        if isinstance(other, str):
+            return Finding(name, Verdict.SKIP, message=f"{reason}; {other}")
+        unknown = engine.unsupported(other)
+        if unknown is not None:
+            return Finding(name, Verdict.SKIP, message=f"{reason}; nor its equivalent: {unknown}")
+        chosen = other
+    try:
+        solved = engine.solve(engine.build(chosen), chosen, TOL)
+        check(chosen, engine.name, solved)
+    except Exception as error:  # anything a simulator may raise
+        return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+    found = _compared(name, chosen, solved, reference)
+    how = "on the joint itself" if chosen is case else "on the equivalent"
+    return replace(found, message="; ".join(part for part in (how, found.message) if part))
+
+
+def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Series]) -> Finding:
+    """Positions, velocities and accelerations against the native ones of the joint itself."""
+    if not found.solved.all():
+        return Finding(name, Verdict.FAIL, message=f"{found.solved.sum()} of {len(found.solved)} samples solved: {found.message}")
+    worst: tuple[float, str, str, Deviation] | None = None
+    for output in case.outputs:
+        standards = [(NATIVE, reference[output.name])]
+        for quantity, deviation in deviations(case, output, output_series(case, output, found), standards).items():
+            figure = deviation.max_abs / deviation.tolerance
+            if worst is None or figure > worst[0]:
+                worst = figure, output.name, quantity, deviation
+    assert worst is not None
+    if above := excess(case, found.residual, TOL):
+        return Finding(name, Verdict.FAIL, message=above)
+    figure, output_name, quantity, deviation = worst
+    message = "" if figure <= 1.0 else describe(output_name, quantity, deviation, case.sweep.driver, case.sweep.values.tolist())
+    verdict = Verdict.PASS if figure <= 1.0 else Verdict.FAIL
+    return Finding(name, verdict, figure, 1.0, AGREE_WHY, None, deviation.worst_step, f"{output_name} {quantity}", message)

@@ -1,0 +1,117 @@
+"""Arms driven at every joint: their poses are products of turns, whatever the number of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ....joints import AxialJoint, Cylindrical, Fixed, Joint, Revolute, Screw, Translational
+from ....mechanism.drivers import Driver, JointAngle, JointDisplacement
+from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
+from ....mechanism.motions import Motion, Ramp, Sine
+from ..truth.evaluation import Poses
+from ..truth.long_double import PI, Real, extended, unit
+from ..truth.reference_motion import Motion as Closed
+from ..truth.reference_motion import closed
+from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
+
+KINDS: Sequence[type[Joint]] = (Revolute, Revolute, Translational, Cylindrical, Screw, Fixed)
+LARGEST = 30
+
+
+class Arms(Family):
+    """Trees of bodies, all drivers moving at once, each in its own way."""
+
+    name = "arms"
+    about = f"trees of 3 to {LARGEST} bodies on hinges, slides, cylinders and screws, every freedom driven; forward kinematics"
+    samples = 41
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """A tree whose joints are a third of a metre apart, or a chain."""
+        count = bodies(rng, LARGEST)
+        chain = rng.random() < 0.3
+        parts, joints, drivers = list[Body](), list[Joint](), list[Driver]()
+        motions = dict[str, Motion]()
+        ends: dict[str, Any] = {GROUND: np.zeros(3)}
+        for k in range(count):
+            parent = list(ends)[-1 if chain else int(rng.integers(len(ends)))]
+            name, place = f"b{k + 1}", ends[parent] + rng.uniform(0.1, 0.3) * direction(rng)
+            kind = KINDS[0] if not drivers else KINDS[int(rng.integers(len(KINDS)))]
+            joint = _joint(kind, rng, f"j{k + 1}", parent, name, triple(place))
+            parts.append(Body(name))
+            joints.append(joint)
+            ends[name] = place
+            for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:  # a thread's turn says its shift
+                of = JointAngle if freedom == "rotation" else JointDisplacement
+                drivers.append(of(f"{joint.name}_{freedom}", joint.name))
+                size = 1.0 if freedom == "rotation" else 0.1
+                swings = rng.random() < 0.5
+                motions[drivers[-1].name] = (
+                    Sine(float(size * rng.uniform(0.2, 1.0)), float(rng.uniform(0.1, 0.5)))
+                    if swings
+                    else Ramp(float(size * rng.uniform(-1.0, 1.0)))
+                )
+        swept = drivers[0].name
+        del motions[swept]
+        ends.pop(GROUND)
+        last = list(ends)[-3:]
+        points = [Point(f"tip_{name}", name, triple(ends[name] + 0.1 * direction(rng))) for name in last]
+        mechanism = Mechanism("arm", parts, joints, points, drivers)
+        return Specimen(
+            f"arm of {count} bodies and {len(drivers)} drivers",
+            partial(as_case, mechanism, swept, np.linspace(-2.0, 2.0, samples), motions=motions),
+            partial(closed, motion=forward(mechanism)),
+            facts=(("bodies", count),),
+        )
+
+
+def _joint(kind: type[Joint], rng: Rng, name: str, parent: str, child: str, place: tuple[float, float, float]) -> Joint:
+    given: dict[str, Any] = {"point": place}
+    if issubclass(kind, AxialJoint):
+        given["axis"] = triple(direction(rng))
+    if kind is Screw:
+        given["lead"] = float(rng.uniform(-0.2, 0.2))
+    return kind(name, parent, child, **given)
+
+
+def forward(mechanism: Mechanism) -> Closed:
+    """The closed form of a tree whose joints stand in an order in which parents come first."""
+
+    def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
+        values = {(d.joint, d.freedom): x for d, x in zip(mechanism.drivers, drives, strict=True) if isinstance(d, _DRIVEN)}
+        n, zero = drives.shape[1], np.zeros_like(drives[0])
+        still = np.stack([zero + 1.0, zero, zero, zero])
+        found: dict[str, tuple[Real, Real, Real]] = {GROUND: (still, extended(np.zeros(3)), np.zeros((3, n), dtype=np.longdouble))}
+        for joint in mechanism.joints:
+            q, at, come = found[joint.i]
+            given: Any = joint
+            place = extended(given.point)
+            turn, shift = values.get((joint.name, "rotation"), zero), values.get((joint.name, "translation"), zero)
+            if isinstance(joint, Screw):
+                shift = extended(joint.lead) * turn / (2.0 * PI)
+            h = unit(extended(given.axis)) if isinstance(joint, AxialJoint) else extended((0.0, 0.0, 1.0))
+            along = h[:, None] * shift
+            carried = come + along + _swing(q, (place - at)[:, None] + along)
+            found[joint.j] = _product(q, np.concatenate([np.cos(turn / 2)[None], h[:, None] * np.sin(turn / 2)])), place, carried
+        del found[GROUND]
+        return found
+
+    return motion
+
+
+_DRIVEN = (JointAngle, JointDisplacement)
+
+
+def _swing(q: Real, a: Real) -> Real:
+    """(R - 1) a, shape (3, n)."""
+    return np.einsum("abn,bn->an", Poses(a[None], q[None]).turned[0], a)
+
+
+def _product(p: Real, q: Real) -> Real:
+    """The turn q, then p, in the axes at design, shape (4, n)."""
+    a, b = p[1:], q[1:]
+    vector = p[0] * b + q[0] * a + np.cross(a, b, axis=0)
+    return np.concatenate([(p[0] * q[0] - (a * b).sum(axis=0))[None], vector])

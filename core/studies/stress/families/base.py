@@ -1,0 +1,107 @@
+"""What a family is: a way to make specimens at random, each a case, its truth, and the refusals that are right."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ....case.case import Case, Sweep, Truth
+from ....case.io.coordinates import with_all_coordinates
+from ....mechanism.mechanism import Mechanism
+from ....mechanism.motions import Motion
+from ....trajectory import Array
+from ..truth.reference_motion import Truth as Known
+from ..truth.reference_motion import followed
+
+TOL = 1e-12
+"""Largest accepted residual, as of `kincheck run`."""
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """One mechanism and its sweep.
+
+    Attributes:
+        describe: makes the case; may refuse to (KincheckError), which is the outcome for every engine then.
+        truth: of the case; None where no sample makes sense and every answer is wrong.
+        reasons: what a right refusal speaks of (a regular expression), beyond singular poses and the end of the motion.
+        excused: whether it may be refused for these reasons though solutions exist.
+        reported: whether an answer must report what the geometry contradicts itself by (`Known.violated`).
+        facts: what there is to say of it, by name.
+    """
+
+    name: str
+    describe: Callable[[], Case]
+    truth: Callable[[Case], Known] | None = followed
+    tol: float = TOL
+    reasons: str = ""
+    excused: bool = False
+    reported: bool = False
+    facts: tuple[tuple[str, float], ...] = ()
+
+
+class Family(ABC):
+    """Base of the families. Declaring one with a name registers it.
+
+    Attributes:
+        about: what is nasty, and its sizes, in a sentence.
+        samples: the most that one specimen has, and so how fine its sweep can be; coarse ones are drawn as often.
+        several: whether samples are shared out among several specimens rather than given to one.
+    """
+
+    name: ClassVar[str]
+    about: ClassVar[str]
+    samples: ClassVar[int] = 201
+    several: ClassVar[bool] = True
+    registry: ClassVar[dict[str, Family]] = {}
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "name" in cls.__dict__:
+            Family.registry[cls.name] = cls()
+
+    @abstractmethod
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """A random specimen of so many samples."""
+
+
+def as_case(
+    mechanism: Mechanism,
+    driver: str,
+    values: Array,
+    *,
+    rate: float = 1.0,
+    motions: dict[str, Motion] | None = None,
+    source: str = "kincheck stress",
+) -> Case:
+    """The case of a mechanism, all coordinates of all its points as outputs."""
+    sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
+    return with_all_coordinates(Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
+
+
+def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:
+    """Three numbers as the descriptions have them."""
+    a, b, c = (float(each) for each in x)
+    return a, b, c
+
+
+def direction(rng: Rng) -> Array:
+    """A random unit vector."""
+    found = rng.normal(size=3)
+    return found / np.linalg.norm(found)
+
+
+def power(rng: Rng, low: float, high: float) -> float:
+    """A number between 10^low and 10^high, all sizes alike."""
+    return float(10.0 ** rng.uniform(low, high))
+
+
+def bodies(rng: Rng, most: int) -> int:
+    """How many bodies, 3 to the most: the cost grows with the square, so that half of them have five or fewer."""
+    return int(3.0 * ((most + 1) / 3.0) ** (rng.random() ** 2))

@@ -1,0 +1,78 @@
+"""Four-bars near their change points, in coarse steps: sharp corners that more rows than are solved must not hide."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from ..truth.long_double import extended
+from ..truth.reference_motion import closed
+from .base import Family, Rng, Specimen, as_case, power
+from .pairs import beside, beside_motion
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, crank_rocker, flats, four_bar, four_bar_motion, meet
+
+# The design is not to be near a corner itself: of what is folded more, coordinates hold too few digits of the shape.
+FOLDED = 0.05
+SMALL = "small "
+
+# Crank, ground, coupler and rocker, of three sizes and by how much they are off.
+SHAPES: Mapping[str, Callable[[float, float, float, float], tuple[float, float, float, float]]] = {
+    "kite": lambda a, g, x, off: (g + off, g, x, x),
+    "kite on its side": lambda a, g, x, off: (a, g, a + off, g),
+    "parallelogram": lambda a, g, x, off: (a, g, g + off, a),
+    "stretched four-bar": lambda a, g, x, off: (a, g, x, a + g - x + off),
+    "folded four-bar": lambda a, g, x, off: (a, g, x, x + abs(g - a) + off),
+}
+
+
+class Corners(Family):
+    """What turns round sharply, or cannot pass by a little, anywhere along a step."""
+
+    name = "corners"
+    about = (
+        "four-bars of any sizes, off by 1e-7 to 0.1 from kites, parallelograms and others that can lie flat, from anywhere in "
+        "coarse steps: rods on hinges (three redundant rows), on two universals (one), and on what leaves none; half of them with "
+        "a regular loop of 1e-3 to 0.3 of their size on the same crank"
+    )
+
+    samples = 31
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """One of them."""
+        plane, way = any_plane(rng), str(rng.choice(["universals", "revolutes", *JOINTS_OF_A_LOOP]))
+        off = power(rng, -7.0, -1.0) * float(rng.choice([-1.0, 1.0]))
+        kind = tuple(SHAPES)[int(rng.integers(len(SHAPES)))]
+        b, d, c = _loop(rng, kind, off)
+        last = float(rng.uniform(2.0, 6.2) * rng.choice([-1.0, 1.0]))
+        mechanism, motion = four_bar(plane, b, d, c, way), four_bar_motion(plane, b, d, c)
+        name, facts = f"{kind} with {way}, off by {off:.2g}", [("off", off)]
+        if rng.random() < 0.5:  # its singular values are small everywhere, and hide those of the large loop
+            ratio, hung = power(rng, -3.0, -0.5), str(rng.choice(JOINTS_OF_A_LOOP))
+            small = crank_rocker(rng, ratio)
+            mechanism = beside(mechanism, plane, *small, hung, SMALL)
+            motion = beside_motion(motion, four_bar_motion(plane, *small), SMALL)
+            name, facts = f"{name}, beside a loop of {ratio:.2g} with {hung}", [*facts, ("ratio", ratio)]
+        return Specimen(
+            name,
+            partial(as_case, mechanism, "turn", np.linspace(0.0, last, samples)),
+            partial(closed, motion=motion, nearest=flats(b, d)),
+            facts=tuple(facts),
+        )
+
+
+def _loop(rng: Rng, kind: str, off: float) -> tuple[Plan, Plan, Plan]:
+    """B, D and C of such a four-bar, at any pose that is not folded."""
+    while True:
+        a, g, x = (float(each) for each in rng.uniform(0.3, 1.5, 3))
+        crank, ground, coupler, rocker = SHAPES[kind](a, g, x, off)
+        turn, side = float(rng.uniform(-np.pi, np.pi)), float(rng.choice([-1.0, 1.0]))
+        b: Plan = (float(crank * np.cos(turn)), float(crank * np.sin(turn)))
+        d: Plan = (ground, 0.0)
+        pin, rest = (extended(each)[:, None] for each in (b, d))
+        met = meet(pin, extended([coupler]) ** 2, rest, extended([rocker]) ** 2, side)
+        c: Plan = (float(met[0, 0]), float(met[1, 0]))
+        twice = (c[0] - b[0]) * (d[1] - b[1]) - (c[1] - b[1]) * (d[0] - b[0])  # the area; not a number where they do not meet
+        if min(coupler, rocker) > 0.1 and abs(twice) > FOLDED * float(np.hypot(d[0] - b[0], d[1] - b[1])):
+            return b, d, c

@@ -1,0 +1,63 @@
+"""Much of something: turns and samples, rates, and digits asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ..truth.reference_motion import closed
+from .base import Family, Rng, Specimen, as_case, power
+from .planar import JOINTS_OF_A_LOOP, any_plane, crank_rocker, four_bar, four_bar_motion
+from .sizes import linkage
+
+TURNS = 1000
+# From one sample to the next: a step is gone in 2,000 parts at most, of which a turn takes some twelve.
+MOST_BETWEEN = 100
+
+
+class Drift(Family):
+    """Errors that add up."""
+
+    name = "drift"
+    about = "crank-rockers over 1,000 turns in one sweep of all the samples, up to 1e6"
+    samples = 1_000_000
+    several = False
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """The closed form knows nothing of the turns before."""
+        plane, points, way = any_plane(rng), crank_rocker(rng), str(rng.choice(JOINTS_OF_A_LOOP))
+        turns = min(TURNS, MOST_BETWEEN * (samples - 1))
+        return Specimen(
+            f"four_bar with {way}, {turns} turns",
+            partial(as_case, four_bar(plane, *points, way), "turn", np.linspace(0.0, 2.0 * np.pi * turns, samples)),
+            partial(closed, motion=four_bar_motion(plane, *points)),
+        )
+
+
+class Rates(Family):
+    """Drivers that creep or fly."""
+
+    name = "rates"
+    about = "four-bars and slider-cranks driven at 1e-9 to 1e9 rad/s either way"
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """Accelerations go with the square of the rate."""
+        rate = power(rng, -9.0, 9.0) * float(rng.choice([-1.0, 1.0]))
+        found = linkage(rng, any_plane(rng), samples, rate=rate)
+        return replace(found, name=f"{found.name} at {rate:.3g} rad/s", facts=(("rate", rate),))
+
+
+class Tolerances(Family):
+    """Digits that doubles do not have."""
+
+    name = "tolerances"
+    about = "four-bars and slider-cranks with residuals asked for of 1e-15 to 1e-300"
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """To be solved as well as can be, or refused by naming the residual that was reached."""
+        tol = power(rng, -300.0, -15.0) if rng.random() < 0.2 else power(rng, -20.0, -15.0)
+        found = linkage(rng, any_plane(rng), samples)
+        reasons = r"residual .*\d"
+        return replace(found, name=f"{found.name} to {tol:.3g}", tol=tol, reasons=reasons, excused=True, facts=(("tol", tol),))

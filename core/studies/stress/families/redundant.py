@@ -1,0 +1,69 @@
+"""Redundant geometry that contradicts itself: which contradiction is accepted, and is it told?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ....case.case import Case
+from ....mechanism.mechanism import Mechanism
+from ..truth.newton_kantorovich import LANES, System
+from ..truth.reference_motion import Motion, Truth, closed, closed_poses
+from .base import TOL, Family, Rng, Specimen, as_case, direction, power, triple
+from .planar import any_plane, crank_rocker, four_bar, four_bar_motion
+
+# Directions are given to 1e-16, and what redundant rows make of that is no contradiction.
+ROUNDED = 1e-14
+
+
+class Redundant(Family):
+    """One hinge of four is not quite parallel to the others."""
+
+    name = "redundant"
+    about = "four-bars of four hinges, one of them off by 1e-12 to 1e-3 rad, or by nothing"
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """To be solved as well as the geometry allows, telling what is left over, or refused by naming it."""
+        tilt = 0.0 if rng.random() < 0.15 else power(rng, -12.0, -3.0)
+        plane, points = any_plane(rng), crank_rocker(rng)
+        sound = four_bar(plane, *points)
+        joint: Any = sound.joint("pin_2")
+        bent = replace(joint, axis=triple(np.array(joint.axis) + tilt * direction(rng)))
+        mechanism = replace(sound, joints=[bent if each is joint else each for each in sound.joints])
+        values = np.linspace(-2.0, 2.0, samples)
+        return Specimen(
+            f"four_bar, one hinge off by {tilt:.2g} rad",
+            partial(as_case, mechanism, "turn", values),
+            partial(_tilted, sound=sound, motion=four_bar_motion(plane, *points), tilt=tilt),
+            reasons=r"contradict|degrees? of freedom|left free|redundant",
+            excused=tilt > ROUNDED,
+            reported=True,
+            facts=(("tilt", tilt),),
+        )
+
+
+def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
+    """The truth of the sound mechanism, and how far one may be from it by meeting other rows than are met here.
+
+    Rows off by the tilt move the pose by K times as much; another choice of rows has an inverse of its own, K times larger at most.
+    """
+    found = closed(replace(case, mechanism=sound), motion)
+    system = System(case)
+    exact = System(replace(case, mechanism=sound))
+    violated = np.zeros(len(case.sweep.values))
+    size = system.rows.stated.unit
+    for sample in np.split(np.arange(len(violated)), range(LANES, len(violated), LANES)):
+        poses = closed_poses(exact, motion, exact.sampled(sample)[0])
+        drives = system.sampled(sample)
+        at = system.solved(poses, drives, system.path.times[sample], system.rows.angles(poses))
+        violated[sample] = np.abs(system.rows.residual(at.poses, drives[0], at.angles)).max(axis=0)
+    slack = found.condition * (1.0 + found.condition) * tilt * size
+    # rates follow from poses that are off, by rows that do not agree: nothing is held against them
+    bounds = {
+        name: np.stack([bound[0] + slack, *(bound[1:] if tilt <= ROUNDED else np.full_like(bound[1:], np.inf))])
+        for name, bound in found.bounds.items()
+    }
+    return replace(found, bounds=bounds, violated=np.where(violated > TOL, violated * size, 0.0))

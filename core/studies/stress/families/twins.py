@@ -1,0 +1,48 @@
+"""Two loops on one crank: singular at the same poses, where the determinant of all rows changes its sign twice, and keeps it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ..truth.reference_motion import closed
+from .base import Family, Rng, Specimen, as_case
+from .pairs import beside, beside_motion
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, nearly_kite, nearly_parallel, rockers
+
+TURN, TWIN = 0.97 * np.pi, "twin "
+
+
+def _rockers(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
+    """Nothing about them is nearly anything else."""
+    return *rockers(rng), 1.0
+
+
+SHAPES = {"parallelograms": nearly_parallel, "kites": nearly_kite, "rockers": _rockers}
+
+
+class Twins(Family):
+    """What is singular twice at once."""
+
+    name = "twins"
+    about = (
+        "two equal loops on one crank, hung alike or not, so that no sign of a whole determinant tells singular poses: "
+        "parallelograms (exact, and off by 1e-12 to 1e-2), kites, and four-bars driven past their dead centres"
+    )
+
+    samples = 61
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """One of them."""
+        plane, (first, second) = any_plane(rng), rng.choice(JOINTS_OF_A_LOOP, 2).tolist()
+        kind = tuple(SHAPES)[int(rng.integers(len(SHAPES)))]
+        b, d, c, off = SHAPES[kind](rng)
+        motion = four_bar_motion(plane, b, d, c, parallel=kind == "parallelograms" and off == 0.0)
+        mechanism = beside(four_bar(plane, b, d, c, first), plane, b, d, c, second, TWIN)
+        return Specimen(
+            f"{kind} with {first} and {second}, off by {off:.2g}",
+            partial(as_case, mechanism, "turn", np.linspace(-TURN, TURN, samples)),
+            partial(closed, motion=beside_motion(motion, motion, TWIN), nearest=flats(b, d)),
+            facts=(("off", off),),
+        )

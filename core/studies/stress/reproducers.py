@@ -1,0 +1,79 @@
+"""Bad cases made small and saved as case files, and case files judged again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from ...case.case import Case
+from ...case.io.atomic_files import write
+from ...case.io.case_writer import case_text
+from ...case.io.coordinates import with_all_coordinates
+from ...errors import KincheckError
+from ...harness.engine import Engine
+from ...harness.execution import Pair
+from .families import Specimen
+from .results import Finding
+from .run import Example
+from .shrink import fewer_samples, reduced
+from .solving import solve_all
+from .truth.reference_motion import Truth, followed
+from .verdicts import Judgement, Verdict, judged
+
+
+def judge(case: Case, engine: Engine, tol: float, truth: Callable[[Case], Truth] | None = followed) -> Judgement:
+    """A case of any origin with an engine, its motion followed from the design unless its truth is known better.
+
+    Raises:
+        KincheckError: the truth cannot be had.
+    """
+    watched = with_all_coordinates(case, case.points)
+    return judge_as(Specimen(case.name, lambda: watched, truth, tol), watched, engine)
+
+
+def judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
+    """A case in the place of a specimen's own: judged by its truth and its excuses."""
+    (answer,) = solve_all([Pair(case, engine, specimen.tol)])
+    return judged(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
+
+
+def save(example: Example, folder: Path) -> Finding:
+    """Reduce an example and write it as a case file; the finding with the name of the file.
+
+    Raises:
+        KincheckError: the file cannot be written.
+    """
+    specimen, engine, finding = example.specimen, example.engine, example.finding
+
+    def bad(case: Case) -> bool:
+        return bool(judge_as(specimen, case, engine).counts[example.verdict])
+
+    def bad_by_itself(case: Case) -> bool:
+        return bool(judge(case, engine, specimen.tol).counts[example.verdict])
+
+    case, words = fewer_samples(example.case, finding.sample, bad), list[str]()
+    if len(case.sweep.values) < len(example.case.sweep.values):
+        words.append(f"samples {len(example.case.sweep.values)} to {len(case.sweep.values)}")
+    if example.verdict is Verdict.SILENTLY_WRONG or not specimen.excused:
+        # what is taken off a closed form is none of it any more: the rest is judged by following the motion
+        try:
+            known = bad_by_itself(case)
+        except KincheckError:
+            known = False
+        if known:
+            case, more = reduced(case, bad_by_itself)
+            words += more
+        else:
+            words.append("judged by the family's own truth only: following the motion does not lead there")
+    verdict = str(example.verdict).replace(",", "").replace(" ", "_")
+    name = f"{finding.family}_{finding.engine}_{finding.mode}_{finding.number}_{verdict}.toml"
+    comments = [
+        f"{finding.verdict} in {finding.engine} ({finding.mode}), tolerance {finding.tol!r}: {finding.specimen}",
+        f"kincheck stress --replay {name} --engine {finding.engine} --mode {finding.mode} --tol {finding.tol!r}",
+        *words,
+        *finding.message.splitlines(),
+    ]
+    write("--out", folder / name, case_text(case, comments).encode())
+    return replace(finding, file=name, reduced=words)

@@ -1,0 +1,153 @@
+"""Making a bad case smaller, as long as its outcome stays as bad: fewer samples, points, bodies and digits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ...case.case import Case, Output
+from ...errors import KincheckError
+from ...joints import Joint, Kind
+from ...kinematics.structure.driver_count import require_driven
+from ...mechanism.mechanism import Mechanism
+
+Bad = Callable[[Case], bool]
+"""Whether a case still has the outcome; a case that cannot be judged has not."""
+
+# Judging a candidate takes a tenth of a second to some: a minute in all.
+TRIES = 150
+
+
+class _Budget:
+    def __init__(self, bad: Bad) -> None:
+        self.bad, self.left = bad, TRIES
+
+    def __call__(self, case: Case) -> bool:
+        if self.left <= 0:
+            return False
+        self.left -= 1
+        try:
+            return self.bad(case)
+        except (KincheckError, ArithmeticError, ValueError):
+            return False
+
+
+def fewer_samples(case: Case, sample: int, bad: Bad) -> Case:
+    """The case with as few samples as it takes, from the design to the bad one or all of them."""
+    still, values = _Budget(bad), case.sweep.values
+    stop = float(values[sample])
+    ends = [(case.sweep.design, stop), (float(values[0]), float(values[-1]))]
+    for start, end in ends if case.sweep.driver in {d.name for d in case.mechanism.drivers} else ends[1:]:
+        if start == end:
+            continue
+        for count in (1, 2, 3, 4, 6, 9, 13, 19, 28, 41, 61):
+            if count < len(values):
+                fewer = replace(case, sweep=replace(case.sweep, values=np.linspace(start if count > 1 else end, end, count)))
+                if still(fewer):
+                    return fewer
+    return case
+
+
+def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
+    """The case with less of everything, and what was taken off in words."""
+    still, words = _Budget(bad), list[str]()
+    before = len(case.mechanism.bodies), len(case.mechanism.joints)
+    going = True
+    while going:
+        going = False
+        for smaller in _smaller(case):
+            if still(smaller):
+                case, going = smaller, True
+                break
+    if (after := (len(case.mechanism.bodies), len(case.mechanism.joints))) != before:
+        words.append(f"bodies {before[0]} to {after[0]}, joints {before[1]} to {after[1]}")
+    for digits in range(1, 12):
+        rounder = rounded(case, digits)
+        if rounder is not None and still(rounder):
+            return rounder, [*words, f"numbers to {digits} digits"]
+    return case, words
+
+
+def _smaller(case: Case) -> Iterator[Case]:
+    """Cases with a body less, free to move as they are driven; the largest steps first."""
+    mechanism = case.mechanism
+    if len(mechanism.points) > 1:
+        driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
+        for point in mechanism.points:
+            if point.name not in driven:
+                yield _with(case, mechanism, {point.name})
+    for body in mechanism.moving:
+        yield from _driven(case, _without(mechanism, body.name, ()))
+    for body, joint in product(mechanism.moving, mechanism.joints):
+        yield from _driven(case, _without(mechanism, body.name, (joint.name,)))
+    for body in mechanism.moving:
+        fixed = [replace(each, fixed=each.fixed or each is body) for each in mechanism.bodies]
+        held = [j for j in mechanism.joints if not all(mechanism.is_fixed(b) or b == body.name for b in j.bodies)]
+        for gone in ["", *(joint.name for joint in held)]:
+            yield from _driven(case, _parts(mechanism, fixed, [joint for joint in held if joint.name != gone]))
+
+
+def _without(mechanism: Mechanism, body: str, joints: Sequence[str]) -> Mechanism | None:
+    bodies = [each for each in mechanism.bodies if each.name != body]
+    return _parts(mechanism, bodies, [j for j in mechanism.joints if body not in j.bodies and j.name not in joints])
+
+
+def _parts(mechanism: Mechanism, bodies: Sequence[Any], joints: Sequence[Joint]) -> Mechanism | None:
+    """What is left with these bodies and joints; None where a driver or all points are gone."""
+    names, known = {"ground", *(body.name for body in bodies)}, {joint.name for joint in joints}
+    points = [point for point in mechanism.points if point.body in names]
+    couplers = [coupler for coupler in mechanism.couplers if set(coupler.joints) <= known]
+    there = {point.name for point in points}
+    if not points or any(getattr(d, "joint", None) not in (None, *known) for d in mechanism.drivers):
+        return None
+    if any(getattr(d, "point", None) not in (None, *there) for d in mechanism.drivers):
+        return None
+    try:
+        return Mechanism(mechanism.name, bodies, joints, points, mechanism.drivers, couplers)
+    except KincheckError:
+        return None
+
+
+def _driven(case: Case, mechanism: Mechanism | None) -> Iterator[Case]:
+    """The case of a mechanism, where it has as many freedoms as drivers."""
+    if mechanism is None:
+        return
+    try:
+        require_driven(mechanism)
+    except (KincheckError, ValueError):
+        return
+    yield _with(case, mechanism, set())
+
+
+def _with(case: Case, mechanism: Mechanism, hidden: set[str]) -> Case:
+    shown = [point for point in mechanism.points if point.name not in hidden]
+    names = {point.name for point in shown}
+    outputs = tuple(each for each in case.outputs if set(each.points) <= names)
+    return replace(case, mechanism=replace(mechanism, points=shown), outputs=outputs)
+
+
+def rounded(case: Case, digits: int) -> Case | None:
+    """The case with its geometry to so many digits; None where that makes no sense."""
+
+    def short(value: Any) -> Any:
+        return tuple(map(short, value)) if isinstance(value, tuple) else float(f"{value:.{digits - 1}e}")  # pyright: ignore
+
+    mechanism = case.mechanism
+    try:
+        joints = [
+            replace(joint, **joint.mapped(dict.fromkeys((Kind.POSITION, Kind.DIRECTION, Kind.LENGTH), short)))
+            for joint in mechanism.joints
+        ]
+        points = [replace(point, position=short(point.position)) for point in mechanism.points]
+        found = replace(mechanism, joints=joints, points=points)
+        require_driven(found)
+    except (KincheckError, ValueError):
+        return None
+    first, last = (float(short(case.sweep.values[k])) for k in (0, -1))
+    sweep = replace(case.sweep, values=np.linspace(first, last, len(case.sweep.values)))
+    outputs = tuple(each for each in case.outputs if isinstance(each, Output))
+    return replace(case, mechanism=found, sweep=sweep, outputs=outputs)

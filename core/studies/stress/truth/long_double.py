@@ -1,0 +1,46 @@
+"""Extended precision: what the truth is computed in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....errors import KincheckError
+
+Real: TypeAlias = NDArray[Any]
+"""Of longdoubles, which numpy's types lose wherever a plain number is near. On x86 they have 64 bits of mantissa: a two-thousandth
+of the round-off of what is judged by them."""
+
+
+def extended(values: Any) -> Real:
+    """Doubles as extended numbers, exactly; a text with all its digits."""
+    return np.asarray(values, dtype=np.longdouble)
+
+
+GROUND_AXES = np.eye(3, dtype=np.longdouble)
+PI = extended("3.14159265358979323846264338327950288")
+
+
+def require_extended() -> None:
+    """Raise KincheckError where the machine has nothing between double precision and software."""
+    if np.finfo(np.longdouble).eps > 1e-18:
+        raise KincheckError(
+            "kincheck stress: numpy's longdouble is no wider than a double on this machine, so there is nothing to judge by; "
+            "run it on x86-64 Linux"
+        )
+
+
+def unit(a: Real) -> Real:
+    """The direction of a."""
+    return a / np.sqrt(a @ a)
+
+
+def triad(axis: Sequence[float]) -> tuple[Real, Real, Real]:
+    """f, g, h: orthonormal and right-handed, h along the axis."""
+    h = unit(extended(axis))
+    across: Real = np.cross(h, GROUND_AXES[int(np.abs(h).argmin())])
+    f = unit(across)
+    return f, np.cross(h, f), h

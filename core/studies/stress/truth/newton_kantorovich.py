@@ -1,0 +1,296 @@
+"""A case as equations in extended precision: its samples polished, its rates, its condition, and its way from the design.
+
+The way is followed here, by nobody else's predictor. A step dx from one knot to the next is taken where J0^-1 J1 - I is less than a
+half in the norm of row sums: the simplified iteration from the knot then contracts all along the step, so that its solution is the
+one that continues the motion (Newton-Kantorovich). Near a singular pose that asks for steps as small as the smallest singular
+value; there it is enough that (J0^-1 J1 - I) dx is less than a half of dx, seen from both ends, and that det(J0^-1 J1) is
+positive: on the other side of a gap between two solutions it is negative. Samples between two knots are interpolated, polished,
+and held to the same from the nearer knot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....case.case import Case
+from ....mechanism.drivers import JointAngle
+from ....trajectory import Array
+from .conditions import conditions
+from .evaluation import Evaluator, Poses, cross, spun
+from .long_double import Real, extended
+
+# Largest change of J between neighbours. At 1 the simplified iteration may fail; a half leaves as much again for what J does
+# between the two.
+LARGEST_CHANGE = 0.5
+# Below this part of the way steps are judged by where they go, no longer in all directions.
+SMALL_PART = 2.0**-6
+# A step is at most this part of the way: a sweep of one or two turns is seen at sixteen places or more.
+FIRST_PART = 1.0 / 16.0
+# Below this part of the way it is a singular pose and no coarse step: there the solution changes as the root of what is left.
+SMALLEST_PART = 2.0**-30
+# Singular values below this part of the largest are those of redundant rows: as `freedom.RANK_TOLERANCE`.
+RANK = 1e-9
+# Samples at a time: keeps the arrays of the largest mechanisms in the cache.
+LANES = 256
+MOST_STEPS = 8
+# A polished sample is right to this part of its condition: a hundredth of what an engine is allowed.
+POLISHED = 1e-16
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Samples that satisfy the equations.
+
+    Attributes:
+        times: [s], shape (n,).
+        angles: of the turns, whole turns included [rad], shape (turns, n).
+        inverse: of the Jacobian, or its pseudo-inverse, shape (n, unknowns, rows).
+        jacobian: shape (n, rows, unknowns).
+        v, a: rates and accelerations of the unknowns, shape (bodies, 6, n).
+        step: Newton's last, over the condition; more than `POLISHED` is no solution.
+    """
+
+    times: Array
+    poses: Poses
+    angles: Real
+    jacobian: Array
+    inverse: Array
+    v: Real
+    a: Real
+    step: Array
+
+    @property
+    def condition(self) -> Array:
+        """The condition of the inverse, shape (n,)."""
+        return condition(self.inverse)
+
+    def at(self, k: int) -> Solved:
+        """One sample."""
+        one = slice(k, k + 1)
+        return Solved(
+            self.times[one],
+            self.poses.at(one),
+            self.angles[:, one],
+            self.jacobian[one],
+            self.inverse[one],
+            self.v[..., one],
+            self.a[..., one],
+            self.step[one],
+        )
+
+    def repeated(self, count: int) -> Solved:
+        """One sample so many times."""
+        lanes = [np.repeat(each, count, axis=-1) for each in (self.poses.u, self.poses.q, self.angles, self.v, self.a)]
+        u, q, angles, v, a = lanes
+        first = [np.repeat(each, count, axis=0) for each in (self.times, self.jacobian, self.inverse, self.step)]
+        times, jacobian, inverse, step = first
+        return Solved(times, Poses(u, q), angles, jacobian, inverse, v, a, step)
+
+
+class System:
+    """The equations of a case and what drives them."""
+
+    def __init__(self, case: Case) -> None:
+        self.case, self.mechanism = case, case.mechanism
+        self.rows = Evaluator(conditions(case.mechanism))
+        self.path = case.sweep.path
+        self.names = [driver.name for driver in self.mechanism.drivers]
+        self.driving = {d.joint: k for k, d in enumerate(self.mechanism.drivers) if isinstance(d, JointAngle)}
+
+    def drives(self, times: Array) -> Real:
+        """Value, velocity and acceleration of all drivers [SI], shape (3, drivers, n)."""
+        return extended(self.path.drive(self.names, times))
+
+    def sampled(self, samples: NDArray[np.intp]) -> Real:
+        """The same at samples of the sweep, the swept value as it was given."""
+        found = self.drives(self.path.times[samples])
+        if self.case.sweep.driver in self.names:
+            found[0, self.names.index(self.case.sweep.driver)] = extended(self.case.sweep.change[samples])
+        return found
+
+    def solved(self, poses: Poses, drives: Real, times: Array, near: Real) -> Solved:
+        """Newton's iteration from poses near to solutions, and the rates there.
+
+        Args:
+            near: angles of the turns nearby [rad], shape (turns, n); those that are driven are known.
+        """
+        near = self._known(near, drives)
+        jacobian = self.rows.jacobian(poses)
+        inverse = inverted(jacobian)
+        last, largest = np.full(poses.samples, np.inf), np.inf
+        for _ in range(MOST_STEPS):
+            residual = self.rows.residual(poses, drives[0], near)
+            step = -np.matmul(inverse, residual.T[..., None].astype(np.float64))[..., 0]
+            size = np.abs(step).max(axis=1)
+            # a step that turns a body over is no correction of a nearby pose
+            good = np.isfinite(size) & (size < 1.0)
+            step[~good] = 0.0
+            last = np.where(good, size / condition(inverse), np.inf)
+            poses = poses.moved(extended(step).T.reshape(-1, 6, len(step)))
+            if (last[good] <= 1e-3 * POLISHED).all() or not good.any():
+                break
+            before, largest = largest, float(size[good].max())
+            if largest > 1e-5 or largest > 1e-3 * before:  # else the old J gains three digits or more
+                jacobian = self.rows.jacobian(poses)
+                inverse = inverted(jacobian)
+        jacobian = self.rows.jacobian(poses)
+        inverse = inverted(jacobian)
+        forced = np.zeros((len(inverse), self.rows.stated.rows, 2))
+        for k, (row, size) in enumerate(self.rows.stated.driven):
+            forced[:, row] = float(size) * drives[1:, k].T.astype(np.float64)
+        v = _bodies(inverse @ forced[:, :, :1])
+        beyond = self.rows.beyond(poses, v).T[..., None].astype(np.float64)
+        a = _bodies(inverse @ (forced[:, :, 1:] - beyond))
+        angles = self.rows.angles(poses)
+        angles = angles + 2.0 * np.pi * np.rint((near - angles) / (2.0 * np.pi))
+        return Solved(times, poses, angles, jacobian, inverse, v, a, last)
+
+    def _known(self, near: Real, drives: Real) -> Real:
+        near = near.copy()
+        for k, joint in enumerate(self.rows.stated.turning):
+            if joint in self.driving:
+                near[k] = drives[0, self.driving[joint]]
+        return near
+
+    def design(self) -> Solved:
+        """The design position, moving as the path says."""
+        start = np.zeros(1)
+        poses = Poses.design(self.rows.bodies, 1)
+        return self.solved(poses, self.drives(start), start, np.zeros((len(self.rows.stated.turns), 1), dtype=np.longdouble))
+
+    def knots(self, stop: float) -> tuple[list[Solved], float | None]:
+        """The way from the design to a time, as far as it goes, and the time at which it folds back, where that ends it."""
+        found, h = [self.design()], stop * FIRST_PART
+        if not found[0].step[0] <= POLISHED:
+            return [], None
+        while (at := found[-1]).times[0] != stop:
+            ahead = float(at.times[0]) + h
+            times = np.array([stop if abs(ahead) >= abs(stop) * (1.0 - SMALLEST_PART) else ahead])
+            dt = times[0] - at.times[0]
+            guess = at.poses.moved(dt * (at.v + 0.5 * dt * at.a))
+            new = self.solved(guess, self.drives(times), times, at.angles)
+            changed = np.inf
+            if new.step[0] <= POLISHED:
+                whole, along = changes([at], np.zeros(1, dtype=np.intp), new)
+                changed = float(whole[0] if abs(dt) > SMALL_PART * abs(stop) else along[0])
+            if changed <= LARGEST_CHANGE:
+                found.append(new)
+                h = float(np.clip(0.6 * LARGEST_CHANGE / max(changed, 1e-9), 0.5, 2.0)) * dt
+                h = min(abs(h), abs(stop) * FIRST_PART) * np.sign(stop)
+            elif abs(dt) <= SMALLEST_PART * abs(stop):
+                return found, _fold(at, stop)
+            else:
+                h = 0.5 * dt
+        return found, None
+
+    def between(self, knots: Sequence[Solved], samples: NDArray[np.intp]) -> Solved:
+        """Samples of the sweep on the way through the knots; steps are infinite where J changes too much from the nearer knot."""
+        times = self.path.times[samples]
+        at = np.array([knot.times[0] for knot in knots])
+        left = np.clip(np.searchsorted(np.abs(at), np.abs(times), side="right") - 1, 0, len(at) - 2)
+        span = at[left + 1] - at[left]
+        s = extended((times - at[left]) / span)
+        angles = np.stack([knot.angles[:, 0] for knot in knots], axis=1)
+        near = angles[:, left] + s * (angles[:, left + 1] - angles[:, left])
+        u = _hermite([k.poses.u[..., 0] for k in knots], [_shift(k) for k in knots], left, s, span)
+        q = _hermite([k.poses.q[..., 0] for k in knots], [_spin(k) for k in knots], left, s, span)
+        q = q / np.sqrt((q * q).sum(axis=1, keepdims=True))
+        found = self.solved(Poses(u, q), self.sampled(samples), times, near)
+        changed = changes(knots, left + (s > 0.5), found)[1]
+        return Solved(
+            found.times,
+            found.poses,
+            found.angles,
+            found.jacobian,
+            found.inverse,
+            found.v,
+            found.a,
+            np.where(changed <= LARGEST_CHANGE, found.step, np.inf),
+        )
+
+
+def condition(inverse: Array) -> Array:
+    """How far all unknowns together move [units, rad] for rows that are off by one each, shape (n,)."""
+    return np.maximum(1.0, np.abs(inverse).sum(axis=2).max(axis=1))
+
+
+def inverted(jacobian: Array) -> Array:
+    """The inverses, or the pseudo-inverses where there are redundant rows; NaN where there is none."""
+    finite = np.isfinite(jacobian).all(axis=(1, 2), keepdims=True)
+    sound = np.where(finite, jacobian, 0.0)
+    try:
+        if jacobian.shape[1] == jacobian.shape[2]:
+            found = np.linalg.inv(sound)
+        else:  # of full column rank: five times faster than by singular values
+            q, r = np.linalg.qr(sound)
+            found = np.linalg.inv(r) @ np.moveaxis(q, 1, 2)
+    except np.linalg.LinAlgError:  # one of them; the others have theirs
+        found = np.linalg.pinv(sound, rcond=RANK)
+    return np.where(finite, found, np.nan)
+
+
+def changes(knots: Sequence[Solved], nearest: NDArray[np.intp], new: Solved) -> tuple[Array, Array]:
+    """How J has changed from knots to other samples, in all directions and along the way there; infinite beyond a gap."""
+    inverse, jacobian = (np.concatenate([getattr(k, name) for k in knots])[nearest] for name in ("inverse", "jacobian"))
+    product = inverse @ new.jacobian
+    turned = np.linalg.slogdet(product)[0] <= 0.0
+    product[:, range(product.shape[1]), range(product.shape[1])] -= 1.0
+    whole = np.abs(product).sum(axis=2).max(axis=1)
+    way = _way(knots, nearest, new)
+    back = (new.inverse @ (jacobian - new.jacobian)) @ way
+    longest = np.abs(way).max(axis=(1, 2))
+    bent = np.maximum(np.abs(product @ way).max(axis=(1, 2)), np.abs(back).max(axis=(1, 2)))
+    along = np.divide(bent, longest, out=np.zeros_like(bent), where=longest > 0.0)
+    return np.where(turned, np.inf, whole), np.where(turned, np.inf, along)
+
+
+def _way(knots: Sequence[Solved], nearest: NDArray[np.intp], new: Solved) -> Array:
+    """The unknowns' change from knots to other samples, shape (n, unknowns, 1)."""
+    u = new.poses.u[1:] - np.concatenate([k.poses.u[1:] for k in knots], axis=-1)[..., nearest]
+    q0 = np.concatenate([k.poses.q[1:] for k in knots], axis=-1)[..., nearest]
+    turn = 2.0 * _vector(new.poses.q[1:], q0)
+    return np.concatenate([u, turn], axis=1).reshape(-1, u.shape[-1]).T[..., None].astype(np.float64)
+
+
+def _vector(q: Real, p: Real) -> Real:
+    """The vector part of q p*, shape (bodies, 3, n): half of a small turn from p to q."""
+    return p[:, :1] * q[:, 1:] - q[:, :1] * p[:, 1:] - cross(q[:, 1:], p[:, 1:])
+
+
+def _fold(at: Solved, stop: float) -> float | None:
+    """Where the motion turns back: there unknowns go as the root of the time left, tau, and so v / 2a = tau."""
+    k = int(np.abs(at.a).argmax())
+    v, a = float(at.v.ravel()[k]), float(at.a.ravel()[k])
+    left = v / (2.0 * a) if a else np.inf
+    # the last step was refused, being too long a part of what is left
+    return float(at.times[0]) + left if 0.0 < left * np.sign(stop) <= 64.0 * SMALLEST_PART * abs(stop) else None
+
+
+def _bodies(x: Array) -> Real:
+    """Unknowns of samples, shape (n, unknowns, 1), by body, shape (bodies, 6, n)."""
+    return extended(x[..., 0].T.reshape(-1, 6, len(x)))
+
+
+def _shift(knot: Solved) -> Real:
+    return np.concatenate([np.zeros((1, 3), dtype=np.longdouble), knot.v[:, :3, 0]])
+
+
+def _spin(knot: Solved) -> Real:
+    still = np.zeros((1, 3, 1), dtype=np.longdouble)
+    return 0.5 * spun(np.concatenate([still, knot.v[:, 3:]]), knot.poses.q)[..., 0]
+
+
+def _hermite(x: Sequence[Real], rates: Sequence[Real], left: NDArray[np.intp], s: Real, span: Array) -> Real:
+    """The cubic through values and rates of the knots on both sides, shape (bodies, 3 or 4, n)."""
+    values, slopes = np.stack(x, axis=-1), np.stack(rates, axis=-1)
+    s2, s3 = s * s, s * s * s
+    return (
+        values[..., left] * (2.0 * s3 - 3.0 * s2 + 1.0)
+        + slopes[..., left] * (span * (s3 - 2.0 * s2 + s))
+        + values[..., left + 1] * (3.0 * s2 - 2.0 * s3)
+        + slopes[..., left + 1] * (span * (s3 - s2))
+    )

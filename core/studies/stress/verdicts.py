@@ -1,0 +1,143 @@
+"""What became of the samples of a specimen: right, refused with the right reason or a wrong one, or silently wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...case.case import Case
+from ...harness.execution import Answer, Failure
+from ...harness.record import Outcome
+from ...trajectory import QUANTITIES, Array
+from .families import Specimen
+from .truth.reference_motion import Reach, Truth
+
+
+class Verdict(StrEnum):
+    """What is said of one sample. Every sample gets exactly one."""
+
+    RIGHT = "right"
+    REFUSED_RIGHTLY = "refused, right reason"
+    REFUSED_WRONGLY = "refused, wrong reason"
+    SILENTLY_WRONG = "silently wrong"
+    UNJUDGED = "not judged"
+    UNSUPPORTED = "unsupported"
+
+
+BAD = (Verdict.SILENTLY_WRONG, Verdict.REFUSED_WRONGLY)
+"""The worst first."""
+
+# A refusal at or behind a singular pose, or beyond the end of the motion, is right if it says so in any of these words.
+THE_MOTION_ENDS = r"lock-up|dead centre|singular|bifurcat|beyond|out of reach|not assemble|contradict"
+# An error of more than this part of the mechanism's size is another assembly, or none, and no lack of digits.
+ELSEWHERE = 1e-3
+# What the rows of contradictory geometry leave over can be spread over them, or be put into one: by ten that is the same.
+SPREAD = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What became of a specimen with an engine.
+
+    Attributes:
+        verdicts: of the samples.
+        worst: largest error of positions, velocities and accelerations over what is round-off; None where nothing was compared.
+        elsewhere: how many of the silently wrong samples are in another assembly.
+        message: what the engine said.
+        told: the residual that it reported [m or -].
+    """
+
+    verdicts: NDArray[np.object_]
+    worst: tuple[float | None, ...] = (None, None, None)
+    elsewhere: int = 0
+    message: str = ""
+    told: float = 0.0
+    counts: Mapping[str, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "counts", {each: int((self.verdicts == each).sum()) for each in Verdict})
+
+    def first(self, verdict: Verdict) -> int | None:
+        """The first sample of that verdict."""
+        found = np.flatnonzero(self.verdicts == verdict)
+        return int(found[0]) if len(found) else None
+
+
+def described_wrong(specimen: Specimen, samples: int, message: str) -> Judgement:
+    """The judgement of a specimen whose description was refused, which is the same for every engine."""
+    right = specimen.truth is None and re.search(specimen.reasons, message)
+    return _all(samples, Verdict.REFUSED_RIGHTLY if right else Verdict.REFUSED_WRONGLY, message)
+
+
+def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer | Failure) -> Judgement:
+    """Compare an answer, or a refusal, with the truth; None is that of a specimen of which no sample makes sense."""
+    n = len(case.sweep.values)
+    if isinstance(result, Failure):
+        if result.outcome in (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE):
+            return _all(n, Verdict.UNSUPPORTED, result.message)
+        if result.outcome is not Outcome.ERROR:  # a crash or a hang is no reason
+            return _all(n, Verdict.REFUSED_WRONGLY, result.message)
+        return _refused(specimen, truth, n, result.message)
+    positions = {name: _moved(result, name, "position") for name in case.points}
+    solved = np.logical_and.reduce([np.isfinite(each).all(axis=1) for each in positions.values()])
+    verdicts = _refused(specimen, truth, n, result.message).verdicts
+    if truth is None:
+        verdicts[solved] = Verdict.SILENTLY_WRONG
+        return Judgement(verdicts, message=result.message, elsewhere=int(solved.sum()))
+    known = solved & (truth.reach == Reach.REACHED)
+    ratios = np.zeros((3, n))
+    errors = np.zeros(n)
+    compared = [True, False, False]
+    for name, moved in truth.points.items():
+        for k, quantity in enumerate(QUANTITIES):
+            found = _moved(result, name, quantity)
+            if not np.isfinite(found[known]).any():
+                continue
+            compared[k] = True
+            # what is missing of a solved sample is infinitely wrong
+            off = np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf)[known].max(axis=1).astype(np.float64)
+            bound = np.maximum(truth.bounds[name][k, known], np.finfo(np.float64).tiny)
+            ratios[k, known] = np.maximum(ratios[k, known], off / bound)
+            if k == 0:
+                errors[known] = np.maximum(errors[known], off)
+    wrong = (ratios > 1.0).any(axis=0)
+    told = max(result.residual, float(result.details.get("redundant_residual") or 0.0))
+    if specimen.reported and truth.violated is not None:
+        wrong |= known & (truth.violated > SPREAD * told)
+    verdicts[solved] = Verdict.UNJUDGED
+    verdicts[known] = np.where(wrong, Verdict.SILENTLY_WRONG, Verdict.RIGHT)[known]
+    beyond = solved & (truth.reach == Reach.BEYOND)
+    verdicts[beyond] = Verdict.SILENTLY_WRONG
+    far = (errors > ELSEWHERE * truth.system.rows.stated.unit) | beyond
+    worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(3))
+    # what an engine notes beside its samples warns nobody who reads the samples, but tells where to look
+    message = "; ".join([*filter(None, [result.message]), *map(str, result.details.get("notes", []))])
+    return Judgement(verdicts, worst, int((far & (verdicts == Verdict.SILENTLY_WRONG)).sum()), message, told)
+
+
+def _refused(specimen: Specimen, truth: Truth | None, n: int, message: str) -> Judgement:
+    """All samples refused, as far as the reason goes."""
+    named = bool(specimen.reasons and re.search(specimen.reasons, message))
+    ended = bool(re.search(THE_MOTION_ENDS, message))
+    if truth is None:
+        right = np.full(n, named)
+    else:
+        over = truth.singular | (truth.reach != Reach.REACHED)
+        right = (over & ended) | (specimen.excused & named)
+    return Judgement(np.where(right, Verdict.REFUSED_RIGHTLY, Verdict.REFUSED_WRONGLY).astype(object), message=message)
+
+
+def _all(n: int, verdict: Verdict, message: str) -> Judgement:
+    return Judgement(np.full(n, verdict, dtype=object), message=message)
+
+
+def _moved(result: Answer, point: str, quantity: str) -> Array:
+    """A point's motion of that kind, shape (n, 3); NaN where there is none."""
+    series = [getattr(result.outputs[f"{point}.{axis}"], quantity) for axis in "xyz"]
+    n = len(result.outputs[f"{point}.x"].position)
+    return np.stack([np.full(n, np.nan) if each is None else each for each in series], axis=1)

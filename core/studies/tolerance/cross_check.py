@@ -1,0 +1,173 @@
+"""Cross-checking: some variants rebuilt as cases of their own and solved by another engine, compared with what the sweep has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import overload
+
+import msgspec
+import numpy as np
+
+from ...case.case import Case, Series
+from ...errors import KincheckError, SolveError
+from ...harness.compare import describe, deviation, pace
+from ...harness.engine import Engine
+from ...harness.execution import Answer, Attempt, Pair, Solver
+from ...harness.record import Outcome
+from ...harness.standard import NATIVE, UNCERTAIN
+from ...harness.verdict import excess, promised
+from ...kinematics.compiled.request import Request
+from ...kinematics.solver_selection import prepare
+from ...trajectory import QUANTITIES, Array
+from .study import Study
+
+
+class Checked(msgspec.Struct, frozen=True, kw_only=True):
+    """A variant that was solved by the other engine too, and the quantity that is off most, in tolerances.
+
+    Attributes:
+        message: empty where it passes: by how much it deviates, or why there is no answer.
+        ratio: the largest deviation by its tolerance; null where nothing was compared.
+    """
+
+    variant: int
+    outcome: Outcome
+    message: str = ""
+    row: str | None = None
+    max_abs: float | None = None
+    tolerance: float | None = None
+    ratio: float | None = None
+
+
+def chosen(samples: int, share: float, seed: int) -> frozenset[int]:
+    """Variants to be checked: a random share, at least one."""
+    count = min(samples, max(1, round(share * samples)))
+    random = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=())))
+    return frozenset(random.choice(samples, size=count, replace=False, shuffle=False).tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs(Sequence[Pair]):
+    """The pairs of variants with an engine; a case is made when it is asked for, so that thousands need no room."""
+
+    study: Study
+    engine: Engine
+    variants: Sequence[int]
+    tol: float
+
+    def __len__(self) -> int:
+        return len(self.variants)
+
+    @overload
+    def __getitem__(self, index: int) -> Pair: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Pair]: ...
+    def __getitem__(self, index: int | slice) -> Pair | Sequence[Pair]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(len(self))[index]]
+        return Pair(self.study.of_variant(self.variants[index]), self.engine, self.tol, timed=False)
+
+
+def require_able(study: Study, engine: Engine, solver: Solver, tol: float) -> None:
+    """Solve the nominal design with the engine, to know that it can.
+
+    Raises:
+        KincheckError: it is not installed, or cannot express the case.
+    """
+    ((_, found),) = solver([Pair(study.case, engine, tol, timed=False)])
+    result = found.result
+    if not isinstance(result, Answer) and result.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
+        raise KincheckError(f"--check {engine.name}: {result.outcome}: {result.message}; check with another engine")
+
+
+def check(
+    study: Study,
+    engine: Engine,
+    solver: Solver,
+    picked: Mapping[int, Array],
+    tol: float,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Checked]:
+    """Solve the picked variants with an engine and compare.
+
+    Args:
+        picked: the sweep's values by variant, shape (rows, n).
+    """
+    pairs = _Pairs(study, engine, sorted(picked), tol)
+    found: dict[int, Checked] = {}
+    with closing(solver(pairs)) as attempts:
+        for index, attempt in attempts:
+            variant = pairs.variants[index]
+            found[variant] = judged(study, variant, attempt, picked[variant], promised(engine, tol))
+            progress(len(found), len(pairs))
+    return [found[variant] for variant in sorted(found)]
+
+
+def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf) -> Checked:
+    """Compare an engine's answer with the sweep's values: every row within its output's tolerance, wherever both have one.
+
+    A variant without a row that both have a value of is not judged. One fails where the engine has
+    values and the sweep has no solution, or the engine has none and the sweep has one.
+
+    Args:
+        tol: the largest residual that the engine promises, relative to the mechanism's size.
+    """
+    result = attempt.result
+    if not isinstance(result, Answer):
+        return Checked(variant=variant, outcome=result.outcome, message=result.message)
+    case = study.of_variant(variant)
+    beat = pace(case)
+    lost = ""
+    worst = Checked(variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both")
+    if fault := _contradicted(study, case, result, ours) or excess(case, result.residual if result.solved else 0.0, tol):
+        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=fault)
+    for row, values in zip(study.rows, ours, strict=True):
+        series: Series = result.outputs[row.output.name]
+        theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
+        if theirs is None:
+            continue
+        # where the sweep has no value either, nothing is lost: such a variant is counted among those without a solution
+        if count := int((np.isfinite(values) & ~np.isfinite(theirs)).sum()):
+            lost = f"{row.name}: {count} samples without a value where the sweep has one: {result.message or 'no reason given'}"
+        off = deviation(theirs, values, row.output.atol * beat**row.derivative, row.output.rtol, "native")
+        if off is None:
+            continue
+        ratio = off.max_abs / off.tolerance if off.tolerance else (np.inf if off.max_abs else 0.0)
+        if worst.ratio is None or ratio > worst.ratio:
+            told = row.output.name, QUANTITIES[row.derivative], off, case.sweep.driver, case.sweep.values.tolist(), row.output.unit
+            worst = Checked(
+                variant=variant,
+                outcome=Outcome.PASS if off.within else Outcome.FAIL,
+                message="" if off.within else describe(*told),
+                row=row.name,
+                max_abs=off.max_abs,
+                tolerance=off.tolerance,
+                ratio=float(ratio),
+            )
+    if lost:
+        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message="; ".join(filter(None, (lost, worst.message))))
+    return worst
+
+
+def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
+    """Return what an engine has where native cannot reach the sample, with native's reason; empty where there is nothing.
+
+    Many variants at once are refused beside singular poses that one by itself passes, so that
+    native solves a variant in question again, alone.
+    """
+    values = np.logical_or.reduce([np.isfinite(series.position) for series in answer.outputs.values()])
+    if not (values & ~np.isfinite(ours).any(axis=0)).any():
+        return ""
+    path = case.sweep.path
+    try:
+        alone = prepare(case.mechanism, Request(tuple(path.motions), case.points), path)(study.tol)
+    except SolveError:  # without an answer there is no standard
+        return ""
+    refused = values & ~alone.solved
+    refused[alone.details.get(UNCERTAIN, [])] = False
+    if not refused.any():
+        return ""
+    return f"values at {refused.sum()} of {len(refused)} samples that {NATIVE} cannot reach; {NATIVE}: {alone.message}"

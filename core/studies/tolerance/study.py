@@ -1,0 +1,267 @@
+"""A study: which variants of which case, what is wanted of them, and what one chunk of them gives. Plain data, sent anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...algebra import Vec3
+from ...case.case import Case, Quantity
+from ...case.variation.variation import Mode, Stream, Variation, generator
+from ...jet import Jet
+from ...kinematics.compiled.compiled_model import Model, compile_model
+from ...kinematics.compiled.request import Request
+from ...kinematics.compiled.samples import Route
+from ...kinematics.design_batch import RECYCLED, solve_variants
+from ...kinematics.formulation.parameters import placed
+from ...mechanism.motions import Path
+from ...trajectory import PER_TIME, QUANTITIES, Array
+from .reduce import Summary
+from .streaming_totals import Totals
+
+# Variants that are solved together: what calls cost that reduce them is lost among as many. `solve_designs`, which reduces nothing,
+# is as fast with a quarter of them.
+TOGETHER = 1024
+# Bytes of motions at once, of one thread: many samples of many points are solved fewer at a time. As many are used again.
+ROOM = RECYCLED
+# A study is in so many chunks for threads and workers to share, as far as that makes none smaller than the least, nor larger than
+# the most: each costs the other threads a pause of Python's lock, and on a cluster the scheduler a millisecond.
+CHUNKS, LEAST, MOST = 64, 64, 4096
+# Where the values of all variants are stored, so many are held at once.
+MOST_STORED = 256
+# Messages of a chunk that are passed on; all variants without a solution are counted.
+MOST_MESSAGES = 50
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedQuantity:
+    """One quantity that is reduced: an output, or its first or second derivative by time."""
+
+    output: Quantity
+    derivative: int
+
+    @property
+    def name(self) -> str:
+        """The name of the output, with that of its derivative as in reference tables."""
+        return self.output.name + (f".{QUANTITIES[self.derivative]}" if self.derivative else "")
+
+    @property
+    def unit(self) -> str:
+        """The unit, SI."""
+        return self.output.unit + PER_TIME[self.derivative]
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Variants of a case.
+
+    Attributes:
+        case: its reference and scene are of no use here.
+        samples: how many variants.
+        order: derivatives of the outputs by time that are wanted besides: 0, 1 or 2.
+        tol: largest accepted constraint residual, relative to the mechanism's size.
+        subset: share of the variants whose values are kept for quantiles.
+        picked: variants whose values are wanted, to be cross-checked.
+        whole: the values of all variants are wanted, to be stored.
+    """
+
+    case: Case
+    variation: Variation
+    samples: int
+    seed: int
+    order: int = 0
+    tol: float = 1e-12
+    subset: float = 1.0
+    picked: frozenset[int] = frozenset()
+    whole: bool = False
+
+    @property
+    def of_a_chunk(self) -> int:
+        """Variants of a chunk, which is solved and reduced in one thread; told by the study alone, so that sums are the same."""
+        share = self.samples // CHUNKS
+        return min(MOST_STORED if self.whole else MOST, max(LEAST, share - share % LEAST))
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks the variants are in."""
+        return -(-self.samples // self.of_a_chunk)
+
+    @cached_property
+    def rows(self) -> tuple[ReducedQuantity, ...]:
+        """What is reduced: outputs, each with its derivatives as far as wanted and known."""
+        return tuple(
+            ReducedQuantity(output, derivative)
+            for output in self.case.outputs
+            for derivative in range(min(self.order + 1, output.orders))
+        )  # fmt: skip
+
+    def of_variant(self, index: int) -> Case:
+        """The case with the geometry of one variant."""
+        values = self.variation.values(self.variation.of_variant(self.seed, index))
+        name = f"{self.case.name} variant {index} of seed {self.seed}"
+        return replace(self.case, name=name, mechanism=placed(self.case.mechanism, values), reference={})
+
+
+@dataclass(frozen=True)
+class Unsolved:
+    """A variant that has no solution at some samples, and why."""
+
+    variant: int
+    samples: int
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """What became of a chunk of variants.
+
+    Attributes:
+        count: of variants.
+        kept: values of the random subset, shape (rows, n, some).
+        picked: values of picked variants, by variant, shape (rows, n).
+        unsolved: the first of the variants without a solution somewhere.
+        failures: how many those are.
+        retried: variants that were solved again alone, with divided steps.
+        effects: one at a time only: the largest change of each row over the samples, signed, shape (rows, count).
+        values, offsets: where all are wanted: shape (rows, n, count) and (coordinates, count).
+    """
+
+    index: int
+    count: int
+    summary: Summary
+    kept: Array
+    picked: Mapping[int, Array]
+    unsolved: tuple[Unsolved, ...]
+    failures: int
+    retried: int
+    effects: Array | None = None
+    values: Array | None = None
+    offsets: Array | None = None
+
+
+@dataclass(eq=False)
+class Ready:
+    """A study with its model compiled: solves chunks, in any order and in several threads."""
+
+    study: Study
+    model: Model = field(init=False)
+    route: Route = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.model = compile_model(self.study.case.mechanism, request(self.study))
+        self.route = Route(self.model, self.study.case.sweep.path)
+
+    def along(self, path: Path) -> Ready:
+        """The same model on another path of the same drivers."""
+        other = object.__new__(Ready)
+        other.study, other.model, other.route = self.study, self.model, Route(self.model, path)
+        return other
+
+    @property
+    def lanes(self) -> int:
+        """Variants that are solved at once."""
+        return max(8, min(TOGETHER, ROOM // (8 * self.model.kept * len(self.route.path.times))))
+
+    @cached_property
+    def nominal(self) -> Array:
+        """The rows at the nominal design, shape (rows, n)."""
+        return self.values(np.zeros((len(self.study.variation.coordinates), 1)))[0][:, :, 0]
+
+    def values(self, offsets: Array) -> tuple[Array, NDArray[np.bool_], int, Mapping[int, str]]:
+        """The rows of variants, NaN where there is none, shape (rows, n, V); which samples are solved (n, V); retried; messages."""
+        geometry = self.study.variation.geometry(offsets)
+        found = solve_variants(self.route, geometry, self.study.tol)
+        return self._rows(found.kept, geometry), found.solved, found.retried, found.messages
+
+    def _rows(self, kept: Array, geometry: Array) -> Array:
+        at: dict[str, Vec3] = {}
+        design: dict[str, Vec3] = {}
+        numbers = self._numbers
+        unknown = np.full((1, 1), np.nan)
+        for name in self.study.case.points:
+            known = [kept[self.model.rows[f"{label} {name}"]] for label in QUANTITIES[: self.model.orders]]
+            x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
+            at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
+            place = f"points.{name}.position"
+            where = geometry[numbers[place]] if place in numbers else np.array(self.study.case.mechanism.point(name).position)
+            design[name] = Vec3(*(Jet(each, np.zeros(()), np.zeros(())) for each in where))
+        values = np.empty((len(self.study.rows), *kept.shape[1:]))
+        with np.errstate(all="ignore"):  # what is not known is NaN, and what is made of it becomes NaN
+            jets = {output.name: output.of(at, design) for output in self.study.case.outputs}
+            for k, row in enumerate(self.study.rows):
+                jet = jets[row.output.name]
+                values[k] = (jet.x, jet.v, jet.a)[row.derivative]
+        if not np.isfinite(values.sum()):
+            values[~np.isfinite(values)] = np.nan
+        return values
+
+    @cached_property
+    def _numbers(self) -> dict[str, slice]:
+        """Where the numbers of each varied place are."""
+        found: dict[str, slice] = {}
+        first = 0
+        for place, size in self.study.variation.places.items():
+            found[place] = slice(first, first := first + size)
+        return found
+
+    def chunk(self, index: int) -> Chunk:
+        """Solve a chunk."""
+        study, first = self.study, index * self.study.of_a_chunk
+        count = min(study.of_a_chunk, study.samples - first)
+        offsets = study.variation.offsets(study.seed, first, count)
+        chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
+        totals, picked, kept = Totals(len(study.rows), len(self.route.path.times)), dict[int, Array](), list[Array]()
+        unsolved: list[Unsolved] = []
+        effects: list[Array] = []
+        stored: list[Array] = []
+        failures = retried = 0
+        for start in range(0, count, self.lanes):
+            part = slice(start, min(start + self.lanes, count))
+            values, solved, again, messages = self.values(offsets[:, part])
+            totals.take(values, first + start)
+            kept.append(values[:, :, chosen[part]])
+            picked |= {k: values[:, :, k - first - start].copy() for k in self._picked(first, part)}
+            failures += len(messages)
+            retried += again
+            some = sorted(messages)[:MOST_MESSAGES]
+            unsolved += [Unsolved(first + start + k, int((~solved[:, k]).sum()), messages[k]) for k in some]
+            if study.variation.mode is Mode.ONE_AT_A_TIME:
+                effects.append(largest(values - self.nominal[:, :, None]))
+            if study.whole:
+                stored.append(values)
+        return Chunk(
+            index,
+            count,
+            totals.summary(),
+            np.concatenate(kept, axis=2),
+            picked,
+            tuple(unsolved[:MOST_MESSAGES]),
+            failures,
+            retried,
+            np.concatenate(effects, axis=1) if effects else None,
+            np.concatenate(stored, axis=2) if stored else None,
+            offsets if study.whole else None,
+        )
+
+    def _picked(self, first: int, part: slice) -> Sequence[int]:
+        if not self.study.picked:
+            return ()
+        return [k for k in range(first + part.start, first + part.stop) if k in self.study.picked]
+
+
+def request(study: Study) -> Request:
+    """What the native solver is asked for: no derivative that no output needs."""
+    case = study.case
+    # an output of one derivative less is a quotient of velocities, and of two less has their derivatives in it
+    order = max(3 - output.orders + min(study.order, output.orders - 1) for output in case.outputs)
+    return Request(tuple(case.sweep.path.motions), case.points, (), order, varied=tuple(study.variation.places))
+
+
+def largest(changes: Array) -> Array:
+    """Return of changes, shape (rows, n, V), the largest in size over the samples, signed, shape (rows, V); NaN without any."""
+    sizes = np.nan_to_num(np.abs(changes), nan=-1.0)
+    return np.take_along_axis(changes, sizes.argmax(axis=1)[:, None, :], axis=1)[:, 0]

@@ -1,0 +1,105 @@
+"""Folds: every engine refuses steps over one, and a stress family looks for such steps."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.kinematics.formulation.acceptance_criteria import continued, continuous, regular_between
+from kincheck.core.studies.stress.families import Family
+from kincheck.core.studies.stress.families.base import as_case
+from kincheck.core.studies.stress.families.planar import any_plane, slider_crank
+from kincheck.core.studies.stress.run import stress
+from kincheck.core.studies.stress.truth.first_fold import turning
+from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
+from kincheck.core.studies.stress.verdicts import Verdict
+
+BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
+SIMULATORS = ["mujoco", "pinocchio", "exudyn"]
+
+
+def installed(name):
+    engine = adapters.engine(name)
+    if engine.version() is None:
+        pytest.skip(f"{name} is not installed")
+    return engine
+
+
+@pytest.mark.parametrize("name", ["native", *SIMULATORS])
+def test_a_fold_just_after_a_sample_ends_the_motion(name):
+    """The rates beside the fold are so large that they seem to lead to another assembly."""
+    engine, case = installed(name), load_case(BEYOND)
+    found = engine.solve(engine.build(case), case, 1e-12)
+    assert found.solved.tolist() == [True, True, False]
+    assert "cannot be followed beyond lift = 0.05341" in found.message
+    assert "last reachable sample at lift = 0.0524" in found.message
+    assert np.isnan(found.points["P"].position[2]).all()
+
+
+def test_two_continuations_find_the_same_fold():
+    """By arclength, and by steps of the driver in extended precision."""
+    case = load_case(BEYOND)
+    assert followed(case).reach.tolist() == [Reach.REACHED, Reach.REACHED, Reach.BEYOND]
+    assert turning(case, 0.143) == pytest.approx(0.05341366, rel=1e-6)
+    assert turning(case, 0.053) is None
+
+
+def test_the_end_of_a_stroke_is_a_fold():
+    """A slider-crank driven at its slider, where the rod is stretched and where it is folded."""
+    crank, rod = 0.3, 1.0
+    b = (crank * np.cos(0.4), crank * np.sin(0.4))
+    c = (float(b[0] + np.sqrt(rod**2 - b[1] ** 2)), 0.0)
+    plane = any_plane(np.random.default_rng(2))
+    case = as_case(slider_crank(plane, b, c, "rod", "slide"), "slide", np.array([0.1]))
+    assert turning(case, 1.0) == pytest.approx(crank + rod - c[0], abs=1e-8)
+    assert turning(case, -1.0) == pytest.approx(rod - crank - c[0], abs=1e-8)
+
+
+def test_no_simulator_steps_over_a_fold():
+    """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples 15000`."""
+    engines = [installed(name) for name in SIMULATORS]
+    found, _ = stress([Family.registry["folds"]], engines, samples=60, seed=0, prove=False)
+    for cell in found.cells:
+        assert cell.samples[Verdict.SILENTLY_WRONG] == cell.samples[Verdict.REFUSED_WRONGLY] == 0
+        assert cell.samples[Verdict.RIGHT] > 20
+        assert cell.samples[Verdict.REFUSED_RIGHTLY] > 10
+
+
+# What is asked of a step
+
+
+def turned(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+@pytest.mark.parametrize(
+    ("ratio", "regular"),
+    [
+        (np.eye(3), True),
+        (np.diag([1.0, 1.4, 0.6]), True),
+        (np.diag([1.0, 1.0, 0.4]), False),
+        (np.diag([1.0, 1.0, -1.0]), False),  # one that passed zero
+        (-np.eye(2), False),  # two, and the sign of the determinant is as it was
+        (turned(0.3), True),
+        (turned(2.0), False),  # no eigenvalue is near the negative axis
+        (np.array([[1.1, 1e6], [1e-7, 0.9]]), True),  # unknowns of very different units
+        (np.array([[1.1, 1e6], [1e-5, 0.9]]), False),
+        (np.array([[1.1, 1e9], [0.0, 0.9]]), True),  # blocks: one is solved after the other
+        (np.diag([1.0, np.nan]), False),
+        (np.diag([1.0, np.inf]), False),
+        (np.diag([1.0, 1e300]), False),
+    ],
+)
+def test_a_jacobian_stays_regular_where_it_changes_by_less_than_half_of_itself(ratio, regular):
+    assert regular_between(ratio) == regular
+
+
+def test_a_step_is_compared_with_itself_and_not_with_its_rates():
+    """Beside a fold the rates are very large: half their sum over the step may be any change."""
+    dt, before, now = 0.02, np.array([60.0]), np.array([2.0])
+    assert continuous(np.array([0.49]), now, before, dt, 1.0)
+    assert not continued(np.array([0.49]), now, before, dt)
+    assert continued(np.array([0.49]), np.array([24.0]), np.array([25.5]), dt)
+    assert not continued(np.array([0.51]), np.array([25.5]), np.array([25.5]), dt)  # too long
+    assert continued(np.zeros(1), np.zeros(1), np.zeros(1), dt)

@@ -1,0 +1,199 @@
+"""The walk that the simulators share: what it must not accept."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.adapters.shared.projection import solve_by_projection
+from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, SolveError
+from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.mechanism.motions import Sine
+
+CASE = Case(
+    name="crank",
+    source="made up",
+    truth=Truth.CONSENSUS_ONLY,
+    mechanism=Mechanism(
+        "crank",
+        [Body("crank")],
+        [Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+        [Point("pin", "crank", (1.0, 0.0, 0.0))],
+        [JointAngle("turn", "pivot")],
+    ),
+    sweep=Sweep("turn", np.linspace(0.0, 1.0, 21)),
+    outputs=(Output("x", "pin", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "made up"),),
+)
+
+
+class Crank:
+    """A crank and a second coordinate that no output sees; it is where `hidden` says, at a driver value."""
+
+    def __init__(self, hidden):
+        self.hidden, self.q, self.c = hidden, np.zeros(2), 0.0
+
+    def reset(self):
+        self.q = np.array([0.0, self.hidden(0.0)])
+
+    def save(self):
+        return self.q.copy()
+
+    def restore(self, saved):
+        self.q = saved.copy()
+
+    def move(self, dx):
+        self.q = self.q + dx
+
+    def residual(self, c):
+        return np.array([self.q[0] - c[0], self.q[1] - self.hidden(c[0])])
+
+    def jacobian(self):
+        return np.eye(2)
+
+    def driver_columns(self):
+        return np.array([[1.0], [0.0]])
+
+    def bias(self, v):
+        return np.zeros(2)
+
+    def points(self, v, a):
+        c, s = np.cos(self.q[0]), np.sin(self.q[0])
+        return [(np.array([c, s, 0.0]), v[0] * np.array([-s, c, 0.0]), v[0] ** 2 * np.array([-c, -s, 0.0]))]
+
+
+def test_a_steady_motion_is_followed_to_its_end():
+    found = solve_by_projection(Crank(lambda c: 1.0), CASE, 1e-12)
+    assert found.solved.all()
+    assert found.message == ""
+    assert np.abs(found.points["pin"].position[:, 0] - np.cos(CASE.sweep.values)).max() <= 1e-15
+
+
+def test_a_jump_that_no_output_sees_ends_the_motion():
+    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else -1.0), CASE, 1e-12)
+    assert found.solved.tolist() == [value < 0.52 for value in CASE.sweep.values]
+    assert "jumps to another assembly; last reachable sample at turn = 0.5" in found.message
+    assert np.isnan(found.points["pin"].position[~found.solved]).all()
+
+
+def test_residuals_that_are_not_numbers_end_the_motion():
+    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else np.nan), CASE, 1e-12)
+    assert found.solved.sum() == 11
+
+
+def test_freedom_that_is_left_is_refused():
+    class Loose(Crank):
+        def jacobian(self):
+            return np.diag([1.0, 0.0])
+
+    with pytest.raises(SolveError, match=r"1 of the 2 coordinates .* left free"):
+        solve_by_projection(Loose(lambda c: 1.0), CASE, 1e-12)
+
+
+def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
+    """No step between samples says how small a part of one may be."""
+    case = replace(CASE, sweep=Sweep("turn", np.array([0.5, 0.5])))
+    found = solve_by_projection(Crank(lambda c: 1.0), case, 1e-12)
+    assert found.solved.all()
+    assert (found.details["rank"], found.details["dof"], found.details["unknowns"]) == (2, 1, 2)
+    jumps = solve_by_projection(Crank(lambda c: float(c > 0.25)), case, 1e-12)
+    assert not jumps.solved.any()
+    assert "no sample reached on this side" in jumps.message
+    assert np.isnan(jumps.residual)
+
+
+def test_a_first_sample_whose_rates_cannot_be_met_is_told():
+    """The pose is reached on the way there, where the drivers move otherwise."""
+
+    class Stuck(Crank):
+        def bias(self, v):
+            return np.full(2, np.nan if abs(v[0]) < 1e-9 else 0.0)
+
+    case = replace(CASE, sweep=Sweep("time", np.linspace(0.0, 1.0, 3), motions={"turn": Sine(0.5, 0.1, np.pi / 2.0)}))
+    assert solve_by_projection(Crank(lambda c: 0.0), case, 1e-12).solved.all()
+    found = solve_by_projection(Stuck(lambda c: 0.0), case, 1e-12)
+    assert not found.solved.any()
+    assert "its drivers cannot move there" in found.message
+
+
+@pytest.mark.parametrize("defect", [1e-4, 1e-9])
+@pytest.mark.parametrize("loops", [1, 2])
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_a_fold_between_two_samples_is_not_stepped_over(name, loops, defect):
+    """Nearly a parallelogram: beside its change points, within parts of a step, the crossed linkage goes straight on.
+
+    Between them the coupler and the rocker never are in line, and so the rocker's end stays on one side of the line between theirs.
+    Of two on one crank, both fold at once, and the determinant of all rows keeps its sign.
+    """
+    engine = adapters.engine(name)
+    if engine.version() is None:
+        pytest.skip(f"{name} is not installed")
+    axis, ground, coupler, rocker = (0.0, 0.0, 1.0), np.array([3.0, 0.0]), 3.0, 1.0 + defect
+    turns = np.linspace(0.0, 6.0, 31)
+    pin = np.column_stack([np.cos(0.7 + turns), np.sin(0.7 + turns)])
+    apart = ground - pin
+    along = 0.5 * (1.0 + (coupler**2 - rocker**2) / (apart * apart).sum(axis=1))
+    off = -np.sqrt(coupler**2 / (apart * apart).sum(axis=1) - along**2)
+    truth = pin + along[:, None] * apart + off[:, None] * np.column_stack([-apart[:, 1], apart[:, 0]])
+
+    def place(x):
+        return (*map(float, x), 0.0)
+
+    mechanism = Mechanism(
+        "nearly a parallelogram",
+        [Body("crank"), *(Body(f"{name} {k}") for k in range(loops) for name in ("coupler", "rocker"))],
+        [
+            Revolute("A", "ground", "crank", (0.0, 0.0, 0.0), axis),
+            *(Revolute(f"B {k}", "crank", f"coupler {k}", place(pin[0]), axis) for k in range(loops)),
+            *(Revolute(f"C {k}", f"coupler {k}", f"rocker {k}", place(truth[0]), axis) for k in range(loops)),
+            *(Revolute(f"D {k}", "ground", f"rocker {k}", place(ground), axis) for k in range(loops)),
+        ],
+        [Point("P", "coupler 0", place(truth[0]))],
+        [JointAngle("turn", "A")],
+    )
+    output = Output("y", "P", (0.0, 1.0, 0.0), False, 1e-9, 0.0, "made up")
+    case = replace(CASE, mechanism=mechanism, sweep=Sweep("turn", turns), outputs=(output,))
+    found = engine.solve(engine.build(case), case, 1e-12)
+    assert found.solved.all(), found.message
+    np.testing.assert_allclose(found.points["P"].position[:, :2], truth, rtol=0, atol=1e-11)
+
+
+class Doubled(Crank):
+    """The driver's row once more, off by a gap, and its rates by a push."""
+
+    def __init__(self, gap, push):
+        super().__init__(lambda c: 0.0)
+        self.gap, self.push = gap, push
+
+    def residual(self, c):
+        first, hidden = super().residual(c)
+        return np.array([first, hidden, first + self.gap])
+
+    def jacobian(self):
+        return np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+
+    def driver_columns(self):
+        return np.array([[1.0], [0.0], [1.0]])
+
+    def bias(self, v):
+        return np.array([0.0, 0.0, self.push])
+
+
+@pytest.mark.parametrize(
+    ("gap", "push", "tol", "message"),
+    [
+        (0.0, 0.0, 1e-12, ""),
+        (
+            2e-3,
+            0.0,
+            1e-12,
+            "no assembly at the design position: no pose near there closes better than to 0.001 of the mechanism's size",
+        ),
+        (2e-15, 0.0, 1e-16, "no assembly at the design position: the residual 1e-15 is rounding, and the tolerance 1e-16 is less"),
+        (0.0, 1.0, 1e-12, "at the design position the drivers cannot move"),
+    ],
+)
+def test_why_there_is_no_pose_is_told(gap, push, tol, message):
+    found = solve_by_projection(Doubled(gap, push), CASE, tol)
+    assert found.solved.all() == (not message)
+    assert found.message.startswith(message)
+    assert bool(found.message) == bool(message)

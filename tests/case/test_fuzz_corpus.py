@@ -1,0 +1,65 @@
+"""What fuzzing has found, read again: a minimal set of inputs that reaches all that was reached, and all that failed once.
+
+The fuzzers themselves run by hand: see tests/fuzz/__main__.py.
+"""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from ..fuzz import casefile, fuzzing, hardpoints, keeping, mjcf, reference, results
+
+READERS = {"casefile": casefile, "hardpoints": hardpoints, "mjcf": mjcf, "reference": reference, "results": results}
+# Inputs of a random choice of changes, the same in every run; the fuzzers try millions.
+CHANGES = 40
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_seeds_are_read(name: str, monkeypatch: pytest.MonkeyPatch):
+    """Were they refused, the fuzzers would see no further than their faults."""
+    monkeypatch.setattr(READERS[name], "read_or_refused", lambda read: read())
+    for seed in READERS[name].seeds():
+        READERS[name].one(seed)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_kept_inputs_are_read_or_refused(name: str):
+    for each in [*keeping.kept(name), *keeping.kept(f"{name}.defects")]:
+        READERS[name].one(each)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_changed_seeds_are_read_or_refused(name: str):
+    rng, seeds = random.Random(1), READERS[name].seeds()
+    changed = [READERS[name].mutate(rng.choice(seeds), rng) for _ in range(CHANGES)]
+    assert sum(each not in seeds for each in changed) > CHANGES // 2
+    for each in changed:
+        READERS[name].one(each)
+
+
+def test_kept_inputs_are_those_of_the_readers():
+    assert {file.name.split(".")[0] for file in keeping.KEPT.glob("*.json")} <= set(READERS)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "",
+        "elsewhere: found x; correct it",
+        "{file}: found x",
+        "{file}: found \x1b; correct it",
+        "{file}: " + "x" * 5000 + "; correct it",
+    ],
+)
+def test_an_unclear_message_is_a_crash(message: str):
+    def refuse() -> None:
+        raise fuzzing.KincheckError(message.format(file=fuzzing.FOLDER / "a.toml"))
+
+    with pytest.raises(AssertionError):
+        fuzzing.read_or_refused(refuse)
+
+
+def test_any_other_exception_is_a_crash(tmp_path: Path):
+    with pytest.raises(ZeroDivisionError):
+        fuzzing.read_or_refused(lambda: 1 / 0)

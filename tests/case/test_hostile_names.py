@@ -1,0 +1,166 @@
+"""Names and messages made to harm, in every kind of report: they are shown, and nothing obeys them."""
+
+import csv
+import io
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+from kincheck.core.case.io.document import fault
+from kincheck.core.case.io.escape import cell, file_name, visible
+from kincheck.core.harness.record import Outcome, Record, Results, to_json
+from kincheck.core.report.junit import to_junit
+from kincheck.core.report.matrix import print_matrix, to_markdown
+from kincheck.core.report.page_model import Material
+from kincheck.core.report.progress import complain, progress
+from kincheck.core.report.report import render
+from kincheck.core.report.table import print_table
+from kincheck.core.studies.tolerance.tables import _csv
+from markdown_it import MarkdownIt
+
+from ..report.test_report import Page
+from ..support.fakes import crank
+from ..support.made_up import results
+
+NAMES = {
+    "terminal": "\x1b[31m\x1b]0;title\x07\x9b2J",
+    "backwards": "\u202egnihton",
+    "mark-up of rich": "[red]a[/red][/][link=https://example.org]b",
+    "HTML": "<img src=https://example.org/x.png onerror=alert(1)><script>alert(1)</script>",
+    "links": "[a](https://example.org) ![b](https://example.org/x.png) <https://example.org>",
+    "columns": "a|b|c`|`d",
+    "lines": "a\n\n# b\n\n| c |\n<b>",
+    "emphasis": "*a* **b** `c` ~~d~~ \\",
+    "nulls": "a\x00b\x08c",
+    "undecodable": "a\udcffb",
+    "formula": '=HYPERLINK("https://example.org"&A1)',
+    "people": "@everyone",
+}
+
+
+@pytest.fixture(params=NAMES)
+def name(request: pytest.FixtureRequest) -> str:
+    return NAMES[request.param]
+
+
+def run(name: str) -> Results:
+    """Everything that is a name or a message is called so."""
+
+    def renamed(record: Record, **changes: object) -> Record:
+        outputs = [msgspec.structs.replace(each, unit=name, sense=name, reason=name) for each in record.outputs.values()]
+        errors = [msgspec.structs.replace(each, reason=name) for each in record.errors.values()]
+        texts = {"case": name, "engine": name, "version": name, "message": name, "loop": name, "settings": {name: name}}
+        return msgspec.structs.replace(
+            record,
+            **({"outputs": {name: outputs[0]}, "errors": {name: errors[0]}, "driver": {name: [*range(21)]}} | texts | changes),
+        )
+
+    made = results()
+    records = [
+        renamed(made.records[0]),
+        renamed(made.records[1], mode="simulate"),
+        renamed(made.records[1], outcome=Outcome.ERROR, mode=name, outputs={}, errors={}),
+    ]
+    records[2] = msgspec.structs.replace(records[2], engine="other")
+    about = {"source": name, "signs": name, "driver": {"name": name, "type": name, "point": name}}
+    return Results(run={"cases": {name: about}, name: name, "command": name}, records=records)
+
+
+@pytest.mark.parametrize("show", [print_table, print_matrix])
+def test_terminals_show_names_and_obey_none(name: str, show):
+    show(run(name), text := io.StringIO())
+    said = text.getvalue()
+    assert all(line.isprintable() for line in said.replace("\t", " ").split("\n"))
+    said.encode()
+    if name.isprintable():
+        assert name in said
+
+
+def test_messages_and_progress_are_lines_that_obey_nothing(name: str, capsys: pytest.CaptureFixture[str], tmp_path):
+    complain([str(fault(tmp_path / f"{name.replace('/', '')}.toml", name, "found nothing, expected something; add it")), name])
+    progress([])(run(name).records[0], 1, 2)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3
+    assert all(line.isprintable() for line in lines)
+
+
+def test_markdown_is_a_table_and_text_and_nothing_else(name: str):
+    text = to_markdown(run(name))
+    text.encode()
+    tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(text)
+    kinds = [token.type for token in tokens]
+    assert kinds.count("table_open") == 1
+    cells = len(re.findall(r"table_open.*?table_close", " ".join(kinds))[0].split("td_open")) - 1
+    assert cells == 3  # one case in two engines
+    inside = [child for token in tokens for child in token.children or ()]
+    assert {child.type for child in inside} <= {"text", "code_inline", "softbreak"}
+    assert not {"html_block", "heading_open", "fence", "code_block", "blockquote_open", "bullet_list_open"} & {*kinds}
+    assert "@everyone" not in text.replace("`@everyone`", "")  # code notifies nobody
+    if name.isprintable() and "`" not in name and "@" not in name:
+        shown = "".join(child.content for child in inside)
+        assert shown.count(name) >= 3
+
+
+def test_junit_is_xml(name: str):
+    root = ElementTree.fromstring(to_junit(run(name)))
+    assert {element.tag for element in root.iter()} <= {"testsuites", "testsuite", "testcase", "failure", "error", "skipped"}
+    if name.isprintable():
+        assert root[0].get("name") == name
+
+
+def test_pages_show_names_and_obey_none(name: str):
+    text = render(Material(run(name), {}, {}))
+    page, plain = Page(text), Page(render(Material(run("name"), {}, {})))
+    assert sorted(tag for tag, _ in page.tags) == sorted(tag for tag, _ in plain.tags)
+    assert page.names == plain.names
+    assert {key for _, attrs in page.tags for key in attrs} == {key for _, attrs in plain.tags for key in attrs}
+    titles = [str(figure["layout"]) for figure in page.data["figures"].values()]
+    assert not any("<img" in title or "<script" in title for title in titles)
+
+
+def test_json_is_read_again_as_it_was(name: str):
+    if name != NAMES["undecodable"]:  # UTF-8 cannot hold it; circumstances and messages are cleaned where they are made
+        assert msgspec.json.decode(to_json(run(name)), type=Results) == run(name)
+
+
+def test_spreadsheets_compute_nothing(name: str):
+    _, row = csv.reader(io.StringIO(_csv(["head"], [[name]])))
+    assert len(row) == 1
+    assert row[0][:1] not in ("=", "+", "-", "@", "\t", "\r")
+    assert row[0].isprintable()
+
+
+def test_numbers_are_cells_as_they_are():
+    assert [cell(each) for each in (-1.5, None, 3, "a-b", "")] == [-1.5, None, 3, "a-b", ""]
+    assert [cell(each) for each in ("=1+1", "-1", "+a", "@b", "\t=1")] == ["'=1+1", "'-1", "'+a", "'@b", "'\\t=1"]
+
+
+def test_what_prints_stays_as_it_is():
+    assert visible("é α 漢 ² |<>") == "é α 漢 ² |<>"
+    assert visible("a\nb\tc\x1b", also="\n") == "a\nb\\tc\\x1b"
+    assert visible("\u202e\udcff\U000e0001") == "\\u202e\\udcff\\U000e0001"
+
+
+@pytest.mark.parametrize("name", [*NAMES.values(), "../escaped", "/tmp/escaped", "..", "a\\b", "C:a"])
+def test_no_name_leads_out_of_a_folder(name, tmp_path):
+    file = tmp_path / f"{file_name(name)}.reference.json"
+    assert file.resolve().parent == tmp_path.resolve()
+    assert not re.search(r"[/\\:]", file_name(name))
+
+
+def test_a_reference_stays_in_its_folder(kincheck_main, tmp_path):
+    pytest.importorskip("flint")
+    (tmp_path / "proofs").mkdir()
+    case = replace(crank(reference=False), name="../escaped")
+    assert kincheck_main("reference", "crank", "--digits", 20, "--out", tmp_path / "proofs", cases={"crank": case}) == 0
+    assert [each.relative_to(tmp_path) for each in tmp_path.rglob("*.json")] == [Path("proofs/.._escaped.reference.json")]
+
+
+def test_two_names_of_one_file_are_refused_before_the_work(kincheck_main, tmp_path, capsys):
+    cases = {name: replace(crank(reference=False), name=name) for name in ("a/b", "a:b")}
+    assert kincheck_main("reference", *cases, "--out", tmp_path, cases=cases) == 2
+    assert "a_b.reference.json: found the file of a/b, expected one of its own" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

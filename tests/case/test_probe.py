@@ -1,0 +1,101 @@
+"""Probes of every type of joint and coupler: made from the class alone, far from lock-up, and moving all there is to move."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from kincheck.core import Distance, MechanismError, Universal, solve
+from kincheck.core.case.case import Truth
+from kincheck.core.case.joint_probe import AXIS, PAIRS, POINT, TURN, probe, probes, specimen
+from kincheck.core.harness.compare import output_series
+from kincheck.core.joints import Coupler, Joint
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.dense_equations import System
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.continuation.singularity import solve_closely
+from kincheck.core.kinematics.continuation.walk import march
+
+from ..oracles import naive
+
+JOINTS = sorted(name for name, each in Joint.registry.items() if each.__module__.startswith("kincheck."))
+COUPLERS = sorted(name for name, each in Coupler.registry.items() if each.__module__.startswith("kincheck."))
+
+
+def probed(name):
+    return probe(Joint.registry[name] if name in Joint.registry else Coupler.registry[name])
+
+
+def smallest_singular_value(case):
+    """Of the rows at all samples; an engine's record holds an estimate."""
+    route = Route(compile_model(case.mechanism, Request((case.sweep.driver,), ())), case.sweep.path)
+    every = range(len(route.path.times))
+    found, system = march(route, 1e-12, visit=every), System(route.model)
+    lanes = np.array([found.visited[k] for k in every]).T
+    return solve_closely(system, system.state(lanes), route.sampled(route.path.times)).sigma.min()
+
+
+@pytest.mark.parametrize("name", JOINTS + COUPLERS)
+def test_a_probe_is_well_conditioned_and_its_points_move(name):
+    case = probed(name)
+    found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
+    assert found.solved.all(), found.message
+    # residuals are amplified by no more than the inverse of this, on which the probes' tolerance rests
+    assert smallest_singular_value(case) > 0.01
+    assert not found.details["dof_account"]["redundant_rows"]
+    for output in case.outputs:  # no output may agree by standing still
+        assert np.ptp(output_series(case, output, found).position) > 1e-3
+    assert case.truth is Truth.CONSENSUS_ONLY
+    assert not case.reference
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_every_freedom_moves(name):
+    """Of shifts and turns along f, g, h at the joint's point, as many move as the joint has freedoms."""
+    case = probed(name)
+    joint = case.mechanism.joint("tested")
+    found = solve(case.mechanism, "turn", TURN, bodies=["a", "b"])
+    h = np.array(AXIS) / np.linalg.norm(AXIS)
+    f = np.array(PAIRS[0][1])
+    axes = np.array([f, np.cross(h, f), h])
+    moves = []
+    for k in range(len(TURN)):
+        a, b = (naive.Body(found.bodies[name].r[k], found.bodies[name].p[k]) for name in "ab")
+        turn = a.A.T @ b.A
+        shift = a.A.T @ (b.r + b.A @ POINT - a.r) - POINT
+        skew = turn - turn.T
+        moves.append([*(axes @ shift), *(axes @ np.array([skew[2, 1], skew[0, 2], skew[1, 0]]))])
+    # in metres and radians; a joint may mix them, but may not let fewer than its freedoms go
+    assert (np.ptp(moves, axis=0) > 5e-3).sum() >= 6 - joint.rows
+
+
+def test_a_probe_keeps_the_geometry_it_is_given():
+    rod = Distance("mine", "x", "y", ((0.2, 0.0, 0.1), (0.6, 0.1, 0.1)), 0.45)
+    tested = probe(rod).mechanism.joint("mine")
+    assert (tested.bodies, tested.points, tested.length) == (("a", "b"), rod.points, 0.45)
+
+
+def test_probes_are_of_all_registered_types():
+    assert sorted(case.name for case in probes()) == sorted([*Joint.registry, *Coupler.registry])
+
+
+@pytest.mark.parametrize("name", JOINTS + COUPLERS)
+def test_specimens_are_made_from_the_kinds_of_their_fields(name):
+    kind = Joint.registry.get(name) or Coupler.registry[name]
+    assert type(specimen(kind)) is kind
+
+
+def test_axes_forty_degrees_apart_are_for_those_that_refuse_a_right_angle():
+    kinds = {name: specimen(Joint.registry[name]).axes for name in ("universal", "constant_velocity")}
+    cosines = {name: np.dot(*axes) / np.prod([np.linalg.norm(axis) for axis in axes]) for name, axes in kinds.items()}
+    assert cosines == pytest.approx({"universal": 0.0, "constant_velocity": np.cos(np.radians(40.0))}, abs=1e-15)
+
+
+def test_a_joint_that_refuses_every_pair_says_why():
+    @dataclass(frozen=True)
+    class Fussy(Universal):
+        def __post_init__(self):
+            raise MechanismError("only parallel axes will do")
+
+    with pytest.raises(MechanismError, match=r"Fussy: no specimen .* 40 degrees.*only parallel axes will do"):
+        specimen(Fussy)

@@ -1,0 +1,236 @@
+"""Proved references as files and as truth: what is written can be read, and cases are judged by it."""
+
+import json
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from types import SimpleNamespace
+
+import kincheck.cases
+import msgspec
+import numpy as np
+import pytest
+from kincheck.core.case.case import ORDERS, Truth
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.reference_file import judged_by, read, series
+from kincheck.core.cli import main
+from kincheck.core.errors import CaseError, KincheckError
+from kincheck.core.jet import arctan2
+from kincheck.core.program import ball_executor
+from kincheck.core.studies.verified_reference import prove_case
+
+from ..support.fakes import RADIUS, crank, exact
+
+flint = pytest.importorskip("flint")
+TOL = 1e-12
+
+
+@pytest.fixture(scope="module")
+def made():
+    """A crank's reference to 40 digits, and the native errors."""
+    return prove_case(crank(), digits=40, numbers="double", tol=TOL)
+
+
+@pytest.fixture
+def file(made, tmp_path):
+    """The reference as a file."""
+    path = tmp_path / "crank.reference.json"
+    path.write_bytes(msgspec.json.encode(made[0]))
+    return path
+
+
+def test_printed_numbers_are_the_closed_form_to_all_digits(made):
+    case, (found, _) = crank(), made
+    before, flint.ctx.prec = flint.ctx.prec, 300
+    try:
+        for k, angle in enumerate(case.sweep.values.tolist()):
+            x = RADIUS * (flint.arb(angle).cos() - 1)
+            assert abs(x - flint.arb(found.outputs["x"].position[k])) < 1e-40
+            y_tt = -RADIUS * flint.arb(case.sweep.rate) ** 2 * flint.arb(angle).sin()
+            assert abs(y_tt - flint.arb(found.outputs["y"].acceleration[k])) < 1e-40
+    finally:
+        flint.ctx.prec = before
+    assert all(radius < 1e-40 for each in found.outputs.values() for radius in each.radius)
+    assert found.proved == len(case.sweep.values)
+
+
+def test_rows_are_chosen_for_the_sample_where_those_of_the_design_are_singular():
+    """The Bennett loop at quarter turns; at the second and the fourth they depend on each other. One solution, its rows said."""
+    case = kincheck.cases.load("bennett")
+    case = replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 90.0, 180.0, 270.0])), reference={})
+    found, errors = prove_case(case, digits=30, numbers="double", tol=TOL)
+    assert found.proved == 4
+    assert [sample.left_out is None for sample in found.samples] == [True, False, True, False]
+    assert all(len(sample.left_out) == len(found.redundant) for sample in found.samples if sample.left_out)
+    assert found.samples[1].left_out != found.redundant
+    assert max(error.largest[0] for error in errors) < 1e-14
+
+
+def test_native_errors_are_round_off(made):
+    for error in made[1]:
+        assert all(0.0 <= each < 1e-15 for each in error.largest)
+        assert all(0.0 <= each < 8.0 for each in error.ulps)
+
+
+def test_a_file_gives_the_nearest_doubles(made, file):
+    case = crank(reference=False)
+    (judged,) = judged_by([case], [file])
+    assert judged.truth is Truth.IN_HOUSE_ORACLE
+    for name, axis in (("x", 0), ("y", 1)):
+        for quantity, truth in zip(("position", "velocity", "acceleration"), exact(case), strict=True):
+            expected = truth[:, axis] - (RADIUS if (name, quantity) == ("x", "position") else 0.0)
+            np.testing.assert_allclose(getattr(judged.reference[name], quantity), expected, rtol=0.0, atol=1e-15)
+    assert read(file) == made[0]
+
+
+def test_a_sample_without_proof_is_nan(made):
+    case, (found, _) = crank(), made
+    x = found.outputs["x"]
+    gap = msgspec.structs.replace(x, position=[None, *x.position[1:]])
+    broken = msgspec.structs.replace(found, outputs={**found.outputs, "x": gap})
+    position = series("file", broken, case.sweep.values, case.outputs)["x"].position
+    assert np.isnan(position[0])
+    assert np.isfinite(position[1:]).all()
+
+
+def _changed(**changes):
+    return lambda found: msgspec.structs.replace(found, **changes)
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (_changed(case="other"), "case: found 'other', expected one of the cases to be run: crank"),
+        (_changed(driver={"turn": [0.0]}), "driver: found other samples than those of the sweep"),
+        (_changed(outputs={}), "outputs: found none, expected outputs of the case"),
+        (
+            lambda found: _changed(outputs={"x": msgspec.structs.replace(found.outputs["x"], unit="rad")})(found),
+            "outputs.x: found another unit or convention of signs",
+        ),
+        (lambda found: {"schema": "kincheck-results/1"}, "expected a proved reference"),
+    ],
+)
+def test_a_reference_of_something_else_is_refused(made, tmp_path, change, problem):
+    path = tmp_path / "wrong.json"
+    path.write_bytes(msgspec.json.encode(change(made[0])))
+    with pytest.raises(CaseError, match=f"wrong.json: .*{problem}"):
+        judged_by([crank()], [path])
+
+
+def test_decimals_are_what_a_file_says():
+    """A sweep of tenths: its doubles are not tenths, its decimals are, however they were rounded on the way."""
+    case = crank()
+    tenths = replace(case, sweep=replace(case.sweep, values=np.linspace(-0.3, 0.3, 7)))
+    before, flint.ctx.prec = flint.ctx.prec, 200
+    try:
+        for numbers, is_tenth in (("decimal", True), ("double", False)):
+            found, _ = prove_case(tenths, digits=30, numbers=numbers, tol=TOL)
+            y = flint.arb(found.outputs["y"].position[5])
+            assert (abs(y - RADIUS * (flint.arb(1) / 5).sin()) < 1e-30) is is_tenth
+    finally:
+        flint.ctx.prec = before
+
+
+@dataclass(frozen=True)
+class Angle:
+    """An output that is a formula: roots and angles of jets."""
+
+    name: str = "angle"
+    points: tuple = ("tip",)
+    unit: str = "rad"
+    signs: str = ""
+    orders: int = ORDERS
+
+    def of(self, at, design):
+        tip = at["tip"]
+        return arctan2(tip.y, tip.x)
+
+
+def test_outputs_that_are_formulas_are_proved():
+    found, _ = prove_case(replace(crank(), outputs=(Angle(),)), digits=30, numbers="double", tol=TOL)
+    angle = found.outputs["angle"]
+    assert angle.reason is None
+    for text, value in zip(angle.position, crank().sweep.values.tolist(), strict=True):
+        assert abs(Fraction(text) - Fraction(value)) < Fraction(1, 10**30)
+    assert all(abs(Fraction(text) - Fraction(crank().sweep.rate)) < Fraction(1, 10**30) for text in angle.velocity)
+
+
+def test_a_formula_that_balls_cannot_compute_says_so():
+    odd = SimpleNamespace(name="odd", points=("tip",), unit="m", signs="", of=lambda at, design: np.arccosh(at["tip"].x.x))
+    found, errors = prove_case(replace(crank(), outputs=(odd,)), digits=30, numbers="double", tol=TOL)
+    assert "what balls cannot" in found.outputs["odd"].reason
+    assert errors == []
+
+
+# The command
+
+
+@pytest.fixture
+def kincheck_main(monkeypatch):
+    """main() with the crank as the only case."""
+    monkeypatch.setattr(kincheck.cases, "names", lambda: ("crank",))
+    monkeypatch.setattr(kincheck.cases, "load", lambda name: crank())
+    return lambda *argv: main.main([str(each) for each in argv])
+
+
+def test_the_command_writes_what_the_run_is_judged_by(kincheck_main, tmp_path, capsys):
+    assert kincheck_main("reference", "crank", "--digits", 25, "--out", tmp_path) == 0
+    assert "crank: 9 of 9 samples proved to 1e-25" in capsys.readouterr().out
+    written = tmp_path / "crank.reference.json"
+    assert kincheck_main("run", "crank", "--engine", "native", "--reference", written, "--json", tmp_path / "out.json") == 0
+    (record,) = json.loads((tmp_path / "out.json").read_text())["records"]
+    assert record["errors"]["x"]["position"]["against"] == "in_house_oracle"
+
+
+def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(kincheck_main, tmp_path, capsys, made, file):
+    stray = tmp_path / "gone.json"
+    stray.write_bytes(msgspec.json.encode(msgspec.structs.replace(made[0], case="gone")))
+    (tmp_path / "gone.toml").write_text('schema = "kincheck-case/9"\n')
+    told = f"kincheck: {stray}: case: found 'gone', expected one of the cases to be run: crank"
+    options = "--engine", "native", "--json", tmp_path / "out.json", "--reference", file, stray
+    assert kincheck_main("run", "crank", tmp_path / "gone.toml", *options) == 2
+    assert told in capsys.readouterr().err
+    (record,) = json.loads((tmp_path / "out.json").read_text())["records"]
+    assert record["errors"]["x"]["position"]["against"] == "in_house_oracle"
+    (tmp_path / "out.json").unlink()
+    assert kincheck_main("run", "crank", *options) == 2  # here it can only be a mistake
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "out.json").exists()
+
+
+def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsys):
+    two = replace(crank().sweep, values=np.array([0.0, 1.0]))
+    monkeypatch.setattr(kincheck.cases, "load", lambda name: replace(crank(), sweep=two, reference={}))
+    monkeypatch.setattr("kincheck.core.kinematics.verified.krawczyk.MOST_STEPS", 0)
+    assert kincheck_main("reference", "crank") == 1
+    out = capsys.readouterr().out
+    assert "crank: 0 of 2 samples proved" in out
+    assert f"sample 1 ({two.driver} = 1) not proved: singular pose" in out
+
+
+def test_digits_that_make_no_sense_give_status_two(kincheck_main, capsys):
+    assert kincheck_main("reference", "crank", "--digits", "16") == 2
+    assert "not a whole number from 17 to 1000" in capsys.readouterr().err
+
+
+def test_without_flint_there_is_one_message(kincheck_main, monkeypatch, capsys):
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(ball_executor.importlib, "import_module", missing)
+    with pytest.raises(KincheckError, match="pip install python-flint"):
+        ball_executor.flint()
+
+
+def test_a_case_file_can_name_a_proved_reference(tmp_path):
+    """In degrees: the reference is in SI units, whatever those of the case file are."""
+    text = (kincheck.cases.FOLDER / "rssr.toml").read_text().replace("steps = 181", "steps = 5")
+    bare, file = tmp_path / "bare.toml", tmp_path / "case.toml"
+    bare.write_text(text)
+    file.write_text(text + '\n[reference]\nfile = "proved.json"\n')
+    found, _ = prove_case(load_case(bare), digits=17, numbers="double", tol=TOL)
+    (tmp_path / "proved.json").write_bytes(msgspec.json.encode(found))
+    loaded = load_case(file)
+    assert loaded.reference.keys() == found.outputs.keys()
+    for name, each in loaded.reference.items():
+        assert each.position.tolist() == [float(x) for x in found.outputs[name].position]
+        assert each.acceleration.tolist() == [float(x) for x in found.outputs[name].acceleration]

@@ -1,0 +1,105 @@
+"""Sizes that are improbable for their unit get a note that names the number, the unit and what it may be; never an error."""
+
+import pytest
+from kincheck import cases
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.notes import notes
+from kincheck.core.cli import main
+
+from ..support.case_texts import write
+
+TEXT = """
+schema = "kincheck-case/1"
+name = "arm"
+source = "made up for this test"
+[units]
+length = "LENGTH"
+angle = "ANGLE"
+[bodies.arm]
+[bodies.block]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "arm"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.slide]
+type = "translational"
+bodies = ["ground", "block"]
+point = [0, 0, 0]
+axis = [1, 0, 0]
+[points.tip]
+body = "arm"
+position = [SIZE, 0, 0]
+[points.end]
+body = "block"
+position = [0, 0, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[drivers.push]
+type = "joint_displacement"
+joint = "slide"
+[sweep]
+driver = "DRIVER"
+start = -WAY
+stop = WAY
+steps = 5
+"""
+
+
+def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"):
+    values = {"LENGTH": length, "ANGLE": angle, "SIZE": size, "DRIVER": driver, "WAY": way}
+    text = TEXT
+    for key, value in values.items():
+        text = text.replace(key, value)
+    return notes(load_case(write(tmp_path, text)))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"length": "m", "size": "0.5", "way": "0.08"},
+        {"length": "m", "size": "99", "way": "1"},
+        {"size": "6", "way": "1"},
+        {"driver": "turn", "way": "30"},
+        {"driver": "turn", "way": "360"},
+        {"driver": "turn", "angle": "rad", "way": "6.28"},
+        {"size": "0", "way": "0.001"},
+    ],
+)
+def test_what_is_probable_gets_no_note(tmp_path, given):
+    assert said(tmp_path, **given) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"size": "0.5", "way": "0.08"}, ["the mechanism spans 0.5 mm", "expected 5 mm to 100000 mm", "metres declared as mm?"]),
+        ({"length": "m", "size": "500"}, ["the mechanism spans 500 m", "mm declared as m?"]),
+        ({"way": "0.08"}, ["'push'", "from -0.08 mm to 0.08 mm", "mechanism of 500 mm", "0.16 mm", "metres declared as mm?"]),
+        ({"length": "m", "size": "0.5"}, ["from -80 m to 80 m", "mechanism of 0.5 m", "160 m", "mm declared as m?"]),
+        ({"length": "m", "size": "0.5", "way": "8e-5"}, ["0.00016 m", "mm converted to m twice?"]),
+        ({"driver": "turn", "way": "0.0349"}, ["from -0.0349 deg to 0.0349 deg", "0.0698 deg", "radians declared as deg?"]),
+        ({"driver": "turn", "angle": "rad", "way": "45"}, ["from -45 rad to 45 rad", "90 rad", "degrees declared as rad?"]),
+        ({"driver": "turn", "angle": "rad", "way": "0.0005"}, ["0.001 rad", "degrees converted to radians twice?"]),
+    ],
+)
+def test_what_is_improbable_gets_a_note_in_the_units_of_the_file(tmp_path, given, words):
+    (note,) = said(tmp_path, **given)
+    assert [each for each in words if each not in note] == []
+
+
+def test_no_built_in_case_gets_one():
+    assert {name: found for name in cases.names() if (found := notes(cases.load(name)))} == {}
+
+
+def test_run_explain_and_the_page_say_it(tmp_path, capsys):
+    said(tmp_path, way="0.08")
+    file = str(tmp_path / "case.toml")
+    note = "driver 'push' goes from -0.08 mm to 0.08 mm"
+    assert main.main(["run", file, "--engine", "native", "--out", str(tmp_path / "out")]) == 0
+    assert note in capsys.readouterr().out
+    assert note.replace("'", "&#39;")[8:] in (tmp_path / "out" / "report.html").read_text()
+    main.main(["explain", file])
+    assert note in " ".join(capsys.readouterr().out.split())

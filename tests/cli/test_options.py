@@ -1,0 +1,88 @@
+"""Options that would be ignored, destroy each other's files or be no limits are refused, before anything is computed."""
+
+import pytest
+from kincheck.core.case.io.atomic_files import unwritable
+from kincheck.core.cli.main import main
+
+VARY = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.ball]\nat = "ball"\nsigma = 1.0\n'
+
+WITHOUT_EFFECT = [
+    ("assemblies rssr --number 2", "--number: found without --export, expected with it, to say what it writes;"),
+    ("assemblies rssr --out x.xml --number 1", "--number, --out: found without --export"),
+    ("assemblies rssr --export mjcf --number 0", "'0' is not a whole number of 1 or more"),
+    ("explain rssr --samples 0", "'0' is not a whole number of 1 or more"),
+    ("explain rssr --samples -1", "'-1' is not a whole number of 1 or more"),
+    ("stress --list --seed 0 --out x", "--list runs nothing; leave out --seed, --out"),
+    ("stress --list --replay x.toml --no-proofs", "--list runs nothing; leave out --no-proofs, --replay"),
+    ("stress --list --engine native --mode projection", "--list runs nothing; leave out --engine, --mode"),
+    ("stress --replay x.toml --seed 0", "--replay judges files as they are, which are of no family; leave out --seed"),
+    ("stress --replay x.toml --samples 2000 --no-proofs --family units", "leave out --family, --samples, --no-proofs"),
+    ("stress --family units --tol 1e-12", "--tol is for replayed files, and families have tolerances of their own; leave it"),
+    ("run rssr --memory 1e300", "argument --memory: '1e300' is more than can be counted, expected 1e+09 at most; give less"),
+    ("run rssr --timeout 2e9", "argument --timeout: '2e9' is more than can be counted, expected 1e+09 at most; give less"),
+]  # fmt: skip
+ONE_FILE = [
+    ("run rssr --json a --junit a", "--junit", "--json"),
+    ("run rssr --junit a --markdown ./no/../a", "--markdown", "--junit"),
+    ("run rssr --markdown link --json a", "--markdown", "--json"),
+    ("run rssr --out no --json no/results.json", "--json", "--out"),
+    ("run rssr --history a --json a", "--json", "--history"),
+    ("sweep mcpherson_strut --vary vary.toml --samples 3 --store a --json a", "--store", "--json"),
+    ("sweep mcpherson_strut --vary vary.toml --samples 3 --out no --json no/envelope.csv", "--json", "--out"),
+    ("report a --junit b --markdown b", "--markdown", "--junit"),
+    ("report --history a --json a", "--json", "--history"),
+    ("history --history a --export a", "--export", "--history"),
+    ("history --history a --plot b.csv --export b.csv", "--export", "--plot"),
+    ("stress --out no --json no/stress.json", "--json", "--out"),
+    ("bench formulation --out no --json no/bench_formulation.html", "--json", "--out"),
+    ("assemblies rssr --export mjcf --json a --out a", "--out", "--json"),
+]  # fmt: skip
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """In a folder with a file, a link to it, a folder, and what varies of a strut."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
+    (tmp_path / "a").write_text("here before")
+    (tmp_path / "link").symlink_to("a")
+    (tmp_path / "no").mkdir()
+    (tmp_path / "vary.toml").write_text(VARY)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("line", "said"), WITHOUT_EFFECT)
+def test_what_would_have_no_effect_is_refused(line, said, here, capsys):
+    assert main(line.split()) == 2
+    out, err = capsys.readouterr()
+    assert (out, said in err) == ("", True), err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(("line", "option", "other"), ONE_FILE)
+def test_two_options_cannot_name_one_file(line, option, other, here, capsys):
+    assert main(line.split()) == 2
+    out, err = capsys.readouterr()
+    (said,) = err.splitlines()
+    assert out == ""
+    assert said.startswith(f"kincheck: {option} ")
+    assert said.endswith(f": found the file of {other}, expected one of its own; give another")
+    assert (here / "a").read_text() == "here before"
+    assert not [*(here / "no").iterdir()]
+
+
+def test_a_second_file_of_an_export_does_not_go_over_the_json(here, capsys):
+    line = "assemblies four_bar --samples 8 --export urdf --out x.urdf --json x.constraints.json"
+    assert main(line.split()) == 2
+    assert "--out x.constraints.json: found the file of --json" in capsys.readouterr().err
+    assert '"kincheck-assemblies/1"' in (here / "x.constraints.json").read_text()
+    assert not (here / "x.urdf").exists()
+
+
+def test_what_is_no_file_takes_what_several_options_write():
+    assert unwritable([("--json", "/dev/null"), ("--junit", "/dev/null"), ("--plot", None), ("--store", "-"), ("--out", "-")]) == []
+
+
+def test_a_limit_that_can_be_counted_is_one(capsys):
+    assert main(["run", "rssr", "--engine", "native", "--jobs", "1", "--memory", "1e9", "--timeout", "1e9"]) == 0
+    assert "1 pass" in capsys.readouterr().out

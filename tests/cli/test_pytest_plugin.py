@@ -1,0 +1,157 @@
+"""The pytest plugin, in a repository of somebody else: pytest is run there, in a process of its own."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from codecs import BOM_UTF8
+
+import kincheck.core
+import pytest
+
+from ..support.case_texts import BASE, INLINE, edited
+
+WRONG = INLINE.replace("1.4, 2.0", "1.4, 2.1")
+PLAIN = "[project]\nname = 'theirs'\n# schema = 'kincheck-case/1' is said, and this is none\n"
+
+
+@pytest.fixture
+def repository(tmp_path):
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    (tmp_path / "pyproject.toml").write_text(PLAIN)
+    (tmp_path / "data.json").write_text('{"schema": "theirs/1"}')
+    (tmp_path / "slider.toml").write_text(BASE + INLINE)
+    return tmp_path
+
+
+def pytest_there(repository, *argv):
+    """What pytest says there, and its exit status."""
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-rs", *argv]
+    done = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False)
+    return done.stdout + done.stderr, done.returncode
+
+
+def test_case_files_are_tests_of_every_engine(repository):
+    out, status = pytest_there(repository, "--kincheck", "--collect-only", "-q")
+    assert status == 0, out
+    assert re.findall(r"^(\S+)::(\S+)$", out, re.MULTILINE) == [
+        ("slider.toml", name) for name in ("native", "mujoco", "pinocchio", "exudyn")
+    ]
+
+
+def test_a_printed_id_runs_that_case_with_that_engine(repository):
+    folder = repository / "of.dots"
+    folder.mkdir()
+    (folder / "my.slider.toml").write_text(BASE + INLINE)
+    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native", "-v")
+    assert status == 0, out
+    printed = re.findall(r"^(\S+::\S+) PASSED", out, re.MULTILINE)
+    assert sorted(printed) == ["of.dots/my.slider.toml::native", "slider.toml::native"]
+    for each in printed:
+        out, status = pytest_there(repository, "--kincheck", "-v", each)
+        assert status == 0, out
+        assert re.findall(r"^(\S+::\S+) PASSED", out, re.MULTILINE) == [each]
+        assert "1 passed" in out
+
+
+def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(repository):
+    (repository / "wrong.toml").write_text(edited(('name = "slider"', 'name = "wrong"')) + WRONG)
+    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")
+    assert status == 1
+    assert "1 failed, 1 passed" in out
+    assert re.search(r"wrong.toml: native: fail: .*tip_x.* velocity .* against closed_form", out), out
+    assert "Traceback" not in out
+
+
+def test_what_is_not_judged_is_skipped_and_says_so(repository):
+    (repository / "slider.toml").write_text(BASE)
+    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")
+    assert (status, "1 skipped" in out) == (0, True)
+    assert re.search(r"SKIPPED.*: not judged: the case has no reference$", out, re.MULTILINE), out
+
+
+SOLVED = """
+import kincheck.core.cli.pytest_plugin as plugin
+from kincheck.core.harness.record import Outcome, Record
+
+def solved(case, engine):
+    outcome = {"native": "crashed", "mujoco": "unavailable", "pinocchio": "unsupported"}[engine.name]
+    known = {"case": case.name, "truth": "closed_form", "mode": "projection", "loop": "python", "version": None}
+    return Record(**known, engine=engine.name, outcome=Outcome(outcome), message=f"{engine.name} cannot")
+
+plugin._solved = solved
+"""
+
+
+def test_what_becomes_of_each_outcome(repository):
+    (repository / "conftest.py").write_text(SOLVED)
+    out, status = pytest_there(repository, "--kincheck", "--deselect", "slider.toml::exudyn")
+    assert status == 1
+    assert "1 failed, 2 skipped, 1 deselected" in out
+    assert "slider.toml: native: crashed: native cannot" in out
+    assert "unavailable: mujoco cannot" in out
+    assert "unsupported: pinocchio cannot" in out
+
+
+def test_an_engine_that_is_asked_for_must_be_there(repository):
+    (repository / "conftest.py").write_text(SOLVED)
+    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "mujoco", "--kincheck-engine", "pinocchio")
+    assert status == 1
+    assert "1 failed, 1 skipped" in out
+    assert "slider.toml: mujoco: mujoco cannot: pip install 'mujoco" in out
+
+
+def test_a_simulator_is_run_in_a_process_of_its_own(repository):
+    pytest.importorskip("mujoco")
+    here = "def pytest_sessionfinish():\n    import sys\n    assert 'mujoco' not in sys.modules\n"
+    (repository / "conftest.py").write_text(here)
+    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "mujoco")
+    assert (status, "1 passed" in out) == (0, True), out
+
+
+def test_a_file_that_makes_no_sense_is_an_error_with_its_message(repository):
+    (repository / "broken.json").write_text('{"schema": "kincheck-case/7", "name": "a"}')
+    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")
+    assert status == 2
+    assert "broken.json: schema: " in out
+    assert "kincheck-case/7" in out
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["--kincheck", "--kincheck-engine", "mujco"], "there is no engine 'mujco'; did you mean 'mujoco'?"),
+        (["--kincheck-engine", "native"], "--kincheck-engine: give --kincheck too"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(repository, argv, message):
+    out, status = pytest_there(repository, *argv)
+    assert status == 4
+    assert message in out
+
+
+def test_without_the_option_nothing_is_collected_and_nothing_heavy_loaded(repository):
+    heavy = {"numpy", "scipy", "msgspec", "rich", "kincheck.core.mechanism.mechanism"}
+    light = f"import sys\ndef test_light():\n    assert not {heavy} & {{*sys.modules}}\n"
+    (repository / "test_light.py").write_text(light + "    assert 'kincheck.core.cli.pytest_plugin' in sys.modules\n")
+    out, status = pytest_there(repository, "-p", "no:hypothesispytest")
+    assert status == 0, out
+    assert "1 passed" in out
+
+
+def test_every_public_name_is_found_though_none_is_loaded_at_first():
+    assert [name for name in kincheck.core.__all__ if not hasattr(kincheck.core, name)] == []
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        kincheck.core.nothing  # noqa: B018
+
+
+def test_case_files_are_found_however_they_are_written(repository):
+    """The schema anywhere in a line of JSON, behind a byte order mark, or in a file with capital letters."""
+    case = tomllib.loads(BASE + INLINE)
+    (repository / "sorted.json").write_text(json.dumps(dict(sorted(case.items()))))
+    (repository / "marked.toml").write_bytes(BOM_UTF8 + (BASE + INLINE).encode())
+    (repository / "LOUD.TOML").write_text(BASE + INLINE)
+    out, _ = pytest_there(repository, "--kincheck", "--collect-only", "-q")
+    assert all(name in out for name in ("sorted.json", "marked.toml", "LOUD.TOML", "slider.toml"))
+    assert not any(name in out for name in ("data.json", "pyproject.toml"))

@@ -1,0 +1,60 @@
+"""Engines are asked for their versions in processes of their own: whatever loading them does, it does not do to ours."""
+
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from kincheck.core.cli import main
+from kincheck.core.cli.registry import Status
+from kincheck.core.harness.engine_versions import versions
+from kincheck.core.harness.unloadable import Unloadable
+
+from ..support.fakes import Fake
+
+DEEDS = {
+    "tells": lambda: "1.2",
+    "prints": lambda: print("loading\nhello") or "3",
+    "is_missing": lambda: None,
+    "exits": lambda: sys.exit(0),
+    "aborts": os.abort,
+    "hangs": lambda: time.sleep(1000.0),
+    "raises": lambda: 1 / 0,
+}
+
+
+@dataclass
+class Loading(Fake):
+    """Its name says what asking for its version does."""
+
+    def version(self):
+        return DEEDS[self.name]()
+
+
+def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))  # where the processes find the engines
+    found = versions([*map(Loading, DEEDS), Unloadable("gone", "no module", "projection")], patience=10.0)
+    assert found == ["1.2", "3", *[None] * 6]
+
+
+@pytest.mark.parametrize("deed", ["import sys; sys.exit(0)", "import os; os.abort()"])
+def test_a_run_with_a_history_outlives_a_simulator_that_cannot_be_loaded(deed, tmp_path):
+    (tmp_path / "exudyn.py").write_text(deed)
+    command = ["run", "rssr", "--engine", "native", "exudyn", "--history", "h.sqlite", "--json", "r.json"]
+    code = "import sys; from kincheck.core.harness import cli; sys.exit(cli.main(sys.argv[1:]))"
+    env = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    found = subprocess.run(
+        [sys.executable, "-c", code, *command], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120.0
+    )
+    assert "[1/2] rssr native: pass" in found.stderr
+    assert (tmp_path / "r.json").exists()
+    assert (tmp_path / "h.sqlite").exists()
+
+
+def test_a_command_that_is_ended_from_within_is_no_success(monkeypatch, capsys):
+    monkeypatch.setattr(main, "house", lambda: sys.exit(0))
+    assert main.main(["list"]) == Status.FAILED
+    assert "ended the program with status 0" in capsys.readouterr().err

@@ -1,0 +1,185 @@
+"""Where a standard and an engine contradict each other the pair fails, with both sides in its message."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import adapters, cases
+from kincheck.core.case.case import Series
+from kincheck.core.harness.execution import Attempt, Failure, attempt
+from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.run import run
+from kincheck.core.report.report import headline
+
+from ..support.fakes import RADIUS, SAMPLES, Fake, at, crank, exact, off, raising, solution
+
+TOL = 1e-12
+ENDS = "cannot be followed beyond here: there is a singular pose ahead"
+
+
+def reaching(samples, message=ENDS, **changed):
+    """An answer that reaches these samples only."""
+
+    def answer(case):
+        solved = np.isin(np.arange(SAMPLES), [*samples])
+        p, v, a = (np.where(solved[:, None], each, np.nan) for each in exact(case))
+        found = solution(case, solved=solved, message=message, position=p, velocity=v, acceleration=a)
+        return replace(found, **changed) if changed else found
+
+    return answer
+
+
+def pair(native, engine, case=None):
+    """Records of the native engine and another."""
+    return run([case or crank(reference=False)], [Fake("native", answer=native), Fake(answer=engine)], tol=TOL).records
+
+
+def test_values_where_native_refuses_the_sample_are_a_fail_with_both_sides():
+    native, fake = pair(reaching(range(7)), solution)
+    assert native.outcome is Outcome.FAIL
+    assert fake.outcome is Outcome.FAIL
+    tip = RADIUS * np.array([np.cos(0.75) - 1.0, np.sin(0.75)])
+    assert fake.message == (
+        f"values at 2 of 9 samples that native cannot reach, first at sample 7 (angle = 0.75): x = {tip[0]:.6g} m, "
+        f"y = {tip[1]:.6g} m; native: 7 of 9 samples solved: {ENDS}"
+    )
+    # where both have values they are compared all the same
+    assert fake.errors["x"].position.within
+    assert fake.errors["x"].contradicted == 2
+
+
+def test_an_engine_that_is_not_native_is_held_against_a_baseline_too():
+    native = Fake("native", answer=reaching(range(7)))
+    (fake,) = run([crank(reference=False)], [Fake()], tol=TOL, baseline=native).records
+    assert (fake.outcome, "that native cannot reach" in fake.message) == (Outcome.FAIL, True)
+
+
+def test_motions_that_end_at_different_samples_say_who_reaches_more():
+    _, further = pair(reaching(range(4)), reaching(range(6), "ends here"))
+    assert further.outcome is Outcome.FAIL
+    assert further.message.startswith("6 of 9 samples solved: ends here; values at 2 of 9 samples that native cannot reach")
+    _, shorter = pair(reaching(range(6)), reaching(range(4), "ends here"))
+    assert shorter.message == "4 of 9 samples solved: ends here; native has values at 2 of the others"
+    _, alike = pair(reaching(range(6)), reaching(range(6), "ends here"))
+    assert alike.message == "6 of 9 samples solved: ends here"
+
+
+def test_a_contradiction_does_not_hide_a_deviation_and_the_reverse():
+    _, fake = pair(reaching(range(7)), off("position", at(2, 1, 9.0)))
+    assert "that native cannot reach" in fake.message
+    assert "y: position is off by" in fake.message
+
+
+def test_native_reaching_nothing_contradicts_every_value():
+    _, fake = pair(reaching([]), solution)
+    assert (fake.outcome, fake.errors["x"].contradicted) == (Outcome.FAIL, SAMPLES)
+
+
+def test_a_reference_without_a_value_says_nothing():
+    case = crank()
+    short = np.where(np.arange(SAMPLES) < 7, 1.0, np.nan)
+    for name, series in case.reference.items():
+        case.reference[name] = Series(*(short * each for each in (series.position, series.velocity, series.acceleration)))
+    native, fake = pair(solution, solution, case)
+    assert [native.outcome, fake.outcome] == [Outcome.PASS, Outcome.PASS]
+    assert "not judged: position: closed_form has no value at 2 of 9 samples; " in fake.message
+    # native refuses what the reference does not have
+    _, fake = pair(reaching(range(7)), solution, case)
+    assert (fake.outcome, "values at 2 of 9 samples that native cannot reach" in fake.message) == (Outcome.FAIL, True)
+    (alone,) = run([case], [Fake()], tol=TOL, baseline=Fake("native", answer=reaching(range(7)))).records
+    assert alone.outcome is Outcome.FAIL
+
+
+def test_a_reference_is_believed_before_native():
+    """Native refuses samples that the closed form has: native is wrong there, and the others are not."""
+    case = crank()
+    case.reference["y"] = Series(case.reference["y"].position)  # the rates of y are native's
+    native, fake = pair(reaching(range(7)), solution, case)
+    assert [native.outcome, fake.outcome] == [Outcome.FAIL, Outcome.PASS]
+    assert "velocity: native has no value at 2 of 9 samples" in fake.message
+
+
+@pytest.mark.parametrize("outcome", [Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED])
+def test_a_standard_that_has_no_answer_judges_nothing(outcome):
+    def solver(pairs):
+        for index, each in enumerate(pairs):
+            if each.engine.name == "native":
+                yield index, Attempt(None, Failure(outcome, "it went down"))
+            else:
+                yield index, attempt(each)
+
+    native, fake = run([crank(reference=False)], [Fake("native"), Fake()], tol=TOL, solver=solver).records
+    assert native.outcome is outcome
+    why = f"the case has no reference, and the native engine has no answer ({outcome}: it went down)"
+    assert (fake.outcome, fake.message) == (Outcome.UNJUDGED, why)
+
+
+def test_derivatives_that_an_engine_lacks_are_in_its_message():
+    def answer(case):
+        found = solution(case)
+        return replace(found, points={"tip": replace(found.points["tip"], velocity=None, acceleration=None)})
+
+    (fake,) = run([crank()], [Fake(answer=answer)], tol=TOL).records
+    assert fake.outcome is Outcome.PASS
+    assert fake.message == "not judged: velocity: the engine gives none; acceleration: the engine gives none"
+
+
+# Residuals
+
+
+def leaving(residual, **changed):
+    return Fake(answer=lambda case: replace(solution(case), residual=residual), **changed)
+
+
+def test_a_residual_above_the_tolerance_is_no_solution():
+    (fake,) = run([crank()], [leaving(1e-6)], tol=TOL).records
+    assert fake.outcome is Outcome.FAIL
+    assert fake.message.startswith("the residual of samples that the engine calls solved is 1e-06, tolerance 1e-12")
+    assert "1 of 1 comparisons has a residual above the tolerance" in headline(run([crank()], [leaving(1e-6)], tol=TOL))
+
+
+def test_a_residual_within_the_tolerance_passes_whoever_leaves_it():
+    assert run([crank()], [leaving(1e-6)], tol=1e-5).records[0].outcome is Outcome.PASS
+    assert run([crank()], [leaving(1e-12)], tol=TOL).records[0].outcome is Outcome.PASS
+    # a simulation promises no residual, and an effort leaves one on purpose
+    assert run([crank()], [leaving(1e-6, mode="simulate")], tol=TOL).records[0].outcome is Outcome.PASS
+    assert run([crank()], [leaving(1e-6)], tol=TOL, residuals=False).records[0].outcome is Outcome.PASS
+
+
+def test_a_residual_fails_what_could_not_be_compared_too():
+    (fake,) = run([crank(reference=False)], [leaving(1e-6)], tol=TOL).records
+    assert fake.outcome is Outcome.FAIL
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_simulators_keep_their_promise_at_any_size(name):
+    engine = adapters.engine(name)
+    if engine.version() is None:
+        pytest.skip(f"{name} is not installed")
+    (record,) = run([cases.load("chrono_macpherson")], [engine], tol=1e-9).records
+    assert record.outcome is Outcome.PASS, record.message
+
+
+# What native says of samples beside singular poses
+
+
+def test_uncertain_samples_contradict_nobody():
+    others = [k for k in range(SAMPLES) if k != 4]
+    uncertain = reaching(others, "refused at angle = 0: so near a singular pose", details={"uncertain_samples": [4]})
+    native, fake = pair(uncertain, solution)
+    assert [native.outcome, fake.outcome] == [Outcome.FAIL, Outcome.PASS]
+    assert "not judged: position: native has no value at 1 of 9 samples" in fake.message
+    assert fake.message.endswith("native: 8 of 9 samples solved: refused at angle = 0: so near a singular pose")
+
+
+def test_contradictions_are_written_and_read():
+    results = run([crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL)
+    assert from_json(to_json(results)) == results
+    assert "contradict" in headline(results)
+
+
+def test_a_standard_is_read_back_from_a_record_when_a_run_is_resumed():
+    results = run([crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL)
+    engines = [Fake("native", answer=raising(AssertionError("not again"))), Fake()]
+    again = run([crank(reference=False)], engines, tol=TOL, made=from_json(to_json(results)).records[:1])
+    assert again.records[1].message == results.records[1].message

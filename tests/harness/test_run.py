@@ -1,0 +1,295 @@
+"""Running: whatever an engine does, its pair gets one record that says so."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.core.case.case import Series, Truth
+from kincheck.core.errors import CaseError, SolveError
+from kincheck.core.harness.compare import output_series
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import UNTOLD, run
+
+from ..support.fakes import SAMPLES, Fake, at, crank, exact, off, partial, raising, solution
+
+TOL = 1e-12
+
+
+def record_of(engine, case=None):
+    (record,) = run([crank() if case is None else case], [engine], tol=TOL).records
+    return record
+
+
+def fail_after(count, error):
+    """Right at first, then raising."""
+    left = iter(range(count))
+
+    def answer(case):
+        if next(left, None) is None:
+            raise error
+        return solution(case)
+
+    return answer
+
+
+def test_the_right_answer_passes_and_is_recorded():
+    record = record_of(Fake(settings={"scheme": np.float64(0.5)}))
+    assert (record.outcome, record.message) == (Outcome.PASS, "")
+    assert record.validated
+    names = record.case, record.engine, record.mode, record.loop, record.version
+    assert names == ("crank", "fake", "projection", "python", "1.2")
+    assert record.driver == {"angle": np.linspace(-1.0, 1.0, SAMPLES).tolist()}
+    assert record.outputs["y"].position == exact(crank())[0][:, 1].tolist()
+    assert (record.rank, record.dof, record.iterations, record.residual_max) == (6, 1, 3 * SAMPLES, 1e-15)
+    assert (record.solved, record.samples) == (SAMPLES, SAMPLES)
+    assert record.details == {"condition": 0.1, "pivots": [0, 1, 2]}
+    assert record.settings == {"scheme": 0.5}
+    deviation = record.errors["x"].velocity
+    assert (deviation.max_abs, deviation.against, deviation.within) == (0.0, "closed_form", True)
+
+
+def test_two_of_one_name_are_refused():
+    with pytest.raises(CaseError, match="two cases named 'crank'"):
+        run([crank(), crank()], [Fake()], tol=TOL)
+    with pytest.raises(CaseError, match=r"two engines named 'fake \(projection\)'"):
+        run([crank()], [Fake(), Fake()], tol=TOL)
+
+
+def test_the_sign_of_an_output_matters():
+    record = record_of(Fake(answer=off("position", lambda p: p * [1.0, -1.0, 1.0])))
+    assert record.outcome is Outcome.FAIL
+    # y = 0.5 sin, at -1 rad and wrong by its double
+    assert record.message == (
+        f"y: position is off by {math.sin(1.0):.3g} m at sample 0 (angle = -1), tolerance 1e-09 m, against closed_form"
+    )
+    assert record.errors["x"].position.within
+
+
+@pytest.mark.parametrize(("quantity", "unit", "tolerance"), [("velocity", "m/s", "2e-09"), ("acceleration", "m/s^2", "4e-09")])
+def test_a_relative_error_of_a_millionth_is_caught_and_named(quantity, unit, tolerance):
+    record = record_of(Fake(answer=off(quantity, lambda values: values * (1.0 + 1e-6))))
+    assert record.outcome is Outcome.FAIL
+    assert f"{quantity} is off by" in record.message
+    assert f"tolerance {tolerance} {unit}, against closed_form (worst of 2 quantities out of tolerance)" in record.message
+
+
+def test_a_deviation_at_one_sample_is_located():
+    record = record_of(Fake(answer=off("position", lambda p: p + at(6, 1, 1e-6)(0 * p))))
+    assert "y: position is off by 1e-06 m at sample 6 (angle = 0.5)" in record.message
+    assert record.errors["y"].position.worst_step == 6
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
+def test_a_solved_sample_that_is_not_finite_is_an_error(quantity, value):
+    record = record_of(Fake(answer=off(quantity, at(3, 2, value))))
+    assert record.outcome is Outcome.ERROR
+    assert f"fake: {quantity} of point 'tip'" in record.message
+    assert "at sample 3 (angle = -0.25), which is called solved" in record.message
+
+
+@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
+def test_a_wrong_shape_is_an_error(quantity):
+    record = record_of(Fake(answer=off(quantity, lambda values: values[1:])))
+    assert record.outcome is Outcome.ERROR
+    assert f"{quantity} of point 'tip' has shape (8, 3), expected (9, 3)" in record.message
+    transposed = record_of(Fake(answer=off(quantity, lambda values: values.T)))
+    assert "has shape (3, 9), expected (9, 3)" in transposed.message
+
+
+def test_other_breaches_of_the_protocol_are_errors():
+    no_point = record_of(Fake(answer=lambda case: replace(solution(case), points={})))
+    assert "no motion of point 'tip'; found: none" in no_point.message
+    short = record_of(Fake(answer=lambda case: solution(case, solved=np.ones(3, dtype=bool))))
+    assert "solved has shape (3,), expected (9,)" in short.message
+    blind = record_of(Fake(answer=lambda case: replace(solution(case), residual=math.nan)))
+    assert "residual is nan although 9 samples are called solved" in blind.message
+    nothing = record_of(Fake(answer=lambda case: None))
+    assert nothing.outcome is Outcome.ERROR
+    assert "AttributeError" in nothing.message
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_an_exception_costs_only_its_own_pair(count):
+    broken = Fake("broken", answer=fail_after(count, SolveError("row 7 contradicts row 3")))
+    results = run([crank("a"), crank("b")], [broken, Fake()], tol=TOL)
+    assert [(each.case, each.engine, each.outcome) for each in results.records] == [
+        ("a", "broken", Outcome.ERROR),
+        ("a", "fake", Outcome.PASS),
+        ("b", "broken", Outcome.ERROR),
+        ("b", "fake", Outcome.PASS),
+    ]
+    assert results.records[0].message == "SolveError: row 7 contradicts row 3"
+    assert results.records[0].errors["x"].reason == "error: SolveError: row 7 contradicts row 3"
+    assert results.records[0].outputs == {}
+    assert results.records[0].us_per_step is None
+
+
+def test_an_exception_anywhere_in_an_engine_becomes_a_record():
+    for method in ("version", "unsupported", "build"):
+        engine = Fake()
+        setattr(engine, method, lambda *_: 1 / 0)
+        assert record_of(engine).message == "ZeroDivisionError: division by zero"
+
+
+def test_an_interrupt_is_not_swallowed():
+    with pytest.raises(KeyboardInterrupt):
+        record_of(Fake(answer=raising(KeyboardInterrupt())))
+
+
+def test_missing_and_unable_engines_have_records_with_reasons():
+    missing = record_of(Fake(installed=None))
+    said = "fake is not installed, or cannot be imported: kincheck doctor says which"
+    assert (missing.outcome, missing.message, missing.version) == (Outcome.UNAVAILABLE, said, None)
+    unable = record_of(Fake(refusal="joint 'cv' (universal) has no counterpart"))
+    assert (unable.outcome, unable.message) == (Outcome.UNSUPPORTED, "joint 'cv' (universal) has no counterpart")
+    assert unable.version == "1.2"
+    for record in (missing, unable):
+        assert not record.outcome.bad
+        assert not record.validated
+        assert set(record.errors) == {"x", "y"}
+        assert record.errors["x"].items() == []
+
+
+def test_missing_samples_fail_and_the_others_are_kept_and_compared():
+    record = record_of(Fake(answer=partial))
+    assert record.outcome is Outcome.FAIL
+    assert record.message == "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2 of the others"
+    assert (record.solved, record.samples) == (7, 9)
+    assert record.outputs["x"].position[7:] == [None, None]
+    assert record.outputs["x"].position[:7] == record_of(Fake()).outputs["x"].position[:7]
+    assert record.outputs["x"].reason is not None
+    assert record.errors["x"].position.within
+    assert record.us_per_step is None  # a time per sample would count samples that were not made
+    assert record.seconds.warm > 0
+
+
+@pytest.mark.parametrize(
+    ("engine", "reasons"),
+    [
+        (Fake(), {}),
+        (Fake(answer=partial), {"us_per_step": UNTOLD["us_per_step"]}),
+        (
+            Fake(answer=lambda case: solution(case, solved=np.zeros(SAMPLES, dtype=bool))),
+            {key: UNTOLD[key] for key in ("residual_max", "iterations", "us_per_step")},
+        ),
+        (Fake(answer=lambda case: replace(solution(case), details={})), {key: UNTOLD[key] for key in ("rank", "dof")}),
+        (Fake(answer=raising(ValueError("no"))), dict.fromkeys(UNTOLD, "error: see message")),
+        (Fake(installed=None), dict.fromkeys(UNTOLD, "unavailable: see message")),
+    ],
+    ids=["all", "some samples", "no sample", "no details", "error", "unavailable"],
+)
+def test_every_number_that_is_null_says_why(engine, reasons):
+    record = record_of(engine)
+    assert record.reasons == reasons
+    assert {key for key in UNTOLD if getattr(record, key) is None} == set(reasons)
+
+
+def test_missing_samples_do_not_hide_a_deviation():
+    def answer(case):
+        trajectory = partial(case)
+        trajectory.points["tip"].position[2, 1] += 1e-3
+        return trajectory
+
+    message = record_of(Fake(answer=answer)).message
+    assert "7 of 9 samples solved" in message
+    assert "y: position is off by 0.001 m at sample 2" in message
+
+
+def test_nothing_solved_is_a_failure_without_numbers():
+    nan = np.full((SAMPLES, 3), np.nan)
+    answer = lambda case: solution(case, solved=np.zeros(SAMPLES, dtype=bool), position=nan, velocity=None, acceleration=None)  # noqa: E731
+    record = record_of(Fake(answer=answer))
+    assert (
+        record.message == "0 of 9 samples solved: the engine does not say why; ask it to; closed_form has values at 9 of the others"
+    )
+    assert (record.residual_max, record.iterations, record.errors["x"].position) == (None, None, None)
+
+
+def test_without_a_reference_engines_are_compared_with_the_native_one():
+    case = crank(truth=Truth.CLOSED_FORM, reference=False)
+    wrong = Fake("wrong", answer=off("acceleration", lambda a: a * (1 + 1e-6)))
+    results = run([case], [Fake(), wrong, Fake("native")], tol=TOL)
+    native, fake, bad = results.records  # the native engine comes first: the others need it
+    assert [native.engine, fake.engine, bad.engine] == ["native", "fake", "wrong"]
+    assert (native.outcome, native.message) == (Outcome.UNJUDGED, "the case has no reference")
+    assert native.errors["x"].items() == []
+    assert (fake.outcome, fake.errors["x"].velocity.against) == (Outcome.PASS, "native")
+    assert bad.outcome is Outcome.FAIL
+    assert "against native" in bad.message
+    # whatever the case claims
+    assert {record.truth for record in results.records} == {"consensus_only"}
+    assert not any(record.validated for record in results.records)
+
+
+def test_without_reference_and_native_engine_the_record_is_not_judged():
+    case = crank(reference=False)
+    alone = record_of(Fake(), case)
+    assert (alone.outcome, alone.message) == (
+        Outcome.UNJUDGED,
+        "the case has no reference, and the native engine is not in this run",
+    )
+    _, fake = run([case], [Fake("native", answer=raising(ValueError("no"))), Fake()], tol=TOL).records
+    assert fake.outcome is Outcome.UNJUDGED
+    assert fake.message == "the case has no reference, and the native engine has no answer (error: ValueError: no)"
+
+
+def test_a_baseline_is_compared_with_and_not_recorded():
+    native = Fake("native")
+    wrong = Fake(answer=off("position", lambda p: 1.001 * p))
+    (record,) = run([crank(reference=False)], [wrong], tol=TOL, baseline=native).records
+    assert (record.engine, record.outcome) == ("fake", Outcome.FAIL)
+    assert "against native" in record.message
+    native.solves = 0
+    run([crank()], [wrong], tol=TOL, baseline=native)
+    assert native.solves == 0  # the reference has it all
+    for lacking in ("velocity", "acceleration"):
+        case = crank()
+        case.reference["y"] = replace(case.reference["y"], **{lacking: None})
+        (record,) = run([case], [Fake(answer=off(lacking, lambda values: 1.001 * values))], tol=TOL, baseline=native).records
+        assert getattr(record.errors["y"], lacking).against == "native"
+        assert not getattr(record.errors["y"], lacking).within
+
+
+def test_what_the_reference_lacks_is_compared_with_the_native_engine():
+    case = crank()
+    case.reference.pop("y")
+    case.reference["x"] = Series(case.reference["x"].position)
+    native, fake = run([case], [Fake("native"), Fake()], tol=TOL).records
+    assert [each.against for _, each in fake.errors["x"].items()] == ["closed_form", "native", "native"]
+    assert [each.against for _, each in fake.errors["y"].items()] == ["native"] * 3
+    missing = "velocity: closed_form gives none; acceleration: closed_form gives none"
+    assert (native.outcome, native.message) == (Outcome.PASS, f"not judged: x: {missing}; y: the reference does not have it")
+    # one output met a truth, the other only another engine
+    assert not fake.validated
+    assert native.truth == "closed_form"
+
+
+def test_an_output_that_has_no_value_where_the_reference_has_one_is_no_pass(monkeypatch):
+    def holed(case, output, trajectory):
+        series = output_series(case, output, trajectory)
+        return replace(series, position=np.where(np.arange(SAMPLES) == 3, np.nan, series.position))
+
+    monkeypatch.setattr("kincheck.core.harness.execution.output_series", holed)
+    record, missing = record_of(Fake()), record_of(Fake(answer=partial))  # of the second it is said why samples are missing
+    assert record.outcome is Outcome.FAIL
+    assert record.message.startswith("x: position has no value at samples where closed_form has one")
+    assert "has no value" not in missing.message
+
+
+@pytest.mark.parametrize("truth", list(Truth))
+def test_only_truths_from_elsewhere_validate(truth):
+    assert record_of(Fake(), crank(truth=truth)).validated is truth.validates
+
+
+def test_a_reference_that_does_not_fit_is_an_error_not_a_pass():
+    case = crank()
+    case.reference["x"] = Series(np.zeros(1))
+    assert "closed_form has shape (1,), expected (9,)" in record_of(Fake(), case).message
+
+
+def test_progress_hears_of_every_record():
+    heard = []
+    results = run([crank("a"), crank("b")], [Fake()], tol=TOL, progress=lambda *news: heard.append(news))
+    assert heard == [(results.records[0], 1, 2), (results.records[1], 2, 2)]

@@ -1,0 +1,65 @@
+"""The time of a solve is that of a warm one, undisturbed by what happens once."""
+
+from itertools import accumulate, chain
+
+import pytest
+from kincheck.core.harness import execution
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
+
+from ..support.fakes import SAMPLES, Fake, crank, off, solution
+
+TOL = 1e-12
+
+
+def record_of(engine):
+    (record,) = run([crank()], [engine], tol=TOL).records
+    return record
+
+
+def timed(monkeypatch, build, *solves, waits=()):
+    """A record of solves that take so long, of which others have the processor for a part."""
+    lengths = chain.from_iterable((0.0, length) for length in (build, *solves, *[0.0] * 9))
+    monkeypatch.setattr(execution, "perf_counter", accumulate(lengths).__next__)
+    waiting = chain.from_iterable((0.0, length) for length in (*waits, *[0.0] * (20 - len(waits))))
+    monkeypatch.setattr(execution, "waited", accumulate(waiting).__next__)
+    engine = Fake()
+    return engine, record_of(engine).seconds
+
+
+def test_times_are_of_warm_solves_and_the_answer_is_the_timed_one():
+    engine = Fake()
+    record = record_of(engine)
+    assert engine.solves == 6  # one cold, five warm: they take no time
+    assert record.us_per_step == pytest.approx(1e6 * record.seconds.warm / SAMPLES)
+    assert record.seconds.build is not None
+    stale = Fake()
+    stale.answer = lambda case: (solution if stale.solves == 1 else off("position", lambda p: p + 1.0))(case)
+    assert record_of(stale).outcome is Outcome.FAIL
+
+
+def test_an_interruption_moves_no_time(monkeypatch):
+    engine, seconds = timed(monkeypatch, 0.5, 0.25, 0.001, 0.009, 0.002, 0.002, 0.002)
+    assert engine.solves == 6
+    assert (seconds.build, seconds.first) == (0.5, 0.25)
+    assert seconds.warm == pytest.approx(0.002)
+
+
+def test_what_others_take_is_told(monkeypatch):
+    _, seconds = timed(monkeypatch, 0.5, *[0.003] * 6, waits=[0.002] * 6)
+    assert seconds.warm == pytest.approx(0.003)
+    assert seconds.waited == pytest.approx(0.002)
+
+
+@pytest.mark.parametrize("solves", [(0.25, 0.001), (0.001, 0.25), (0.001, 0.7), (0.7, 0.001)])
+def test_the_compiler_is_in_no_time(solves, monkeypatch):
+    """It has come to work in one of the warm solves."""
+    _, seconds = timed(monkeypatch, 0.1, 0.002, *solves, *[0.001] * 4)
+    assert seconds.warm == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize("first", [10.0, 30.0])
+def test_slow_engines_are_solved_twice(first, monkeypatch):
+    engine, seconds = timed(monkeypatch, 10.0, first, 10.0)
+    assert engine.solves == 2
+    assert (seconds.build, seconds.first, seconds.warm) == (10.0, first, 10.0)

@@ -1,0 +1,218 @@
+"""Runs that ended before all was made, engines that are gone for long: no report says that all is well."""
+
+import os
+import shutil
+import tempfile
+import xml.etree.ElementTree as ET
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+
+import msgspec
+import pytest
+from kincheck.core.cli import main
+from kincheck.core.errors import CaseError, KincheckError
+from kincheck.core.harness.execution import here
+from kincheck.core.harness.record import Outcome, Results, to_json
+from kincheck.core.harness.results_file import read_results
+from kincheck.core.history.regression.findings import Kind
+from kincheck.core.history.store import HistoryError, Store
+from kincheck.core.report.caveats import caveats
+from kincheck.core.report.junit import to_junit
+from kincheck.core.report.regression_junit import to_regression_junit
+from kincheck.core.report.regression_summary import to_markdown
+from kincheck.core.report.report import headline
+
+from ..history.test_regression import kinds, reported
+from ..support.nights import FACTS, changed, keep, nights, records
+
+GONE = {"outcome": Outcome.UNAVAILABLE, "message": "not installed", "seconds": None, "errors": {}}
+UNMADE = "asked for and never made: the run ended before it"
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def killed(path, made, *, owner="a-host-that-is-no-more|1|1"):
+    """A run of all pairs that ended by force after so many; with an owner of None, one that goes on."""
+    run = keep(path, records(), status="running")
+    with Store(path) as store:
+        store.connection.execute(
+            "DELETE FROM records WHERE run_id = ? AND rowid > (SELECT max(rowid) FROM records) - ?", (run, 4 - made)
+        )
+        if owner is not None:
+            store.connection.execute("UPDATE runs SET owner = ? WHERE id = ?", (owner, run))
+    return run
+
+
+# Runs that were killed
+
+
+def test_a_run_that_was_killed_is_judged_and_not_the_one_before(path, capsys):
+    nights(path, 2)
+    killed(path, 3)
+    found = reported(path)
+    assert found.run.name == "run 3, without an end"
+    assert [(each.kind, each.case, each.engine, each.message) for each in found.findings] == [
+        (Kind.LOST, "second", "mujoco", UNMADE)
+    ]
+    assert main.main(["report", "--history", str(path)]) == 1
+    assert "run 3, without an end against run 2 (last green): 1 with something lost" in capsys.readouterr().out
+
+
+def test_a_run_that_goes_on_is_left_alone(path):
+    nights(path, 2)
+    killed(path, 3, owner=None)
+    assert reported(path).run.name == "run 2"
+
+
+def test_a_run_of_which_nothing_was_made_is_judged_too(path):
+    nights(path, 1)
+    killed(path, 0)
+    found = reported(path)
+    assert len(found.regressions) == 4
+    assert to_markdown(found).startswith("## run 2, without an end against run 1 (last green): 4 with something lost")
+
+
+def test_what_was_never_made_counts_with_nothing_to_compare_with(path, capsys):
+    killed(path, 1)
+    assert main.main(["report", "--history", str(path)]) == 1
+    assert "all 1 right, 3 never made; compared with nothing" in capsys.readouterr().out
+
+
+def test_every_format_tells_of_pairs_that_were_never_made(path):
+    nights(path, 1)
+    killed(path, 1)
+    with Store(path) as store:
+        results = store.results(2)
+    assert results.missing == [
+        ("first", "mujoco", "projection"),
+        ("second", "native", "projection"),
+        ("second", "mujoco", "projection"),
+    ]
+    assert headline(results).endswith("; the run ended before 3 more")
+    said = dict(caveats(results))["Never made: 3"]
+    assert said.endswith("nothing is said about mujoco on first; native on second; mujoco on second.")
+    for text in (to_junit(results), to_regression_junit(results, reported(path))):
+        root = ET.fromstring(text)
+        assert [(suite.get("name"), suite.get("tests"), suite.get("errors"), suite.get("failures")) for suite in root] == [
+            ("first", "3", "1", "0"),
+            ("second", "2", "2", "0"),
+        ]
+        assert {test.find("error").get("message") for test in root.iter("testcase") if test.get("name") == "never made"} == {UNMADE}
+
+
+def test_a_file_of_a_run_that_ended_early_is_judged_likewise(path, tmp_path):
+    """What the command writes where it is interrupted."""
+    nights(path, 1)
+    pairs = [[each.case, each.engine, each.mode] for each in records()[1:]]
+    file = tmp_path / "results.json"
+    file.write_bytes(to_json(Results(run={**FACTS, "started": "now", "missing": pairs}, records=records()[:1])))
+    assert kinds(reported(path, str(file), "1")) == [(Kind.LOST, *pair[:2]) for pair in pairs]
+    file.write_bytes(to_json(Results(run={**FACTS, "missing": [["first", "mujoco"]]}, records=records()[:1])))
+    with pytest.raises(CaseError, match=r"run.missing"):
+        reported(path, str(file), "1")
+
+
+def test_the_command_says_what_it_did_not_come_to(tmp_path, monkeypatch):
+    def stopped(pairs):
+        yield from islice(here(pairs), 1)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("kincheck.core.cli.execution_options.solver", lambda *_: (stopped, {}))
+    file = tmp_path / "results.json"
+    assert main.main(["run", "rssr", "bennett", "--engine", "native", "--json", str(file)]) == 130
+    assert read_results(file).missing == [("bennett", "native", "projection")]
+
+
+# Engines that are gone
+
+
+def test_an_engine_that_stays_away_is_told_every_night(path):
+    nights(path, 2)
+    for night in range(3):
+        keep(path, changed(changed(records(), **GONE), case="second", **GONE))
+        found = reported(path)
+        assert found.against.name == "run 2 (last green)"
+        assert {(each.kind, each.engine) for each in found.regressions} == {(Kind.LOST, "mujoco")}, night
+    keep(path, records())
+    assert not reported(path).regressed
+    keep(path, records())
+    assert reported(path).against.name == "run 6 (last green)"
+
+
+def test_an_engine_that_was_never_there_is_no_regression(path):
+    for _ in range(3):
+        keep(path, changed(changed(records(), **GONE), case="second", **GONE))
+    found = reported(path)
+    assert (found.against.name, found.findings) == ("run 2 (last green)", [])
+
+
+def test_a_branch_that_is_not_there_is_told_those_that_are(path):
+    nights(path, 2)
+    assert reported(path, against="mian-baseline").reason == (
+        "no earlier run of branch 'mian', without changes to its files, with any of its pairs; the history has branches main"
+    )
+
+
+# Histories that cannot be read whole
+
+
+@contextmanager
+def unwritable(folder):
+    """The folder as one in which this process, even the superuser's, can write nothing."""
+    folder.chmod(0o555)
+    superuser = hasattr(os, "geteuid") and os.geteuid() == 0
+    if superuser:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if superuser:
+            os.seteuid(0)
+        folder.chmod(0o755)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders have other permissions there")
+@pytest.mark.parametrize("merged", [True, False])
+def test_a_history_where_nothing_can_be_written_is_read_whole_or_not_at_all(path, merged):
+    nights(path, 1)
+    with tempfile.TemporaryDirectory() as name:
+        there = Path(name) / path.name
+        with Store(path) as store:
+            store.connection.execute("PRAGMA wal_autocheckpoint = 0")
+            keep(path, records())
+            if merged:
+                store.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            shutil.copy(path, there)
+            shutil.copy(f"{path}-wal", f"{there}-wal")
+        for file in there.parent.iterdir():
+            file.chmod(0o444)
+        with unwritable(there.parent):
+            if merged:
+                with Store(there, writable=False) as store:
+                    assert len(store.runs()) == 2
+            else:
+                with pytest.raises(HistoryError, match=r"its latest records are in history.sqlite-wal still, .* copy both files"):
+                    Store(there, writable=False)
+
+
+def test_a_history_without_any_run_is_a_message(path):
+    Store(path).close()
+    with pytest.raises(KincheckError, match="no run to report; `kincheck run --history"):
+        reported(path)
+
+
+def test_a_step_has_the_unit_of_its_output(path, capsys):
+    facts = {"first": {"outputs": {"x": {"unit": "deg"}}}}
+    nights(path, 2)
+    grown = {"errors": lambda errors: errors | {"x": _grown(errors["x"])}}
+    keep(path, changed(records(), **grown), cases=facts)
+    assert main.main(["history", "--history", str(path), "--case", "first"]) == 0
+    assert " → 1e-10 deg/s² since run 3" in capsys.readouterr().out
+
+
+def _grown(deviations):
+    return msgspec.structs.replace(deviations, acceleration=msgspec.structs.replace(deviations.acceleration, max_abs=1e-10))

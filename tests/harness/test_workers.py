@@ -1,0 +1,235 @@
+"""Isolation: whatever an engine does in a worker process, its pair gets the right record and no other pair is touched."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import pytest
+from kincheck.core.harness.execution import here
+from kincheck.core.harness.provenance import THREADS
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.resource_limits import Limits
+from kincheck.core.harness.run import run
+from kincheck.core.harness.workers.pool import in_workers
+
+from ..support.bad_engine import Bad, Leaking, Unimportable
+from ..support.drill import Slow
+from ..support.fakes import Fake, crank, raising, solution
+
+ROOT = Path(__file__).parents[2]
+TOL = 1e-12
+# Long for a crank even on a busy machine, short for a test that waits for it.
+LIMITS = Limits(timeout=2.0, memory=1.0)
+PATIENT = Limits(timeout=60.0, memory=1.0)
+
+EXPECTED = {
+    "right": (Outcome.PASS, ""),
+    "segfault": (Outcome.CRASHED, "the process died of SIGSEGV in "),
+    "abort": (Outcome.CRASHED, "the process died of SIGABRT in "),
+    "system_exit": (Outcome.ERROR, "SystemExit: 0"),
+    "exit": (Outcome.CRASHED, "the process ended with status 3 before it had an answer; it last printed: solving exit"),
+    "spinning": (Outcome.TIMEOUT, "no answer within 2 s; the process was killed; it last printed: solving spinning"),
+    "deaf": (Outcome.TIMEOUT, "no answer within 2 s"),
+    "memory": (Outcome.ERROR, "this process may have 1 GB"),
+    "shapes": (Outcome.ERROR, "position of point 'tip' has shape (8, 3), expected (9, 3)"),
+    "nan": (Outcome.ERROR, "velocity of point 'tip' is [nan, nan, nan] at sample 0"),
+    "weird": (Outcome.ERROR, "Weird: its text cannot be had (TypeError)"),
+    "lengthy": (Outcome.ERROR, "characters left out"),
+    "interrupt": (Outcome.ERROR, "KeyboardInterrupt"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _importable(monkeypatch):
+    """Workers find the engines of the tests where their parent does."""
+    monkeypatch.syspath_prepend(str(ROOT))
+
+
+def timeless(records):
+    """What two runs must have in common."""
+    return [msgspec.structs.replace(each, seconds=None, us_per_step=None) for each in records]
+
+
+def test_every_fault_becomes_its_record_and_costs_no_other_pair():
+    cases = [crank(kind) for kind in EXPECTED]
+    results = run(cases, [Bad(), Fake("good")], tol=TOL, solver=in_workers(2, LIMITS))
+    found = {(each.case, each.engine): each for each in results.records}
+    assert list(found) == [(kind, engine) for kind in EXPECTED for engine in ("bad", "good")]
+    for kind, (outcome, message) in EXPECTED.items():
+        record = found[kind, "bad"]
+        assert (kind, record.outcome) == (kind, outcome)
+        assert message in record.message
+        assert len(record.message) < 3000
+        assert record.version == "1.2"  # it was told before the fault
+        assert found[kind, "good"].outcome is Outcome.PASS
+    # the line that crashed, the end of what was printed, and no more
+    assert 'bad_engine.py", line' in found["abort", "bad"].message
+    assert "solving segfault" in found["segfault", "bad"].details["printed"]
+    assert "Current thread 0x..." in found["segfault", "bad"].details["printed"]
+    assert found["nan", "bad"].seconds.build is not None
+    assert found["nan", "bad"].seconds.warm is None
+
+
+def test_a_flood_of_output_neither_blocks_nor_stays():
+    (record,) = run([crank("flood")], [Bad()], tol=TOL, solver=in_workers(1, PATIENT)).records
+    assert (record.outcome, record.message) == (Outcome.PASS, "")
+    assert "printed" not in record.details
+
+
+def test_an_engine_that_cannot_be_imported_errs():
+    results = run([crank()], [Unimportable(), Fake("good")], tol=TOL, solver=in_workers(1, PATIENT))
+    assert [each.outcome for each in results.records] == [Outcome.ERROR, Outcome.PASS]
+    assert "No module named 'no_such_simulator_anywhere'" in results.records[0].message
+
+
+@dataclass
+class Elsewhere(Fake):
+    """Says which process it is in; crashes there in the case of that name."""
+
+    name: str = "elsewhere"
+
+    def solve(self, model, case, tol):
+        if case.name == "segfault":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        answer = solution(case)
+        return type(answer)(**{**vars(answer), "details": {"process": os.getpid()}})
+
+
+def test_a_worker_stays_for_its_engine_and_is_replaced_after_a_crash():
+    cases = [crank(name) for name in ("a", "b", "segfault", "c", "d")]
+    results = run(cases, [Elsewhere()], tol=TOL, solver=in_workers(1, PATIENT))
+    a, b, crash, c, d = (each.details.get("process") for each in results.records)
+    assert os.getpid() != a == b
+    assert crash is None
+    assert b != c == d
+
+
+@pytest.mark.parametrize("given", [None, "2"])
+def test_linear_algebra_has_one_thread_unless_it_is_told_how_many(monkeypatch, given):
+    """Two that wait for each other on a busy machine made Exudyn's steps 30 times as long."""
+    started, start = list[str](), subprocess.Popen
+    for name in THREADS:
+        if given is None:
+            monkeypatch.delenv(name, raising=False)
+        else:
+            monkeypatch.setenv(name, given)
+
+    def noted(*command, **options):
+        started.extend(options["env"][name] for name in THREADS)
+        return start(*command, **options)
+
+    monkeypatch.setattr(subprocess, "Popen", noted)
+    (record,) = run([crank("a")], [Elsewhere()], tol=TOL, solver=in_workers(1, PATIENT)).records
+    assert record.outcome is Outcome.PASS
+    assert started == [given or "1"] * len(THREADS)
+
+
+def test_what_a_pair_leaves_behind_is_not_charged_to_another():
+    """Each pair keeps 0.3 GB of the half that there is: the second fails in the process of the first, and passes in its own."""
+    results = run([crank(name) for name in "ab"], [Leaking()], tol=TOL, solver=in_workers(1, Limits(memory=0.5)))
+    assert [each.message for each in results.records] == ["", ""]
+
+
+def test_records_are_the_same_however_many_jobs():
+    """Without a reference the others wait for the native engine, which is the last to be through."""
+    cases = [crank("a", reference=False), crank("b"), crank("c", reference=False)]
+    engines = [Fake(), Fake("missing", installed=None), Slow("native", seconds=0.05)]
+    three, one, none = (
+        run(cases, engines, tol=TOL, solver=solver).records for solver in (in_workers(3, PATIENT), in_workers(1, PATIENT), here)
+    )
+    assert timeless(three) == timeless(one) == timeless(none)
+    assert [each.errors["x"].position.against for each in three if each.engine == "fake"] == ["native", "closed_form", "native"]
+
+
+def test_a_baseline_is_solved_in_a_worker_too_and_a_crash_of_it_is_told():
+    case = crank("segfault", reference=False)
+    (record,) = run([case], [Fake()], tol=TOL, baseline=Bad("native"), solver=in_workers(2, PATIENT)).records
+    assert record.outcome is Outcome.UNJUDGED
+    why = "the case has no reference, and the native engine has no answer (crashed: the process died of SIGSEGV"
+    assert record.message.startswith(why)
+
+
+def test_an_engine_that_cannot_be_sent_says_what_to_do():
+    (record,) = run([crank()], [Fake(answer=raising(ValueError()))], tol=TOL, solver=in_workers(1, PATIENT)).records
+    assert record.outcome is Outcome.ERROR
+    assert record.message.startswith("cannot be sent to a worker process: ")
+    assert "--jobs 0" in record.message
+
+
+@pytest.fixture
+def deaf(monkeypatch, tmp_path):
+    """Waits for a worker to be in the middle of what it will never end."""
+    told = tmp_path / "deaf"
+    monkeypatch.setenv("KINCHECK_TEST_DEAF", str(told))
+    return lambda: until(told.exists)
+
+
+def until(condition):
+    """Wait for it, not for ever; whether it has come."""
+    deadline = time.monotonic() + 60.0
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return condition()
+
+
+def test_an_interrupt_ends_the_workers_at_once(deaf):
+    def interrupt(record, done, total):
+        assert deaf()
+        raise KeyboardInterrupt
+
+    marker = mark()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run([crank("deaf")], [Bad(), Fake()], tol=TOL, solver=in_workers(2, Limits()), progress=interrupt)
+    assert marked(marker) == []
+    assert time.monotonic() - begin < Limits().timeout
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere only between pairs")
+def test_a_worker_that_hangs_dies_with_its_parent(deaf):
+    marker = mark()
+    code = "from tests.test_workers import *; run([crank('deaf')], [Bad()], tol=TOL, solver=in_workers(1, Limits()))"
+    with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT) as parent:
+        assert deaf()
+        assert len(marked(marker)) == 2
+        parent.kill()
+    assert until(lambda: marked(marker) == [])
+
+
+def mark():
+    """Mark the processes that are started from now on."""
+    os.environ["KINCHECK_TEST_MARKER"] = marker = f"{os.getpid()}-{time.monotonic_ns()}"
+    return marker
+
+
+def marked(marker):
+    """The processes that are there and have the mark: others than this one, whose environment was read before it."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if marker.encode() in (folder / "environ").read_bytes():
+                found.append(int(folder.name))
+        except OSError:  # another user's, or gone
+            continue
+    return found
+
+
+def test_a_message_with_everything_in_it_stays_a_message():
+    record = run([crank()], [Fake(answer=lambda case: {}[b"\xff" * 10000])], tol=TOL).records[0]
+    assert record.message.startswith("KeyError: ")
+    assert len(record.message) < 3000
+
+
+def test_a_limit_that_was_reached_is_named_even_for_numpy():
+    results = run([crank("memory")], [Bad()], tol=TOL, solver=in_workers(1, Limits(memory=2.0)))
+    assert "MemoryError: Unable to allocate 7.45 GiB" in results.records[0].message
+    assert "may have 2 GB" in results.records[0].message
+
+
+def test_nothing_to_solve_starts_nothing():
+    assert run([], [Bad()], tol=TOL, solver=in_workers(4, LIMITS)).records == []

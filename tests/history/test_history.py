@@ -1,0 +1,256 @@
+"""kincheck history: lists, trends, plots and exports; and files of an earlier schema."""
+
+import csv
+import json
+import math
+import shutil
+import sqlite3
+import sys
+import zlib
+from base64 import b64decode
+from pathlib import Path
+
+import msgspec
+import pytest
+from kincheck.core.cli import main
+from kincheck.core.errors import KincheckError
+from kincheck.core.harness.record import Outcome
+from kincheck.core.history.export import NUMBERS, export
+from kincheck.core.history.queries import green, read
+from kincheck.core.history.store import HistoryError, Store
+from kincheck.core.report.figure_data import Past, trend_figures
+from kincheck.core.report.trends import trends
+
+from ..support.nights import changed, keep, nights, records, times
+
+FIRST_SCHEMA = Path(__file__).parents[1] / "data" / "history_1.sqlite"
+"""Two runs of a crank in three and four engines, made by schema 1."""
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def history(path, *argv):
+    return main.main(["history", "--history", str(path), *map(str, argv)])
+
+
+# Files of another time
+
+
+def test_a_file_of_the_first_schema_is_migrated_and_keeps_all_it_had(path):
+    old = sqlite3.connect(FIRST_SCHEMA)
+    assert old.execute("PRAGMA user_version").fetchone() == (1,)
+    before = {name: old.execute(f"SELECT * FROM {name}").fetchall() for name in ("runs", "records", "documents", "attachments")}
+    old.close()
+    assert [len(rows) for rows in before.values()] == [2, 7, 1, 2]
+    shutil.copy(FIRST_SCHEMA, path)
+    with Store(path, writable=False) as store:
+        for name, rows in before.items():
+            found = store.connection.execute(f"SELECT * FROM {name}").fetchall()
+            assert [row[: len(rows[0])] for row in found] == rows
+        results = store.results(2)
+        assert [(each.engine, each.outcome.value) for each in results.records] == [
+            ("native", "pass"),
+            ("wrong", "fail"),
+            ("partial", "fail"),
+        ]
+        assert results.records[1].seconds.waited is None
+        assert results.references["crank"]["x"].unit == "m"
+        assert read(store).pairs["crank", "native", "projection"][0].seconds > 0
+        assert store.connection.execute("SELECT count(*), max(max_abs) > 0 FROM measured WHERE run = 2").fetchone() == (18, 1)
+
+
+def test_a_migrated_file_goes_on(path):
+    shutil.copy(FIRST_SCHEMA, path)
+    assert keep(path, records()) == 3
+    with Store(path) as store:
+        assert store.records(3) == records()
+        assert store.connection.execute("SELECT count(waited_seconds), count(*) FROM records").fetchone() == (4, 11)
+
+
+def test_a_later_schema_is_refused_by_every_command(path, capsys):
+    nights(path, 1)
+    with Store(path) as store:
+        store.connection.execute("PRAGMA user_version = 99")
+    for command in ("history", "report"):
+        assert main.main([command, "--history", str(path)]) == 2
+        assert "its schema is version 99, this kincheck knows" in capsys.readouterr().err
+
+
+# Lists
+
+
+def test_runs_are_listed_the_latest_first(path, capsys):
+    nights(path, 2)
+    keep(path, changed(records(), outcome=Outcome.CRASHED), status="running", git={"commit": "abcdef" * 7, "changed": True})
+    assert history(path) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["run", "3", "2", "1"]
+    assert "3 pass, 1 crashed" in lines[1]
+    assert "abcdefabcd+" in lines[1]
+    assert "native 1.2, mujoco 4.0.0" in lines[2]
+    assert history(path, "--last", 1) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 2
+
+
+def test_trends_of_a_pair_and_its_steps(path, capsys):
+    nights(path, 6)
+    for _ in range(3):
+        keep(path, changed(records(), **times(4.0)), numpy="2.1.0")
+    assert history(path, "--case", "first", "--engine", "mujoco") == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[0].strip() == "first · mujoco"
+    assert "2026-11-09 03:00 #9  4.0.0    pass       5e-13 " in out
+    assert "worse: first · mujoco: time: " in out
+    assert "since run 7 (2026-11-07 03:00); after run 6: numpy 2.0.0 → 2.1.0, commit" in out
+    assert "second" not in out
+
+
+def test_names_and_files_that_are_not_there_are_messages(path, capsys, monkeypatch):
+    monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
+    assert main.main(["history"]) == 2
+    assert "which file? give --history FILE, or set KINCHECK_HISTORY" in capsys.readouterr().err
+    assert history(path) == 2
+    assert "there is no such file" in capsys.readouterr().err
+    nights(path, 1)
+    assert history(path, "--case", "frist") == 2
+    assert "there is no case 'frist'; did you mean 'first'?" in capsys.readouterr().err
+    monkeypatch.setenv("KINCHECK_HISTORY", str(path))
+    assert main.main(["history"]) == 0
+
+
+def test_green_runs_are_those_in_which_something_passed_and_nothing_went_wrong(path):
+    nights(path, 1)
+    keep(path, changed(records(), outcome=Outcome.TIMEOUT))
+    keep(path, changed(records(), outcome=Outcome.UNSUPPORTED))
+    keep(path, [msgspec.structs.replace(each, outcome=Outcome.UNAVAILABLE) for each in records()])
+    keep(path, records(), status="interrupted")
+    with Store(path) as store:
+        assert [row.id for row in green(store)] == [3, 1]
+        assert [row.id for row in green(store, before=3)] == [1]
+
+
+# Plots
+
+
+def drawn(page):
+    """The figures of a page, by name."""
+    packed = page.read_text().split('id="report-data">')[1].split("<")[0]
+    return json.loads(zlib.decompress(b64decode(packed)))["figures"]
+
+
+def test_the_plot_holds_the_numbers_of_the_history(path, tmp_path):
+    nights(path, 4)
+    page = tmp_path / "trends.html"
+    assert history(path, "--engine", "mujoco", "--plot", page) == 0
+    text = page.read_text()
+    assert "http://" not in text.split('id="plotly"')[0]
+    figures = drawn(page)
+    assert [*figures] == ["error-1", "time-1", "error-2", "time-2"]  # of two cases
+    with Store(path) as store:
+        past = trends(read(store))["first"]
+    mine = [each for each in past if each.engine == "mujoco"]
+    assert figures["error-1"]["data"][0]["y"] == [each.max_error for each in mine] == pytest.approx([5e-13] * 4, rel=1e-3)
+    assert figures["time-1"]["data"][0]["y"] == [each.us_per_step for each in mine]
+    assert figures["time-1"]["data"][0]["x"] == [each.run for each in mine]
+    assert mine[0].run == "2026-11-01 03:00 #1"
+
+
+def test_errors_of_exactly_zero_have_a_floor_to_be_drawn_on(path, tmp_path):
+    nights(path, 1)
+    page = tmp_path / "trends.html"
+    history(path, "--engine", "native", "--plot", page)
+    figure = drawn(page)["error-1"]
+    assert figure["data"][0]["y"] == [0.0]
+    assert figure["layout"]["meta"]["floor"] > 0.0
+
+
+# Exports
+
+
+def exported(path, file):
+    assert history(path, "--export", file) == 0
+    if file.suffix == ".csv":
+        with file.open(encoding="utf-8", newline="") as lines:
+            return list(csv.DictReader(lines))
+    return pytest.importorskip("pyarrow.parquet").read_table(file).to_pylist()
+
+
+def test_exports_hold_every_number(path, tmp_path):
+    nights(path, 2)
+    keep(path, changed(records(), outcome=Outcome.UNAVAILABLE, errors={}, seconds=None, version=None), git=None)
+    table, text = exported(path, tmp_path / "all.parquet"), exported(path, tmp_path / "all.csv")
+    # two runs of 4 pairs, 2 outputs, 3 motions, and one in which a pair has nothing but its outcome
+    assert len(table) == len(text) == 2 * 24 + 18 + 3
+    for typed, plain in zip(table, text, strict=True):
+        for name, value in typed.items():
+            assert plain[name] == ("" if value is None else str(value).lower() if isinstance(value, bool) else str(value))
+            assert isinstance(value, float | None) is (name in NUMBERS) or value is None
+    expected = records()[1].errors["x"].velocity
+    row = next(row for row in table if (row["run"], row["engine"], row["output"], row["motion"]) == (1, "mujoco", "x", "velocity"))
+    assert (row["max_abs"], row["rms"], row["tolerance"]) == (expected.max_abs, expected.rms, expected.tolerance)
+    assert (row["within"], row["git_branch"], row["calibration_seconds"]) == (True, "main", 0.02)
+    missing = [row for row in table if row["outcome"] == "unavailable"]
+    assert {(row["max_abs"], row["warm_seconds"], row["git_commit"], row["output"]) for row in missing} == {
+        (None, None, None, None)
+    }
+
+
+def test_an_export_can_be_of_a_case_and_an_engine(path, tmp_path):
+    nights(path, 1)
+    with Store(path) as store:
+        assert export(store, tmp_path / "some.csv", cases=["first"], engines=["native", "mujoco"]) == 12
+
+
+def test_what_cannot_be_exported_is_a_message(path, tmp_path, monkeypatch):
+    nights(path, 1)
+    with Store(path) as store:
+        with pytest.raises(KincheckError, match=r"ends in '.xlsx'; give a file that ends in .parquet or .csv"):
+            export(store, tmp_path / "all.xlsx")
+        with pytest.raises(KincheckError, match="cannot be written"):
+            export(store, tmp_path / "no" / "all.csv")
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+        with pytest.raises(KincheckError, match=r"pip install 'kincheck\[parquet\]'; or give a .csv"):
+            export(store, tmp_path / "all.parquet")
+        store.connection.execute("DROP VIEW measured")
+        with pytest.raises(HistoryError, match="no such table: measured"):
+            export(store, tmp_path / "all.csv")
+
+
+def test_a_run_keeps_how_long_it_was_kept_waiting(path):
+    made = [msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, waited=0.004)) for each in records()]
+    keep(path, made)
+    with Store(path) as store:
+        (entry,) = read(store).pairs["first", "mujoco", "projection"]
+    assert math.isclose(entry.seconds, 0.006)
+
+
+def test_what_has_no_value_in_any_run_is_not_drawn(path, tmp_path):
+    def past(error, time):
+        return [Past(run=run, engine="native", max_error=error, us_per_step=time) for run in ("1", "2")]
+
+    assert [*trend_figures(past(None, 2.0), {})] == ["time"]
+    assert [*trend_figures(past(0.0, None), {})] == ["error"]
+    assert trend_figures(past(None, None), {}) == {}
+    keep(path, [msgspec.structs.replace(each, errors={}, us_per_step=None) for each in records()])
+    assert history(path, "--plot", tmp_path / "trends.html") == 0
+    text = (tmp_path / "trends.html").read_text()
+    assert "1 run, oldest first" in text
+    assert text.count("No engine has solved it in these runs.") == 2
+    assert "data-figure" not in text.split('id="plotly"')[0]
+
+
+def test_times_that_are_close_are_drawn_over_a_decade():
+    """Else a tenth looks like a step; a decade or more is drawn as it is."""
+    for factor, spread, ticks in ((1.1, 1.0, "D2"), (20.0, None, "D2"), (2000.0, None, 1)):
+        past = [Past(run=str(k), engine="native", max_error=None, us_per_step=time) for k, time in enumerate((2.0, 2.0 * factor))]
+        axis = trend_figures(past, {})["time"]["layout"]["yaxis"]
+        assert axis["dtick"] == ticks  # 1, 2 and 5 of a few decades
+        if spread is None:
+            assert "range" not in axis
+        else:
+            low, high = axis["range"]
+            assert high - low == pytest.approx(spread)
+            assert low < math.log10(2.0) < math.log10(2.2) < high

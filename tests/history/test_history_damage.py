@@ -1,0 +1,204 @@
+"""A history with a fault costs one message and status 2: never a result, and where one run is damaged, never the others."""
+
+import json
+import sqlite3
+
+import pytest
+from kincheck.core.cli.main import main
+from kincheck.core.history.schema import MIGRATIONS
+from kincheck.core.history.store import Store
+
+from ..support.nights import nights
+
+NO_TRENDS = "The history cannot be read, so that this page says nothing of earlier runs."
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def change(path, statement):
+    connection = sqlite3.connect(path)
+    connection.execute(statement)
+    connection.commit()
+    connection.close()
+
+
+def directory(path, monkeypatch):
+    path.mkdir()
+
+
+def no_database(path, monkeypatch):
+    path.write_bytes(b"not a database at all" * 100)
+
+
+def of_another_program(path, monkeypatch):
+    change(path, "CREATE TABLE mine (a)")
+
+
+def of_a_later_version(path, monkeypatch):
+    Store(path).close()
+    change(path, f"PRAGMA user_version = {len(MIGRATIONS) + 1}")
+
+
+def cut_off(path, monkeypatch):
+    nights(path, 2)
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+def locked(path, monkeypatch):
+    nights(path, 1)
+    monkeypatch.setattr("kincheck.core.history.faults.BUSY", 0.2)
+    holder = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    holder.execute("BEGIN EXCLUSIVE")
+    HELD.append(holder)
+
+
+def full(path, monkeypatch):
+    nights(path, 1)
+
+    monkeypatch.setattr(Store, "_attach", no_room)
+
+
+def no_room(*_):
+    raise sqlite3.OperationalError("database or disk is full")
+
+
+HELD = []
+
+WHOLE_FILE = [directory, no_database, of_another_program, of_a_later_version, cut_off, locked, full]
+
+
+@pytest.mark.parametrize("fault", WHOLE_FILE)
+def test_a_history_that_cannot_be_used_costs_no_result(path, tmp_path, capsys, monkeypatch, fault):
+    fault(path, monkeypatch)
+    out, junit = tmp_path / "out", tmp_path / "junit.xml"
+    command = ["run", "rssr", "--engine", "native", "--history", str(path), "--out", str(out), "--junit", str(junit)]
+    assert main(command) == 2
+    while HELD:
+        HELD.pop().close()
+    told, said = capsys.readouterr()
+    (problem,) = [line for line in said.splitlines() if line.startswith("kincheck: ")]
+    assert problem.startswith(f"kincheck: history {path}: cannot be ")
+    assert problem.endswith("; the run is not in the history")
+    assert "1 pass" in told
+    assert len(json.loads((out / "results.json").read_text())["records"]) == 1
+    assert "rssr" in junit.read_text()
+    assert NO_TRENDS in (out / "report.html").read_text()
+
+
+DAMAGE = {
+    "circumstances": """UPDATE runs SET circumstances = replace(circumstances, '"kincheck":', '"kincheck"!') WHERE id = 2""",
+    "plan": "UPDATE runs SET plan = replace(plan, '[', '(') WHERE id = 2",
+    "a byte of a run": "UPDATE runs SET command = cast(x'61ff62' as text) WHERE id = 2",
+    "a byte of an engine": "UPDATE records SET engine = cast(x'6e61ff697665' as text) WHERE run_id = 2 AND engine = 'native'",
+    "a byte of a message": "UPDATE records SET message = cast(x'61ff62' as text) WHERE run_id = 2",
+    "errors": "UPDATE records SET errors = substr(errors, 2) WHERE run_id = 2",
+    "an outcome": "UPDATE records SET outcome = 'pasd' WHERE run_id = 2",
+}
+
+
+@pytest.fixture(params=DAMAGE)
+def damaged(request, path):
+    """A history of three runs, of which the second is damaged."""
+    nights(path, 3)
+    change(path, DAMAGE[request.param])
+    return path
+
+
+def passed_over(capsys, path):
+    """The one line that says which run was passed over, and how to be rid of it."""
+    told, said = capsys.readouterr()
+    (problem,) = [line for line in said.splitlines() if not line.startswith("[")]
+    assert problem.startswith(f"kincheck: history {path}: run 2 cannot be read (")
+    assert f"kincheck history --history {path} --remove 2" in problem
+    return told
+
+
+def test_the_other_runs_are_drawn_and_the_new_one_is_kept(damaged, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["run", "rssr", "--engine", "native", "--history", str(damaged), "--out", str(out)]) == 2
+    assert "1 pass" in passed_over(capsys, damaged)
+    assert NO_TRENDS not in (out / "report.html").read_text()
+    with Store(damaged, writable=False) as store:
+        assert store.runs()[0].id == 4
+        assert len(store.records(4)) == 1
+
+
+def test_the_other_runs_are_listed_plotted_and_exported(damaged, tmp_path, capsys):
+    table, plot = tmp_path / "all.csv", tmp_path / "plot.html"
+    command = ["history", "--history", str(damaged)]
+    assert main([*command, "--export", str(table), "--plot", str(plot)]) == 2
+    told = passed_over(capsys, damaged)
+    assert f"{table}: " in told
+    rows = [line.split(",")[0] for line in table.read_text().splitlines()[1:]]
+    assert {*rows} == {"1", "3"}
+    assert rows.count("1") == rows.count("3")
+    assert plot.exists()
+    assert main([*command, "--case", "first", "--engine", "native"]) == 2
+    passed_over(capsys, damaged)
+
+
+def test_a_report_is_made_of_the_others(damaged, tmp_path, capsys):
+    assert main(["report", "--history", str(damaged), "--out", str(tmp_path / "out")]) == 2
+    assert "run 3 against run 1 (last green)" in passed_over(capsys, damaged)
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_a_damaged_record_is_no_run_to_compare_with(path, capsys):
+    nights(path, 3)
+    change(path, "UPDATE records SET record = x'00' WHERE run_id = 2")
+    assert main(["report", "--history", str(path)]) == 2
+    assert "run 3 against run 1 (last green)" in passed_over(capsys, path)
+    assert main(["report", "2", "--history", str(path)]) == 2
+    passed_over(capsys, path)
+
+
+def test_a_run_that_is_removed_is_passed_over_no_more(damaged, capsys):
+    assert main(["history", "--history", str(damaged), "--remove", "2"]) == 0
+    assert "run 2 is removed" in capsys.readouterr().out
+    with Store(damaged) as store:
+        assert [row.id for row in store.runs()] == [3, 1]
+        assert store.connection.execute("SELECT count(*) FROM records WHERE run_id = 2").fetchone() == (0,)
+        assert len(store.records(3)) == 4
+    assert main(["history", "--history", str(damaged), "--remove", "2"]) == 2
+    assert "there is no run 2" in capsys.readouterr().err
+
+
+def test_many_damaged_runs_are_not_told_one_by_one(path, capsys):
+    nights(path, 9)
+    change(path, "UPDATE runs SET plan = '(' WHERE id > 1")
+    assert main(["history", "--history", str(path)]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 6
+    assert "3 more runs cannot be read: 4, 3, 2" in said[-1]
+
+
+def test_damage_that_comes_while_records_are_added_costs_no_result(path, tmp_path, capsys, monkeypatch):
+    add = Store.add_record
+
+    def damage_then_add(self, run, record):
+        if record.case == "bennett":
+            self.connection.execute("DROP TABLE records")
+        add(self, run, record)
+
+    monkeypatch.setattr(Store, "add_record", damage_then_add)
+    out = tmp_path / "out"
+    assert main(["run", "rssr", "bennett", "four_bar", "--engine", "native", "--history", str(path), "--out", str(out)]) == 2
+    said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("[")]
+    assert len(said) == 1
+    assert "the records before bennett native are kept there as run 1" in said[0]
+    assert len(json.loads((out / "results.json").read_text())["records"]) == 3
+    assert NO_TRENDS in (out / "report.html").read_text()
+
+
+def test_a_run_to_be_resumed_that_is_damaged_is_made_anew(path, capsys):
+    command = ["run", "rssr", "--engine", "native", "--history", str(path)]
+    assert main(command) == 0
+    change(path, "UPDATE runs SET status = 'interrupted', plan = '('")
+    capsys.readouterr()
+    assert main([*command, "--resume"]) == 2
+    said = capsys.readouterr().err
+    assert "run 2 is new" in said
+    assert "run 1 cannot be read" in said

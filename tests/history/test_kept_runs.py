@@ -1,0 +1,140 @@
+"""Runs of the command line that are kept in a history: killed at any moment, on a bad disk, and how they are told apart."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from kincheck.core.harness.provenance import calibration, git_state
+from kincheck.core.history.run_digest import digest
+from kincheck.core.history.store import Store
+
+from ..harness.test_workers import timeless
+from ..support.fakes import crank
+
+ROOT = Path(__file__).parents[2]
+MOMENTS = int(os.environ.get("KINCHECK_DRILL", "6"))
+"""At which a run is killed: KINCHECK_DRILL=50 for the full drill."""
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def kincheck(*arguments, limit=None, **environment):
+    """The command line with made-up cases and engines: see drill.py. limit: on the size of files [bytes]."""
+    restrict = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit})); " if limit else ""
+    command = [sys.executable, "-c", f"{restrict}import sys; from tests.drill import main; sys.exit(main())", *map(str, arguments)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=ROOT, env={**os.environ, "KINCHECK_HISTORY": "", **environment}, **pipes)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits the size of files as POSIX does")
+def test_a_disk_that_fails_in_the_middle_is_a_message_and_the_results_are_delivered(path):
+    """The limit leaves room for some records."""
+    Store(path).close()
+    process = kincheck("run", "--jobs", 0, "--engine", "native", "--history", path, "--json", "-", limit=52_000)
+    out, err = process.communicate()
+    assert process.returncode == 2
+    assert f"kincheck: history {path}: cannot be written: disk I/O error; look at the disk: it may be full" in err
+    assert len(msgspec.json.decode(out)["records"]) == 4
+    with Store(path) as store:
+        (row,) = store.runs()
+        assert 0 < len(store.records(row.id)) < 4
+
+
+def test_a_history_that_cannot_be_opened_costs_no_result(path):
+    process = kincheck("run", "--engine", "native", "--jobs", 0, "--history", path.parent, "--json", "-")
+    out, err = process.communicate()
+    assert process.returncode == 2
+    expected = "cannot be opened: unable to open database file; give a file in a folder that exists and can be written"
+    assert err.splitlines()[-1] == f"kincheck: history {path.parent}: {expected}; the run is not in the history"
+    assert len(msgspec.json.decode(out)["records"]) == 4
+
+
+def test_resume_needs_a_history_and_the_environment_can_name_it(path):
+    process = kincheck("run", "--resume")
+    assert "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY" in process.communicate()[1]
+    assert process.returncode == 2
+    process = kincheck("run", "first", "--engine", "native", "--resume", KINCHECK_HISTORY=str(path))
+    assert "no run of the same kind without an end: run 1 is new" in process.communicate()[1]
+    assert process.returncode == 0
+    with Store(path) as store:
+        assert len(store.runs()) == 1
+
+
+# Kills
+
+
+def test_a_run_killed_at_any_moment_is_resumed_to_the_same_records(tmp_path):
+    """The moments are drawn over the whole of a run and its ways in and out; one run in three is killed twice."""
+    arguments = ["run", "--jobs", "2", "--history"]
+    begin = time.monotonic()
+    undisturbed = kincheck(*arguments, tmp_path / "undisturbed.sqlite")
+    undisturbed.communicate()
+    lasted = time.monotonic() - begin
+    with Store(tmp_path / "undisturbed.sqlite") as store:
+        expected = store.results(1)
+    assert len(expected.records) == 12
+    moments = random.Random(943745)
+    for number in range(MOMENTS):
+        path = tmp_path / f"{number}.sqlite"
+        for _ in range(1 + (number % 3 == 0)):
+            process = kincheck(*arguments, path, "--resume")
+            time.sleep(moments.uniform(0.0, lasted))
+            process.send_signal(signal.SIGKILL)
+            process.communicate()
+        process = kincheck(*arguments, path, "--resume")
+        err = process.communicate()[1]
+        assert process.returncode == 1, err  # the segmentation fault
+        with Store(path) as store:
+            assert store.connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+            finished = [row for row in store.runs() if row.status == "finished"]
+            results = store.results(finished[0].id)
+            assert timeless(results.records) == timeless(expected.records)
+            assert results.references == expected.references
+            # begun at most once more than needed: where the kill came after the end
+            assert len(store.runs()) == len(finished)
+
+
+# What a run is told by
+
+
+def test_a_digest_is_of_content():
+    assert digest(crank()) == digest(crank())
+    assert digest({"a": 1}) != digest({"a": 1.0}) != digest({"a": True})
+    assert digest(np.array([0.0])) != digest(np.array([-0.0]))
+    assert digest([["a"], []]) != digest([["a", []]])
+    assert len({digest(crank(rate=rate)) for rate in (1.0, 2.0)}) == 2
+
+
+def test_the_state_of_a_repository(tmp_path):
+    def git(*arguments):
+        name = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "init.defaultBranch=trunk"]
+        return subprocess.run(["git", "-C", tmp_path, *name, *arguments], check=True, capture_output=True, text=True).stdout.strip()
+
+    assert git_state(tmp_path) is None
+    git("init")
+    (tmp_path / "case.toml").write_text("a")
+    git("add", ".")
+    git("commit", "-m", "first")
+    assert git_state(tmp_path) == {"commit": git("rev-parse", "HEAD"), "branch": "trunk", "changed": False}
+    (tmp_path / "case.toml").write_text("b")
+    git("checkout", "--detach")
+    found = git_state(tmp_path)
+    edits = found.pop("edits")
+    assert found == {"commit": git("rev-parse", "HEAD"), "branch": None, "changed": True}
+    assert git_state(tmp_path)["edits"] == edits
+    (tmp_path / "case.toml").write_text("c")
+    assert git_state(tmp_path)["edits"] != edits
+
+
+def test_calibration_is_a_time():
+    assert 0.0 < calibration() < 60.0

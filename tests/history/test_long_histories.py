@@ -1,0 +1,235 @@
+"""Reports over many nights: what stays wrong is told every night, what grows slowly is told, and nothing is made up."""
+
+import os
+from pathlib import Path
+
+import msgspec
+import pytest
+from kincheck.core.case.io.atomic_files import written
+from kincheck.core.cli import main
+from kincheck.core.harness.record import Outcome, to_json
+from kincheck.core.history.regression.findings import Kind
+from kincheck.core.history.regression.run_selection import find, find_against
+from kincheck.core.history.run_recorder import keep as begin
+from kincheck.core.history.store import Store
+
+from ..harness.test_unfinished import killed
+from ..support.fakes import Fake, crank
+from ..support.nights import changed, keep, nights, records, worse
+from .test_regression import reported
+
+FIRST = ("first", "mujoco")
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def held_to(factor):
+    """A change of errors: all tolerances grow."""
+
+    def one(deviation):
+        return deviation and msgspec.structs.replace(deviation, tolerance=factor * deviation.tolerance)
+
+    def change(errors):
+        return {
+            output: msgspec.structs.replace(each, **{motion: one(deviation) for motion, deviation in each.items()})
+            for output, each in errors.items()
+        }
+
+    return {"errors": change}
+
+
+def without(motion):
+    """A change of errors: a motion is not compared any more."""
+    return {"errors": lambda errors: {output: msgspec.structs.replace(each, **{motion: None}) for output, each in errors.items()}}
+
+
+def told(found):
+    return {(each.kind, each.case, each.engine) for each in found.regressions}
+
+
+def test_another_tolerance_is_no_step_of_the_error(path):
+    """Errors far below the floor, and a tolerance that makes the floor higher than they ever were."""
+    tiny = worse(1e-4)
+    for _ in range(3):
+        keep(path, changed(records(), **tiny))
+    grown = changed(changed(records(), **tiny), **held_to(1e4))
+    keep(path, grown)
+    found = reported(path)
+    assert (found.steps, found.regressions) == ([], [])
+    assert {each.kind for each in found.findings} == {Kind.TOLERANCE}
+    assert {each.since for each in found.findings} == {None}
+
+
+def test_a_step_has_the_errors_that_were_found(path):
+    for factor in (1e-4, 1e-4, 1e-4, 100.0, 100.0):
+        keep(path, changed(records(), **worse(factor)))
+    (step,) = reported(path).steps
+    least = changed(records(), **worse(1e-4))
+    (record,) = [each for each in least if (each.case, each.engine) == FIRST]
+    assert step.before == pytest.approx(record.errors["x"].position.max_abs, rel=1e-12)
+    assert step.now == pytest.approx(1e6 * step.before, rel=1e-9)
+
+
+def test_a_file_is_the_run_of_the_history_that_it_came_from(path, tmp_path):
+    nights(path, 1)
+    keep(path, changed(records(), **worse(450.0)))
+    nights(path, 1)
+    with Store(path) as store:
+        file = tmp_path / "results.json"
+        file.write_bytes(to_json(store.results(2)))
+        subject = find(str(file), store)
+        assert (subject.number, find_against("last-green", subject, store)[0].number) == (2, 1)
+        other = msgspec.structs.replace(store.results(2), run=store.results(2).run | {"host": "elsewhere"})
+        file.write_bytes(to_json(other))
+        subject = find(str(file), store)  # of another machine, and begun when run 2 was: run 3 is later
+        assert (subject.number, subject.before) == (None, 3)
+    assert told(reported(path, str(file), "1")) == {(Kind.DRIFTED, *FIRST)}
+
+
+@pytest.mark.parametrize(
+    "gone",
+    [
+        {"outcome": Outcome.UNAVAILABLE, "errors": {}, "solved": None, "seconds": None},
+        {"outcome": Outcome.UNSUPPORTED, "errors": {}, "solved": None, "seconds": None},
+        without("acceleration"),
+    ],
+    ids=["unavailable", "unsupported", "acceleration"],
+)
+def test_what_is_gone_is_told_for_as_long_as_it_is(path, gone):
+    nights(path, 1)
+    for _ in range(62):
+        keep(path, changed(records(), **gone))
+    for run in ("2", "3", "63"):
+        found = reported(path, run)
+        assert (found.against.number, told(found)) == (1, {(Kind.LOST, *FIRST)})
+
+
+def test_an_output_that_the_case_has_no_more_is_told_once(path):
+    nights(path, 1)
+    fewer = {"errors": lambda errors: {"x": errors["x"]}, "outputs": lambda outputs: {"x": outputs["x"]}}
+    for _ in range(2):
+        keep(path, changed(records(), **fewer))
+    assert told(reported(path, "2")) == {(Kind.LOST, *FIRST)}
+    assert told(reported(path, "3")) == set()
+
+
+def test_small_runs_in_between_hide_nothing(path):
+    nights(path, 1)
+    for _ in range(62):
+        keep(path, [each for each in records() if each.case == "second"])
+    keep(path, changed(records(), **worse(450.0)))
+    assert told(reported(path)) == {(Kind.DRIFTED, *FIRST)}
+
+
+def test_an_error_that_grows_little_by_little_is_told(path):
+    for night in range(4):
+        keep(path, changed(records(), **worse(5.0**night)))
+    assert told(reported(path, "2")) == set()
+    for run in ("3", "4"):
+        found = reported(path, run)
+        assert told(found) == {(Kind.DRIFTED, *FIRST)}
+        assert "little by little since run 1" in found.regressions[0].message
+    (finding,) = found.regressions
+    assert finding.now == pytest.approx(125.0 * finding.before)
+
+
+def test_a_step_that_was_told_is_not_told_again(path):
+    nights(path, 3)
+    for _ in range(3):
+        keep(path, changed(records(), **worse(100.0)))
+    assert [told(reported(path, run)) for run in ("4", "5", "6")] == [{(Kind.DRIFTED, *FIRST)}, set(), set()]
+    assert [(step.first, step.last) for step in reported(path).steps] == [(4, 3)]
+    assert [each.since for each in reported(path, "4").regressions] == [4]
+
+
+def test_a_wide_tolerance_later_does_not_hide_a_step(path):
+    for factor, wide in ((1.0, 1.0), (1.0, 1.0), (100.0, 1.0), (100.0, 1e4)):
+        keep(path, changed(changed(records(), **worse(factor)), **held_to(wide)))
+    assert [(step.first, step.now / step.before) for step in reported(path).steps] == [(3, pytest.approx(100.0))]
+
+
+def test_the_first_bad_run_may_be_one_that_was_killed(path, capsys):
+    nights(path, 2)
+    bad = changed(records(), outcome=Outcome.FAIL)
+    run = keep(path, bad, status="running")
+    with Store(path) as store:
+        store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1' WHERE id = ?", (run,))
+    keep(path, bad)
+    (finding,) = reported(path).regressions
+    assert finding.since == run
+    assert main.main(["history", "--history", str(path)]) == 0
+    assert " killed " in capsys.readouterr().out
+    export = path.with_suffix(".csv")
+    assert main.main(["history", "--history", str(path), "--export", str(export)]) == 0
+    assert ",killed," in export.read_text("utf-8")
+
+
+def test_a_run_that_is_being_made_is_not_reported(path, capsys):
+    nights(path, 1)
+    killed(path, 3, owner=None)
+    assert main.main(["report", "2", "--history", str(path)]) == 2
+    assert "run 2 is being made now; report it when it has ended" in capsys.readouterr().err
+
+
+def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_references(path, tmp_path):
+    case, engines = crank("first"), [Fake("native"), Fake("mujoco")]
+    kept = begin(path, [case, crank("second")], engines, tol=1e-12, command="kincheck run", settings={}, resume=False)
+    kept.add(next(each for each in records() if (each.case, each.engine) == ("first", "native")))
+    kept.store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1'")
+    kept.store.close()
+    with Store(path, writable=False) as store:
+        assert store.results(1).references["first"].keys() == case.reference.keys()
+    assert main.main(["report", "--history", str(path), "--out", str(tmp_path)]) == 1
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "never made" in page
+    assert "not asked" not in page
+    assert "Lost (3)" in page  # in two rows
+
+
+def test_a_run_of_another_version_is_not_gone_on_with(path):
+    case, settings = crank("first"), {"tol": 1e-12, "command": "kincheck run", "settings": {}}
+    for version, resumed in (("1.0", False), ("2.0", False), ("2.0", True)):
+        kept = begin(path, [case], [Fake("native", installed=version)], resume=True, **settings)
+        assert kept.resumed is resumed
+        kept.store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1'")
+        kept.store.close()
+
+
+def test_other_edits_are_named(path):
+    git = {"commit": "ab" * 20, "branch": "main", "changed": True}
+    for edits in ("one", "two"):
+        keep(path, records(), git=git | {"edits": edits})
+    assert [str(change) for change in reported(path).changes] == ["uncommitted edits one → two"]
+
+
+def test_errors_of_zero_leave_any_tolerance_loose(path):
+    for _ in range(10):
+        keep(path, changed(records(), **worse(0.0)))
+    (loose,) = [each for each in reported(path).loose if each.largest == 0.0]
+    assert (loose.case, loose.output, loose.factor) == ("first", "x", None)
+
+
+def test_an_interrupt_is_no_traceback(capsys, monkeypatch):
+    monkeypatch.setattr("kincheck.core.cli.list._list", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert main.main(["list"]) == 130
+    assert capsys.readouterr().err == "kincheck: interrupted\n"
+
+
+def test_a_file_that_cannot_be_finished_leaves_what_stood_there(tmp_path):
+    def half(path):
+        path.write_text("half of it")
+        raise OSError(28, "No space left on device")
+
+    file = tmp_path / "report.html"
+    file.write_text("yesterday's")
+    assert written(file, half) == [f"{file}: cannot be written (No space left on device); what else was asked for is tried"]
+    assert (file.read_text(), [*tmp_path.iterdir()]) == ("yesterday's", [file])
+    link = tmp_path / "latest.html"
+    link.symlink_to(file)
+    assert written(link, lambda path: path.write_text("today's")) == []
+    assert (link.is_symlink(), file.read_text()) == (True, "today's")
+    assert written(Path(os.devnull), lambda path: path.write_text("nowhere")) == []
+    assert not Path(os.devnull).is_file()

@@ -1,0 +1,174 @@
+"""What a report tells besides errors and times: dof, rank, residuals, units, values that are null now, pairs that are missing."""
+
+import xml.etree.ElementTree as ET
+
+import msgspec
+import pytest
+from kincheck.core.cli import main
+from kincheck.core.harness.record import Outcome
+from kincheck.core.history.regression.findings import WHY, Kind
+
+from ..support.nights import changed, keep, nights, records, reported
+
+FIRST = ("first", "mujoco")
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def of_output(output="x", **changes):
+    """A change of outputs: of one of them."""
+
+    def change(outputs):
+        values = {name: each(getattr(outputs[output], name)) if callable(each) else each for name, each in changes.items()}
+        return outputs | {output: msgspec.structs.replace(outputs[output], **values)}
+
+    return {"outputs": change}
+
+
+def without(*samples):
+    """A series that has null at these samples."""
+    return lambda values: [None if k in samples else value for k, value in enumerate(values)]
+
+
+TOLD = {
+    "dof": ({"dof": 1}, {"dof": 2}, Kind.FREEDOM, "dof 1 → 2"),
+    "rank": ({"rank": 17}, {"rank": 16}, Kind.RANK, "rank 17 → 16"),
+    "residual": (
+        {"residual_max": 5e-16},
+        {"residual_max": 1e-8},
+        Kind.RESIDUAL,
+        "largest residual 5e-16 → 1e-8 (×2e7)",
+    ),
+    "residual of zero": ({"residual_max": 0.0}, {"residual_max": 1e-12}, Kind.RESIDUAL, "largest residual 0 → 1e-12"),
+    "three digits": ({"residual_max": 1e-15}, {"residual_max": 1e-12}, Kind.RESIDUAL, "largest residual 1e-15 → 1e-12 (×1e"),
+    "no residual": (
+        {"residual_max": 5e-16},
+        {"residual_max": None, "reasons": {"residual_max": "not asked"}},
+        Kind.GONE,
+        "residual_max has no value now, 5e-16 before: not asked",
+    ),
+    "unit": ({}, of_output(unit="rad"), Kind.UNIT, "x: unit m → rad"),
+    "sense": ({}, of_output(sense="to the left"), Kind.UNIT, "x: sense none → to the left"),
+    "velocity": (
+        {},
+        of_output(velocity=without(4), reason="it is undefined there"),
+        Kind.GONE,
+        "x velocity has no value at 1 of 9 samples that had one, first at angle = ",
+    ),
+    "all velocities, unjudged": (
+        {"errors": {}},
+        {"errors": {}} | of_output(velocity=None, reason="the engine gives none"),
+        Kind.GONE,
+        "x velocity has no value at 9 of 9 samples that had one, first at angle = ",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", TOLD)
+def test_what_differs_is_told_in_every_format(path, tmp_path, capsys, what):
+    before, now, kind, message = TOLD[what]
+    keep(path, changed(records(), **before))
+    keep(path, changed(records(), **{**before, **now}))
+    found = reported(path)
+    (finding,) = found.findings
+    assert (finding.kind, finding.case, finding.engine) == (kind, *FIRST)
+    assert finding.message.startswith(message)
+    assert found.regressed is kind.regression is (kind is not Kind.RANK)
+    assert main.main(["report", "--history", str(path), "--out", str(tmp_path)]) == kind.regression
+    capsys.readouterr()
+    title = f"{kind.capitalize()} (1): {WHY[kind]}"
+    assert title in (tmp_path / "regressions.md").read_text("utf-8")
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert f"{kind.capitalize()} (1)</b>: " in page
+    assert message in page
+    assert message in (tmp_path / "regressions.json").read_text("utf-8")
+    failures = [each.get("message") for each in ET.parse(tmp_path / "junit.xml").getroot().iter("failure")]
+    assert [each.startswith(f"{kind}: {message}") for each in failures] == [True] * kind.regression
+
+
+@pytest.mark.parametrize(
+    ("before", "now"),
+    [
+        ({"residual_max": 1e-17}, {"residual_max": 1e-14}),
+        ({"residual_max": 0.0}, {"residual_max": 2e-16}),
+        ({"residual_max": 2e-16}, {"residual_max": 1.9e-13}),
+        ({"residual_max": 1e-9}, {"residual_max": 1e-16}),
+        ({"dof": None, "rank": None, "residual_max": None}, {"dof": 1, "rank": 3, "residual_max": 1e-16}),
+    ],
+    ids=["rounding", "the last place", "less than three digits", "better", "nothing known before"],
+)
+def test_what_means_nothing_is_not_told(path, before, now):
+    keep(path, changed(records(), **before))
+    keep(path, changed(records(), **now))
+    assert reported(path).findings == []
+
+
+def test_samples_that_are_lost_are_told_once(path):
+    keep(path, records())
+    all_null = {name: without(7, 8) for name in ("position", "velocity", "acceleration")}
+
+    def fewer(outputs):
+        return {name: of_output(name, **all_null)["outputs"](outputs)[name] for name in outputs}
+
+    keep(path, changed(records(), outputs=fewer, solved=7))
+    assert [each.kind for each in reported(path, against="1").findings] == [Kind.LOST]
+
+    def one_more(outputs):
+        return of_output(velocity=without(3))["outputs"](fewer(outputs))
+
+    keep(path, changed(records(), outputs=one_more, solved=7))
+    found = reported(path, against="1").findings
+    assert [each.kind for each in found] == [Kind.LOST, Kind.GONE]
+    assert " at 1 of 9 samples " in found[1].message
+
+
+# Pairs that are missing
+
+
+def test_missing_cases_and_engines_are_told_and_status_1_where_that_is_asked(path, tmp_path, capsys):
+    nights(path, 2)
+    keep(path, [each for each in records() if each.case == "first" and each.engine == "native"])
+    assert main.main(["report", "--history", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "nothing regressed; 3 not in this run" in said
+    assert "| mujoco | first, second | pass there |" in said
+    assert main.main(["report", "--history", str(path), "--missing-is-failure", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("## run 3 against run 2 (last green): 3 not in this run")
+    assert "**Not in this run (3): " in said
+    assert "<details open>" in (tmp_path / "report.html").read_text("utf-8")
+    suites = ET.parse(tmp_path / "junit.xml").getroot()
+    assert [(each.get("name"), each.get("failures")) for each in suites] == [("first", "1"), ("second", "2")]
+
+
+def test_a_pair_that_only_the_last_run_had_is_missing_though_that_was_not_green(path, capsys):
+    keep(path, records()[:2])
+    keep(path, changed(records(), case="second", outcome=Outcome.FAIL))
+    keep(path, records()[:2])
+    found = reported(path)
+    assert found.against.number == 1
+    assert [(each.kind, each.case, each.message) for each in found.findings] == [
+        (Kind.ABSENT, "second", "in run 2, by the same command")
+    ] * 2
+    assert main.main(["report", "--history", str(path)]) == 0
+    assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 1
+    capsys.readouterr()
+
+
+def test_a_run_of_another_command_was_asked_for_something_else(path, capsys):
+    keep(path, records()[:2])
+    keep(path, [msgspec.structs.replace(each, case="mine") for each in records()], command="kincheck run mine.toml")
+    keep(path, records()[:2])
+    assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 0
+    assert "not in this run" not in capsys.readouterr().out
+
+
+def test_missing_pairs_count_with_nothing_to_compare_with(path, capsys):
+    keep(path, changed(records(), outcome=Outcome.FAIL))
+    keep(path, records()[:2])
+    assert main.main(["report", "--history", str(path)]) == 0
+    assert "2 not in this run; compared with nothing" in capsys.readouterr().out
+    assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 1

@@ -1,0 +1,183 @@
+"""Steps in a history: the first bad run, and what else changed there; not what is noise, and not a single slow night."""
+
+import math
+import random
+
+import msgspec
+import numpy as np
+import pytest
+from kincheck.core.cli import main
+from kincheck.core.harness.record import Outcome
+from kincheck.core.history.queries import read
+from kincheck.core.history.regression.change_points import change_points, steps
+from kincheck.core.history.store import Store
+
+from ..support.nights import changed, keep, nights, records, times, worse
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def found(path, **options):
+    with Store(path) as store:
+        return steps(read(store), **options)
+
+
+def noisy(levels, spread=0.05, seed=3):
+    noise = random.Random(seed)
+    return np.array([level + noise.gauss(0.0, spread) for level in levels])
+
+
+SHAPES = {
+    "comes and goes": ([8, 8, 8, 8], [8, 16, 24]),
+    "three slow runs": ([18, 3, 15], [18, 21]),
+    "three at the end": ([37, 3], [37]),
+    "one step": ([25, 8], [25]),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_comes_and_goes_is_found_exactly(shape, sign):
+    """Steps of ten standard deviations, a factor of two in time, up first or down first."""
+    lengths, expected = SHAPES[shape]
+    level = sign * math.log(2.0) * np.repeat([k % 2 for k in range(len(lengths))], lengths)
+    found = [change_points(noisy(level, 0.0693, seed), least=math.log(1.5), lasting=3) for seed in range(100)]
+    assert sum(each == expected for each in found) >= 95
+
+
+def test_a_slow_drift_is_no_step():
+    drift = np.linspace(0.0, math.log(4.0), 60)
+    for seed in range(20):
+        assert change_points(noisy(drift, seed=seed), least=math.log(1.5), lasting=3) == []
+
+
+def test_values_that_go_to_and_fro_are_no_steps():
+    """As errors on two kinds of hosted processors are."""
+    for seed in range(20):
+        chance = random.Random(seed)
+        values = np.array([math.log(30.0) * (chance.random() < 0.5) for _ in range(60)])
+        assert change_points(values, least=math.log(10.0), lasting=1) == []
+
+
+@pytest.mark.parametrize(
+    ("levels", "expected"),
+    [
+        ([0.0] * 20, []),
+        ([0.0] * 12 + [0.7] * 8, [12]),
+        ([0.0] * 12 + [0.7] * 8 + [-0.8] * 9, [12, 20]),
+        ([0.0] * 17 + [0.7] * 3, [17]),
+        ([0.0] * 18 + [0.7] * 2, []),
+        ([0.0] * 10 + [3.0] + [0.0] * 10, []),
+        ([0.0] * 12 + [0.3] * 8, []),
+    ],
+    ids=["quiet", "step", "two", "at the end", "too short", "outlier", "too small"],
+)
+def test_levels_are_found_where_they_change(levels, expected):
+    for seed in range(5):
+        assert change_points(noisy(levels, seed=seed), least=math.log(1.5), lasting=3) == expected
+
+
+def test_noise_has_no_steps():
+    """Nights of which one in ten is slow by up to a factor of three."""
+    noise = random.Random(7)
+    for _ in range(200):
+        values = np.array([noise.gauss(0.0, 0.1) + (noise.random() < 0.1) * noise.uniform(0.0, 1.1) for _ in range(40)])
+        assert change_points(values, least=math.log(1.5), lasting=3) == []
+
+
+def test_a_step_of_time_names_its_first_run_and_the_versions_that_changed(path):
+    noise = random.Random(5)
+    for _ in range(8):
+        keep(path, records(noise=noise))
+    for _ in range(4):
+        keep(path, changed(records(noise=noise), **times(2.0)), python="3.13.0")
+    (step,) = found(path)
+    assert (step.case, step.engine, step.quantity, step.first, step.last) == ("first", "mujoco", "time", 9, 8)
+    assert step.started == "2026-11-09T03:00:00+00:00"
+    assert step.worse
+    assert step.now / step.before == pytest.approx(2.0, rel=0.1)
+    assert [str(each) for each in step.changes] == ["python 3.12.3 → 3.13.0", "commit 0808080808 → 0909090909"]
+
+
+def test_a_step_of_error_needs_one_run_and_names_the_output_that_moved_most(path):
+    nights(path, 3)
+    both = changed(changed(records(), **worse(20.0, "x")), **worse(200.0, "y"))
+    keep(path, [msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in both])
+    (step,) = found(path)
+    assert (step.quantity, step.output, step.first) == ("position", "y", 4)
+    assert step.now / step.before == pytest.approx(200.0, rel=1e-3)
+    assert str(step.changes[0]) == "mujoco 4.0.0 → 4.1.0"
+
+
+def test_an_outcome_has_a_first_bad_run_and_what_is_over_does_not_stand(path):
+    nights(path, 2)
+    for _ in range(2):
+        keep(path, changed(records(), outcome=Outcome.CRASHED, message="signal 11"))
+    assert [(each.quantity, each.first, each.worse) for each in found(path, standing=True)] == [("outcome", 3, True)]
+    nights(path, 1)
+    assert found(path, standing=True) == []
+    assert [(each.first, each.worse) for each in found(path)] == [(5, False), (3, True)]
+
+
+def test_slow_nights_are_no_step_of_time(path):
+    noise = random.Random(5)
+    for night in range(12):
+        keep(path, changed(records(noise=noise), **times(3.0 if night in (5, 10, 11) else 1.0)))
+    assert found(path) == []
+
+
+def test_the_present_bad_stretch_has_its_own_first_run_and_an_earlier_one_its_repair(path, capsys):
+    noise = random.Random(3)
+    for night in range(32):
+        keep(path, changed(records(noise=noise), **times(2.0 if night // 8 % 2 else 1.0)))
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
+        (25, True, None),
+        (17, False, None),
+        (9, True, 17),
+    ]
+    assert [(each.first, each.last) for each in found(path, standing=True)] == [(25, 24)]
+    assert main.main(["report", "--against", "20", "--history", str(path)]) == 1
+    said = capsys.readouterr().out
+    assert " · since run 25 |" in said
+    assert "ms a sweep since run 25 (" in said
+    assert "since run 9" not in said
+    assert main.main(["history", "--case", "first", "--engine", "mujoco", "--last", "0", "--history", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
+
+
+def test_what_is_only_partly_repaired_stands(path):
+    noise = random.Random(3)
+    for night in range(24):
+        keep(path, changed(records(noise=noise), **times((1.0, 8.0, 3.0)[night // 8])))
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [(17, False, None), (9, True, None)]
+    assert [each.first for each in found(path, standing=True)] == [9]
+
+
+def test_one_bad_night_of_error_is_a_step_and_its_repair(path):
+    for night in range(12):
+        keep(path, changed(records(), **worse(100.0 if night == 5 else 1.0)))
+    assert [(each.first, each.repaired) for each in found(path) if each.worse] == [(6, 7)]
+    assert found(path, standing=True) == []
+
+
+def test_outputs_that_became_worse_one_after_the_other_both_stand(path):
+    nights(path, 4)
+    for _ in range(4):
+        keep(path, changed(records(), **worse(100.0, "x")))
+    for _ in range(4):
+        keep(path, changed(changed(records(), **worse(100.0, "x")), **worse(50.0, "y")))
+    assert [(each.output, each.first) for each in found(path, standing=True)] == [("y", 9), ("x", 5)]
+
+
+def test_a_missing_engine_repairs_nothing(path):
+    nights(path, 2)
+    keep(path, changed(records(), outcome=Outcome.FAIL))
+    for _ in range(2):
+        keep(path, changed(records(), outcome=Outcome.UNAVAILABLE, seconds=None, errors={}))
+    assert [(each.first, each.repaired) for each in found(path, standing=True)] == [(3, None)]
+    nights(path, 1)
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [(6, False, None), (3, True, 6)]

@@ -1,0 +1,299 @@
+"""History: what was kept stays, whatever ends the run, the disk or the process; and files of another time or kind."""
+
+import os
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+from kincheck.core.harness.run import run
+from kincheck.core.history import schema
+from kincheck.core.history.process_identity import alive, owner
+from kincheck.core.history.run_recorder import keep
+from kincheck.core.history.store import HistoryError, Store
+
+from ..harness.test_workers import timeless
+from ..support.fakes import Fake, crank, off, partial, raising
+
+ROOT = Path(__file__).parents[2]
+TOL = 1e-12
+ENGINES = [
+    Fake("native"),
+    Fake("wrong", answer=off("velocity", lambda v: 1.1 * v)),
+    Fake("partial", answer=partial),
+    Fake("broken", answer=raising(ValueError("no"))),
+    Fake("missing", installed=None),
+]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "history.sqlite"
+
+
+def kept(path, cases, engines, *, resume=False, stop=None):
+    """A run in a history, which ends by force after so many records; the run's number and what it gave."""
+    keeping = keep(path, cases, engines, tol=TOL, command="kincheck run", settings={"jobs": 0}, resume=resume)
+
+    def made(record, done, total):
+        keeping.add(record)
+        if done == stop:
+            raise KeyboardInterrupt
+
+    try:
+        results = run(cases, engines, tol=TOL, progress=made, made=keeping.made, facts=keeping.facts)
+        keeping.end(results, interrupted=False)
+    except KeyboardInterrupt:
+        keeping.store.close()
+        return keeping, None
+    return keeping, results
+
+
+def test_a_run_is_read_as_it_was(path):
+    cases = [crank("a"), crank("b", reference=False)]
+    keeping, results = kept(path, cases, ENGINES)
+    with Store(path, writable=False) as store:
+        (row,) = store.runs()
+        assert store.results(keeping.run) == results
+        columns = "outcome, validated, version, build_seconds, warm_seconds, solved, json_extract(errors, '$.y.velocity.max_abs')"
+        query = f"SELECT {columns} FROM records WHERE case_name = 'a' AND engine = ?"
+        assert store.connection.execute(query, ["broken"]).fetchone()[:3] == ("error", 0, "1.2")
+        wrong = store.connection.execute(query, ["wrong"]).fetchone()
+        assert wrong[0] == "fail"
+        assert wrong[-1] == results.records[1].errors["y"].velocity.max_abs
+        assert wrong[4] == results.records[1].seconds.warm
+    assert (row.status, row.command) == ("finished", "kincheck run")
+    assert row.started <= row.finished
+    assert row.circumstances["calibration_seconds"] > 0
+    assert set(row.circumstances) >= {"host", "processor", "python", "numpy", "kincheck", "git", "jobs", "tol"}
+
+
+def test_references_are_there_once_however_many_runs_have_them(path):
+    for _ in range(3):
+        kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        assert store.connection.execute("SELECT count(*) FROM documents").fetchone() == (1,)
+        assert [row.id for row in store.runs()] == [3, 2, 1]
+        assert len({str(store.results(row.id).references) for row in store.runs()}) == 1
+
+
+def test_a_record_is_there_before_the_next_is_made(path):
+    keeping, _ = kept(path, [crank()], ENGINES, stop=2)
+    with Store(path, writable=False) as store:
+        assert [each.engine for each in store.records(keeping.run)] == ["native", "wrong"]
+        assert store.run(keeping.run).status == "running"
+        assert len(store.results(keeping.run).records) == 2
+
+
+def test_a_pair_is_never_there_twice(path):
+    keeping, results = kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        store.add_record(keeping.run, msgspec.structs.replace(results.records[0], message="again"))
+        assert store.records(keeping.run) == results.records
+
+
+@pytest.mark.parametrize("stop", range(1, 10))
+def test_a_run_that_was_stopped_goes_on_to_the_same_records(path, stop):
+    cases = [crank("a", reference=False), crank("b")]
+    undisturbed = run(cases, ENGINES, tol=TOL)
+    first, _ = kept(path, cases, ENGINES, stop=stop)
+    solved = [engine.solves for engine in ENGINES]
+    second, results = kept(path, cases, ENGINES, resume=True)
+    assert second.run == first.run
+    assert second.resumed
+    assert len(second.made) == stop
+    assert (ENGINES[0].solves == solved[0]) is (stop > 5)  # both native answers are there from then on
+    assert timeless(results.records) == timeless(undisturbed.records)
+    assert results.run == second.facts | {"engines": undisturbed.run["engines"]}
+    with Store(path) as store:
+        assert store.results(second.run) == results
+        assert store.run(second.run).status == "finished"
+
+
+def test_only_the_same_run_without_an_end_is_resumed(path, monkeypatch):
+    case = crank()
+    stopped, _ = kept(path, [case], ENGINES, stop=1)
+    others = {
+        "case": ([replace(case, name="other")], ENGINES),
+        "grid": ([replace(case, sweep=replace(case.sweep, values=case.sweep.values * (1 + 1e-16) + 1e-17))], ENGINES),
+        "engines": ([case], ENGINES[:-1]),
+    }
+    for cases, engines in others.values():
+        assert not kept(path, cases, engines, resume=True)[0].resumed
+    for git in ({"commit": "b" * 40, "changed": False}, None):
+        with monkeypatch.context() as elsewhere:
+            elsewhere.setattr("kincheck.core.harness.provenance.git_state", lambda _, git=git: git)
+            assert not kept(path, [case], ENGINES, resume=True)[0].resumed  # other code may give other records
+    assert kept(path, [crank()], ENGINES, resume=True)[0].run == stopped.run  # equal, and made anew
+    assert not kept(path, [case], ENGINES, resume=True)[0].resumed  # it has an end now
+
+
+def test_a_run_is_not_taken_from_a_process_that_is_at_it(path):
+    with Store(path) as store:
+        run_number = store.begin_run("same", [], {"started": "now", "command": ""})
+        other = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+        with other:
+            theirs = owner().replace(f"|{os.getpid()}|", f"|{other.pid}|").rpartition("|")[0] + "|" + begun(other.pid)
+            assert alive(theirs)
+            store.connection.execute("UPDATE runs SET owner = ?", [theirs])
+            assert store.resume_run("same") is None
+            other.kill()
+            os.waitid(os.P_PID, other.pid, os.WEXITED | os.WNOWAIT)  # it has ended, and nobody has asked how
+            assert not alive(theirs)
+        assert not alive(theirs)
+        assert store.resume_run("same").id == run_number
+        # the number of a process is given again; when it began is not
+        store.connection.execute("UPDATE runs SET owner = ?", [owner() + "0"])
+        assert store.resume_run("same").id == run_number
+
+
+def begun(process):
+    return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[19]
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from kincheck.core.history.store import Store
+from kincheck.core.harness.run import run
+from tests.fakes import Fake, crank
+records = run([crank(f"c{k}") for k in range(40)], [Fake()], tol=1e-12).records
+with Store(Path(sys.argv[1])) as store:
+    number = store.begin_run("same", [(each.case, each.engine, each.mode) for each in records], {"started": "now", "command": ""})
+    for record in records:
+        store.add_record(number, record)
+    store.finish(number)
+    print(number, store.records(number) == records)
+"""
+
+
+def test_runs_at_once_do_not_disturb_each_other(path):
+    """From the making of the file on."""
+    writers = [
+        subprocess.Popen([sys.executable, "-c", WRITER, path], cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(3)
+    ]
+    said = [writer.communicate()[0].split() for writer in writers]
+    assert sorted(said) == [["1", "True"], ["2", "True"], ["3", "True"]]
+
+
+OPENERS = """
+import os, sys, time
+from pathlib import Path
+from kincheck.core.history.store import Store
+for k in range(80):
+    at, children = time.time() + 0.004, []
+    for c in range(4):
+        child = os.fork()
+        if not child:
+            while time.time() < at + 0.0007 * c:
+                pass
+            try:
+                with Store(Path(sys.argv[1]) / f"{k}.sqlite"):
+                    os._exit(0)
+            except BaseException as error:
+                print(error, flush=True)
+                os._exit(1)
+        children.append(child)
+    for child in children:
+        os.waitpid(child, 0)
+"""
+
+
+def test_a_new_file_is_opened_by_several_at_once(tmp_path):
+    """A thousandth of a second apart, while one of them is making the tables."""
+    ran = subprocess.run([sys.executable, "-c", OPENERS, tmp_path], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert ran.stdout == ""
+    assert len(list(tmp_path.glob("*.sqlite"))) == 80
+
+
+# Files of another time or kind
+
+
+def test_an_older_file_is_migrated_and_keeps_its_data(path, monkeypatch):
+    keeping, results = kept(path, [crank()], ENGINES)
+    later = "ALTER TABLE runs ADD COLUMN note TEXT; UPDATE runs SET note = 'kept; too';"
+    monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, later))
+    with Store(path) as store:
+        assert store.results(keeping.run) == results
+        assert store.connection.execute("SELECT note FROM runs").fetchall() == [("kept; too",)]
+        assert store.connection.execute("PRAGMA user_version").fetchone() == (len(schema.MIGRATIONS),)
+
+
+def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
+    keeping, results = kept(path, [crank()], ENGINES)
+    with monkeypatch.context() as patch:
+        patch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"))
+        with pytest.raises(HistoryError, match="table runs already exists"):
+            Store(path)
+    with Store(path) as store:
+        assert store.results(keeping.run) == results
+
+
+def test_a_file_of_a_later_version_is_left_alone(path):
+    kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        store.connection.execute("PRAGMA user_version = 99")
+    for writable in (True, False):
+        with pytest.raises(HistoryError, match=r"schema is version 99, this kincheck knows \d+; update kincheck"):
+            Store(path, writable=writable)
+
+
+def test_a_file_of_another_program_is_left_alone(path):
+    other = sqlite3.connect(path)
+    other.execute("CREATE TABLE bookmarks (url TEXT)")
+    other.close()
+    before = path.read_bytes()
+    with pytest.raises(HistoryError, match="a database of another program; give another file"):
+        Store(path)
+    assert path.read_bytes() == before
+    path.write_bytes(b"not a database at all" * 100)
+    with pytest.raises(HistoryError, match="file is not a database; give another file"):
+        Store(path)
+
+
+def test_places_that_cannot_be_are_messages(tmp_path):
+    with pytest.raises(HistoryError, match="unable to open database file; give a file in a folder that exists"):
+        Store(tmp_path / "no" / "history.sqlite")
+    with pytest.raises(HistoryError, match="there is no such file"):
+        Store(tmp_path / "none.sqlite", writable=False)
+    with Store(tmp_path / "empty.sqlite") as store, pytest.raises(HistoryError, match="there is no run 7"):
+        store.results(7)
+
+
+def test_a_damaged_record_is_a_message(path):
+    keeping, _ = kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        store.connection.execute("UPDATE records SET record = x'00'")
+        with pytest.raises(HistoryError, match="cannot be read"):
+            store.records(keeping.run)
+
+
+# Disks
+
+
+def full_after(path, pages):
+    """A history file that can grow by so many pages: SQLite then says what it says of a full disk."""
+    store = Store(path)
+    (count,) = store.connection.execute("PRAGMA page_count").fetchone()
+    store.connection.execute(f"PRAGMA max_page_count = {count + pages}")
+    return store
+
+
+def test_a_full_disk_is_a_message_and_what_was_kept_stays(path):
+    cases = [crank(f"c{k}") for k in range(40)]
+    keeping = keep(path, cases, ENGINES[:1], tol=TOL, command="", settings={}, resume=False)
+    keeping.store.close()
+    keeping.store = full_after(path, pages=8)
+    results = run(cases, ENGINES[:1], tol=TOL, progress=lambda record, *_: keeping.add(record))
+    keeping.end(results, interrupted=False)
+    (problem,) = keeping.problems
+    assert problem.startswith(f"history {path}: cannot be written: database or disk is full; make room; the records before ")
+    assert len(results.records) == 40  # the run went on
+    with Store(path) as store:
+        found = store.records(keeping.run)
+        assert 0 < len(found) < 40
+        assert found == results.records[: len(found)]
+        assert store.connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)

@@ -1,0 +1,274 @@
+"""Components solved one after the other: the same motions as all at once, whatever the mechanism, and programs are shared."""
+
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, SolveError, solve
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.kinematics.by_components.block_solver import WORST, Cascade
+from kincheck.core.kinematics.by_components.sweep import LANES, CascadeSweep
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.motion_start import start_of
+from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request, accept_by
+from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.continuation.step_halving import HALVINGS, part_of_step
+from kincheck.core.kinematics.continuation.sweep import follow
+from kincheck.core.mechanism.motions import Path, Ramp, Sine
+from kincheck.core.program import MARGIN
+
+from ..support.mechanisms import four_bar, mcpherson, slider_crank
+from .test_chain import LEAN, chain
+
+
+def both(mechanism, path, points, *, compiled=True):
+    bodies = tuple(body.name for body in mechanism.moving)
+    request = Request(tuple(path.motions), points, bodies, compiled=compiled)
+    cascade = CascadeSweep(Cascade(mechanism, request), path)
+    return cascade.solve(1e-12), follow(Route(compile_model(mechanism, request), path), 1e-12)
+
+
+def assert_alike(found, expected):
+    assert found.solved.all(), found.message
+    assert expected.solved.all()
+    for name, motion in expected.bodies.items():
+        # two orders of elimination: round-off of one times the condition, once more for each derivative (library: below 100)
+        for label, limit in (("r", 1e-14), ("p", 1e-14), ("v", 1e-13), ("a", 3e-12)):
+            assert np.abs(getattr(found.bodies[name], label) - getattr(motion, label)).max() <= limit
+    for name, motion in expected.points.items():
+        assert np.abs(found.points[name].acceleration - motion.acceleration).max() <= 3e-12
+    assert [found.details[name] for name in ("rank", "dof")] == [expected.details[name] for name in ("rank", "dof")]
+
+
+# the redundant, the open loop of several, several drivers, a sweep that does not start at the design
+@pytest.mark.parametrize("name", ["andrews_squeezer", "mcpherson_steered", "four_bar", "rssr", "delta_robot", "bricard"])
+def test_components_give_what_one_program_gives(name):
+    case = cases.load(name)
+    assert_alike(*both(case.mechanism, case.sweep.path, case.points))
+
+
+def test_numpy_runs_components_too():
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-1.0, 1.0, 9))
+    assert_alike(*both(chain(3), path, ("end",), compiled=False))
+
+
+@pytest.mark.parametrize(
+    "times", [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 70)[::-1], np.zeros(1)], ids=["far", "back", "one"]
+)
+def test_any_samples(times):
+    for mechanism, driver in ((slider_crank(), "turn"), (four_bar(), "turn")):
+        points = tuple(point.name for point in mechanism.points)
+        assert_alike(*both(mechanism, Path({driver: Ramp(2.0)}, times), points))
+
+
+@pytest.mark.parametrize("first", [-7.0, 0.0, 3.0, 1000.0])
+def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
+    """The drivers go there in a second of their own; the path's own time may be any."""
+    mechanism, path = chain(3), Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5))
+    assert not start_of(chain(3), path).stands
+    assert_alike(*both(mechanism, path, ("end",)))
+
+
+def test_a_singular_pose_on_the_way_to_the_first_sample_is_told_every_time():
+    path = Path({"turn": Sine(2.4, 1e-2, np.pi / 2.0)}, np.linspace(2.0, 3.0, 5))
+    sweep = CascadeSweep(Cascade(chain(6), Request(("turn",), ("end",))), path)
+    told = [sweep.solve(1e-12).details["notes"] for _ in range(2)]
+    assert told[0] == told[1]
+    assert "crosses a singular pose near turn = 1.870" in told[0][0]
+
+
+def test_what_is_fixed_stands_still_beside_many_components():
+    m = chain(2)
+    still = Body("frame", fixed=True, origin=(0.5, 0.0, 0.0))
+    m = type(m)(m.name, [*m.bodies, still], m.joints, [*m.points, Point("mark", "frame", (1.0, 2.0, 3.0))], m.drivers)
+    request, path = Request(("turn",), ("mark",), ("frame",)), Path({"turn": Ramp(1.0)}, np.array([0.0, 0.2, LEAN + np.pi / 2.0]))
+    found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
+    assert found.solved.tolist() == [True, True, False]
+    mark, frame = found.points["mark"], found.bodies["frame"]
+    given = mark.position, mark.velocity, mark.acceleration, frame.r, frame.p, frame.v, frame.a
+    expected = (1.0, 2.0, 3.0), [0.0] * 3, [0.0] * 3, (0.5, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), [0.0] * 6, [0.0] * 6
+    for values, wanted in zip(given, expected, strict=True):
+        assert np.array_equal(values[:2], [wanted] * 2)
+        assert np.isnan(values[2]).all()
+
+
+def test_components_iterate_no_more_than_is_asked_for():
+    path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.2, 9))
+    once = Request(("turn",), ("end",), last_iteration=np.inf)
+    found = CascadeSweep(Cascade(chain(3), once), path).solve(np.inf)
+    assert (found.iterations == 1).all()
+    assert found.residual > 1e-10
+
+
+def test_components_built_alike_share_a_program():
+    cascade = Cascade(chain(40), Request(("turn",), ("end",)))
+    assert len(cascade.parts) == 41
+    assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]  # the crank, the one with the point, all others
+    assert cascade.largest == 12
+
+
+def test_a_chain_of_two_hundred_loops_closes_to_round_off():
+    loops = 200
+    turn = np.linspace(-0.3, 0.3, 33)
+    found = CascadeSweep(Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    assert found.solved.all(), found.message
+    assert found.residual <= 1e-15
+    # the end is two hundred metres away: its coordinates round at 1.4e-14 m
+    expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    assert np.abs(found.points["end"].position - expected).max() <= 3e-14
+
+
+def test_an_end_of_the_travel_is_told_with_the_component():
+    mechanism = mcpherson()
+    values = np.linspace(0.0, 0.4, 41)
+    sweep = CascadeSweep(Cascade(mechanism, Request(("stroke",), ("wheel",))), Path({"stroke": Ramp(1.0)}, values))
+    found = sweep.solve(1e-12)
+    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
+    assert np.isnan(found.points["wheel"].position[~found.solved]).all()
+    assert "cannot be followed beyond stroke = 0.293" in found.message
+    assert "knuckle" in found.message
+    assert "; last reachable sample at stroke = 0.29; shorten the sweep" in found.message
+    assert np.array_equal(sweep.solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True)
+
+
+def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
+    """The second of two four-bars, which cannot turn on; the first one's crank can, and its residuals are no larger."""
+    links = {"rod0": (4.0, 3.2, 2.6, 1.0, 1.0), "rod1": (4.0, 3.0, 1.5, 2.0, 1.3)}  # ground, rod, rocker, crank, angle
+    axis = (0.0, 0.0, 1.0)
+    bodies, joints, start = [Body("crank")], [Revolute("turn", "ground", "crank", (0.0, 0.0, 0.0), axis)], 0.0
+    carrier = "crank"
+    for k, (rod, (ground, long, rocker, crank, angle)) in enumerate(links.items()):
+        a, c = np.array([start, 0.0]) + crank * np.array([np.cos(angle), np.sin(angle)]), np.array([start + ground, 0.0])
+        apart = c - a
+        along = (apart @ apart + long**2 - rocker**2) / (2.0 * (apart @ apart))
+        off = np.sqrt(long**2 / (apart @ apart) - along**2)
+        b = a + along * apart + off * np.array([-apart[1], apart[0]])
+        bodies += [Body(rod), Body(f"rocker{k}")]
+        ends = ((f"a{k}", carrier, rod, a), (f"b{k}", rod, f"rocker{k}", b), (f"c{k}", "ground", f"rocker{k}", c))
+        joints += [Revolute(name, i, j, (*map(float, place), 0.0), axis) for name, i, j, place in ends]
+        carrier, start = f"rocker{k}", start + ground
+    mechanism = Mechanism("two loops", bodies, joints, [Point("end", carrier, (start, 0.0, 0.0))], [JointAngle("turn", "turn")])
+    cascade = Cascade(mechanism, Request(("turn",), ("end",)))
+    for values in (np.linspace(0.0, 6.0, 31), [0.0, 3.0], [0.1, 2.0, 4.0]):
+        found = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.array(values))).solve(1e-12)
+        assert not found.solved.all()
+        assert "the component of rod1, rocker1 is the nearest to singular" in found.message
+
+
+def test_what_it_cannot_take_apart_is_refused():
+    m = chain(2)
+    coupled = type(m)(m.name, m.bodies, m.joints, m.points, m.drivers, [Gear("gear", ("pivot0", "pivot1"), ratio=1.0)])
+    with pytest.raises(SolveError, match="couplers"):
+        Cascade(coupled, Request(("turn",), ()))
+    free = type(m)(m.name, m.bodies, m.joints, m.points, [])
+    with pytest.raises(SolveError, match="not driven enough"):
+        Cascade(free, Request((), ()))
+    assert isinstance(m.drivers[0], JointAngle)
+
+
+def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
+    """Every loop may fold there; that the motion goes on is said."""
+    loops, turn = 20, np.linspace(-0.1, 2.4, 26)
+    found = CascadeSweep(Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    assert found.solved.all(), found.message
+    expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    # every loop adds its rounding, over the sine of how far its links are from in line
+    rounding = 4.0 * loops * np.finfo(float).eps / np.abs(np.cos(turn - LEAN))
+    assert (np.abs(found.points["end"].position - expected).max(axis=1) <= rounding).all()
+    (note,) = found.details["notes"]
+    assert "crosses a singular pose near turn = 1.870" in note
+
+
+def test_a_sample_where_the_links_are_in_line_is_refused():
+    turn = np.array([0.0, 1.8, LEAN + np.pi / 2.0, 1.9, 2.4])
+    found = CascadeSweep(Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    assert found.solved.tolist() == [True, True, False, True, True]
+    assert "refused at turn = 1.87079633: so near a singular pose" in found.message
+    alone = CascadeSweep(Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn[2:3])).solve(1e-12)
+    assert not alone.solved.any()
+    assert np.isnan([alone.residual, alone.details["smallest_singular_value"]]).all()  # nothing was found, which is not zero
+
+
+@pytest.mark.parametrize("name", ["kite", "four_bar_in_one_step"])
+def test_a_narrow_gap_is_not_stepped_over(name):
+    """The sample is beyond a gap, or a corner, of less than a thousandth of the step."""
+    case = load_case(File(__file__).parents[1] / "data" / "stress" / f"{name}.toml")
+    found, expected = both(case.mechanism, case.sweep.path, case.points)
+    if expected.solved.all():
+        assert_alike(found, expected)
+    else:
+        assert not found.solved.any()
+        assert "cannot be followed beyond" in found.message
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
+    path, request = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)), Request(("turn",), ("end",), compiled=compiled)
+    cascade = Cascade(chain(3), request)
+    for count in (LANES, 5):  # all that there are, or the last ones are as the last
+        going, carrying = (CascadeSweep(cascade, path) for _ in range(2))
+        for sweep in (going, carrying):
+            lanes = sweep._lanes
+            lanes.anchor = sweep._departure[0]
+            lanes.accept_by(accept_by(1e-12))
+            for first in (0.0, 0.1, 0.2):  # there and back again
+                assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), path) > 0.0).all()
+                if sweep is going:
+                    lanes.go_on()
+                else:
+                    lanes.carry(count - 1)
+        for a, b in zip(going._lanes.anchor, carrying._lanes.anchor, strict=True):
+            np.testing.assert_array_equal(a, b)
+        model = cascade.kinds[0].model
+        assert going._lanes.anchor[0][0, [*model.plan.fixed].index(model.slots[FROM + TIME])] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("part", range(4))
+def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
+    """The first, which is driven, any of those that are alike, and the last; what is not a number is the worst of all."""
+    path, request = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)), Request(("turn",), ("end",), compiled=compiled)
+    cascade = Cascade(chain(3), request)
+    sweep = CascadeSweep(cascade, path)
+    lanes, times = sweep._lanes, np.linspace(0.005, 0.1, LANES)
+    lanes.anchor = sweep._departure[0]
+    lanes.accept_by(accept_by(1e-12))
+    assert len(cascade.parts) == 4
+    assert (lanes.attempt(times, path) > 0.0).all()
+    np.testing.assert_array_equal(lanes.worst[WORST.index("closure")], lanes.each("closure").max(axis=0))
+    np.testing.assert_array_equal(lanes.worst[WORST.index(SIGMA)], lanes.each(SIGMA).min(axis=0))
+    kind, member = cascade.place[part]
+    anchor, model = lanes.anchor, kind.model
+    column = [*model.plan.fixed].index(model.vectors[FROM + "q b0"][0])
+    anchor[cascade.kinds.index(kind)][member, column] = np.nan
+    lanes.anchor = anchor
+    assert not (lanes.attempt(times, path) > 0.0).any()
+    for name in ("closure", MARGIN):
+        assert np.isnan(lanes.worst[WORST.index(name)]).all()
+
+
+def test_nothing_may_be_wanted():
+    found = solve(chain(30), "turn", np.linspace(0.0, 0.3, 5), points=())
+    assert found.details["components"] == 31
+    assert found.solved.all()
+    assert not found.points
+
+
+@pytest.mark.parametrize("lanes", [8, 16])
+@pytest.mark.parametrize("part", [1, 2, 7, 8, 9, 14, 15, 16, 17, 30, 31, 39])
+def test_a_step_is_divided_as_often_whatever_the_lanes(part, lanes):
+    """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is not reached."""
+    tried = list[np.ndarray]()
+
+    def attempt(times):
+        assert len(times) == lanes
+        tried.append(times)
+        return np.where(times - 1.0 <= 2.0**-part, 1.0, -1.0)
+
+    lane, time = part_of_step(1.0, 2.0, attempt, lanes)
+    assert time == 1.0 + 2.0**-part == tried[-1][lane]
+    # that of which no half is tried is no part
+    last = lambda times: tried.append(times) or np.where(times - 1.0 <= 2.0**-HALVINGS, 1.0, -1.0)  # noqa: E731
+    assert part_of_step(1.0, 2.0, last, lanes) is None
+    assert tried[-1][-1] <= 1.0 + 2.0**-HALVINGS

@@ -1,0 +1,45 @@
+"""A chain of N four-bar loops (IFToMM A02: parallel unit cranks): right at any length, and its cost grows by the loop."""
+
+import numpy as np
+import pytest
+from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, Spherical, Universal, solve
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import Request
+
+LEAN = 0.3
+"""Of the cranks at design [rad]; at a right angle from upright the chain is singular."""
+
+
+def chain(loops, lean=LEAN):
+    """Cranks at (k, 0) that lean alike, tied by couplers of length one; only the first is driven."""
+    s, c, n = np.sin(lean), np.cos(lean), range(loops)
+    cranks = [Revolute(f"pivot{k}", "ground", f"crank{k}", (k, 0.0, 0.0), (0.0, 0.0, 1.0)) for k in range(loops + 1)]
+    balls = [Spherical(f"ball{k}", f"crank{k}", f"coupler{k}", (k + s, c, 0.0)) for k in n]
+    crosses = [
+        Universal(f"cross{k}", f"crank{k + 1}", f"coupler{k}", (k + 1 + s, c, 0.0), ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))) for k in n
+    ]
+    return Mechanism(
+        "chain",
+        [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)],
+        [*cranks, *balls, *crosses],
+        [Point("end", f"crank{loops}", (loops + s, c, 0.0))],
+        [JointAngle("turn", "pivot0")],
+    )
+
+
+@pytest.mark.parametrize("loops", [1, 5])
+def test_the_last_crank_turns_as_the_first(loops):
+    turn = np.linspace(-np.pi, np.pi, 37)  # through the change points, where the loops could fold over
+    found = solve(chain(loops), "turn", turn)
+    assert found.solved.all(), found.message
+    expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    # round-off grows with the length of the chain, and by the condition near the change points, sampled no nearer than 0.1 rad
+    assert np.abs(found.points["end"].position - expected).max() <= 1e-13 * loops
+
+
+def test_every_loop_costs_the_same():
+    flops = []
+    for loops in (4, 8, 12):
+        sizes = compile_model(chain(loops), Request(("turn",), (), compiled=False)).sizes
+        flops.append([sizes[name]["flops"] for name in ("newton", "outputs")])
+    assert np.diff(flops, axis=0)[0].tolist() == np.diff(flops, axis=0)[1].tolist()

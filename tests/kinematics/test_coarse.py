@@ -1,0 +1,90 @@
+"""Coarse sweeps are gone in parts of their steps: to the samples of a closed form, by whichever parts are small enough."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.continuation import walk
+from kincheck.core.kinematics.continuation.sweep import sweep
+from kincheck.core.kinematics.continuation.walk import FINER, Marcher
+from kincheck.core.mechanism.motions import Path, Ramp
+
+from ..support.mechanisms import slider_crank, slider_crank_motion
+
+COARSE = {
+    "a turn in six": np.linspace(0.0, 2.0 * np.pi, 7),
+    "turns of three radians": np.linspace(-12.0, 12.0, 9),
+    "one step of six turns": np.array([12.0 * np.pi]),
+    "in no order, and twice the same": np.array([5.0, -4.0, 0.0, 2.5, 5.0, -1.0]),
+    "small steps, then large": np.concatenate([np.linspace(0.0, 0.1, 40), np.linspace(2.0, 9.0, 5)]),
+}
+"""Angles of the crank, measured from the design position."""
+
+
+@cache
+def model(compiled):
+    return compile_model(slider_crank(), Request(("turn",), ("end",), compiled=compiled))
+
+
+def swept(values, *, compiled=True):
+    """Along a route of its own: what is made ready for one that was solved before is kept with it."""
+    return sweep(model(compiled), Path({"turn": Ramp(1.0)}, np.asarray(values)), 1e-12)
+
+
+def assert_right(found, values):
+    """Every sample is there, with position, velocity and acceleration of the closed form."""
+    assert found.solved.all()
+    assert not found.message
+    assert found.residual <= 1e-15
+    end, x = found.points["end"], slider_crank_motion(values)
+    motions = zip((end.position, end.velocity, end.acceleration), (x.x, x.v, x.a), strict=True)
+    assert max(np.abs(each[:, 0] - truth).max() for each, truth in motions) <= 1e-14
+
+
+@pytest.fixture
+def divided(monkeypatch):
+    """The steps of which parts were looked for one by one."""
+    aims, divide = list[float](), Marcher._divide
+    monkeypatch.setattr(Marcher, "_divide", lambda self, anchor, aim, *rest: aims.append(aim) or divide(self, anchor, aim, *rest))
+    return aims
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
+def test_a_coarse_sweep_goes_in_equal_parts(values, compiled, divided):
+    assert_right(swept(values, compiled=compiled), values)
+    assert not divided
+
+
+@pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
+def test_or_in_parts_that_are_looked_for_one_by_one(values, divided, monkeypatch):
+    monkeypatch.setattr(walk, "FINER", ())
+    assert_right(swept(values), values)
+    assert divided
+
+
+def test_a_step_too_long_for_all_equal_parts_is_divided(divided, monkeypatch):
+    """Its parts are of more than a radian."""
+    value = np.array([1.2 * FINER[1]])
+    assert_right(swept(value), value)
+    assert not divided
+    monkeypatch.setattr(walk, "FINER", FINER[:2])
+    assert_right(swept(value), value)
+    assert divided
+
+
+def test_longer_sweeps_than_are_kept_ready_are_divided(divided, monkeypatch):
+    monkeypatch.setattr(walk, "ROOM", 8)
+    values = np.array([0.0, 6.0])
+    assert_right(swept(values), values)
+    assert divided
+
+
+def test_the_worst_is_of_the_samples_that_were_asked_for():
+    """Not of the poses between, which are nearer to singular."""
+    whole, least = 2.0 * np.pi, "smallest_singular_value"
+    assert swept(np.linspace(0.0, whole, 41)).details[least] < 0.97
+    assert swept([0.0, whole]).details[least] == pytest.approx(1.0, abs=1e-12)
+    assert swept([0.0, 2.5 * np.pi]).details[least] < 0.97

@@ -1,0 +1,229 @@
+"""One mechanism solved again and again is made ready once."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from gc import collect
+from threading import Thread
+from weakref import WeakSet
+
+import numpy as np
+import pytest
+from kincheck.core import Revolute, Spherical, solve, solve_designs
+from kincheck.core.kinematics.by_components import block_solver
+from kincheck.core.kinematics.by_components import sweep as cascade_sweep
+from kincheck.core.kinematics.compiled import compiled_model, samples
+from kincheck.core.kinematics.compiled.thread_cache import ThreadCache
+from kincheck.core.kinematics.continuation import walk
+from kincheck.core.kinematics.solver_selection import prepare
+from kincheck.core.kinematics.sparse import sparse_model as sparse
+from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
+from kincheck.core.studies.bench.size import circle
+
+from ..support.mechanisms import mcpherson
+from .test_chain import chain
+
+STROKES = np.linspace(-0.05, 0.05, 21)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """The requests that models were made for."""
+    requests, make = [], compiled_model.compile_model
+    monkeypatch.setattr(compiled_model, "compile_model", lambda *given: (requests.append(given[1]), make(*given))[1])
+    return requests
+
+
+def test_the_same_mechanism_and_request_need_one_model(made):
+    first = solve(mcpherson(), "stroke", STROKES).points["wheel"]
+    was = first.position.copy()
+    other = solve(mcpherson(), "stroke", STROKES[::-1] / 2.0).points["wheel"]
+    again = solve(mcpherson(), "stroke", STROKES).points["wheel"]
+    assert len(made) == 1
+    np.testing.assert_array_equal(first.position, was)
+    np.testing.assert_array_equal(again.position, was)
+    assert np.abs(other.position - was[::-1]).max() > 1e-3
+    solve(mcpherson(), "stroke", STROKES, order=0)
+    wheel = mcpherson().point("wheel").position
+    higher = replace(mcpherson().point("wheel"), position=(*wheel[:2], wheel[2] + 0.01))
+    moved = solve(replace(mcpherson(), points=[higher]), "stroke", STROKES).points["wheel"]
+    assert len(made) == 3
+    assert np.abs(moved.position - was).max() > 1e-3
+
+
+def test_designs_too(made):
+    place = "points.wheel.position"
+    values = {place: np.array([mcpherson().point("wheel").position, (0.1, 0.7, 0.3)])}
+    first, again = (solve_designs(mcpherson(), "stroke", STROKES, values).points["wheel"].position for _ in range(2))
+    assert len(made) == 1
+    np.testing.assert_array_equal(first, again)
+
+
+def test_threads_share_it():
+    alone = solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy()
+    with ThreadPoolExecutor(4) as threads:
+        for found in threads.map(lambda _: solve(mcpherson(), "stroke", STROKES), range(24)):
+            np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
+
+
+@pytest.fixture
+def swept(monkeypatch):
+    """What was made of paths through components."""
+    sweeps, make = [], cascade_sweep.CascadeSweep.__init__
+    monkeypatch.setattr(cascade_sweep.CascadeSweep, "__init__", lambda self, *given: (sweeps.append(self), make(self, *given))[1])
+    return sweeps
+
+
+def test_of_a_chain_the_last_path_is_kept(swept):
+    turn, half = np.linspace(-0.1, 0.2, 9), np.linspace(-0.1, 0.05, 9)
+    found = []
+    for values, number in ((turn, 1), (turn, 1), (half, 2), (turn, 3)):
+        found.append(solve(chain(12), "turn", values).points["end"].acceleration)
+        assert len(swept) == number
+    for each in (found[1], found[3]):
+        np.testing.assert_array_equal(each, found[0])
+
+
+def test_threads_take_turns_at_a_chain_and_each_keeps_its_own(swept):
+    turn = np.linspace(-0.1, 0.2, 9)
+    with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
+        found = [pool.submit(solve, chain(12), "turn", turn).result() for pool in (one, other, one, other)]
+    assert len(swept) == 2
+    for each in found[1:]:
+        np.testing.assert_array_equal(each.points["end"].acceleration, found[0].points["end"].acceleration)
+
+
+def test_large_mechanisms_follow_motions_of_a_users_own_anew(swept):
+    @dataclass(frozen=True)
+    class Mine(Motion):
+        def at(self, t):
+            return t, 1.0 + 0.0 * t, 0.0 * t
+
+    request, times = samples.Request(("turn",), ("end",)), np.linspace(0.0, 0.1, 5)
+    for number in (1, 2):
+        assert prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).solved.all()
+        assert len(swept) == number
+
+
+@pytest.mark.usefixtures("own_joint_types")
+def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
+    @dataclass(frozen=True)
+    class Hinge(Revolute):
+        type = "hinge_of_mine"
+
+    made, make = [], block_solver.Cascade.__init__
+    monkeypatch.setattr(block_solver.Cascade, "__init__", lambda self, *given: (made.append(self), make(self, *given))[1])
+    mechanism = chain(12)
+    joints = [Hinge(j.name, j.i, j.j, j.point, j.axis) if type(j) is Revolute else j for j in mechanism.joints]
+    for number in (1, 2):
+        assert solve(replace(mechanism, joints=joints), "turn", [0.0, 0.1]).solved.all()
+        assert len(made) == number
+
+
+@pytest.mark.usefixtures("own_joint_types")
+def test_joints_of_a_users_own_are_made_anew(made):
+    """They may be equal, and yet not mean the same."""
+
+    @dataclass(frozen=True)
+    class Ball(Spherical):
+        type = "ball_of_mine"
+
+    joints = [Ball(j.name, j.i, j.j, j.point) if type(j) is Spherical else j for j in mcpherson().joints]
+    assert any(type(j) is Ball for j in joints)
+    for _ in range(2):
+        assert solve(replace(mcpherson(), joints=joints), "stroke", STROKES).solved.all()
+    assert len(made) == 2
+
+
+@pytest.fixture
+def bound(monkeypatch):
+    """What was bound to lanes, a route each."""
+    routes, bind = [], walk.Marcher.__init__
+    monkeypatch.setattr(walk.Marcher, "__init__", lambda self, *given: (routes.append(given[0]), bind(self, *given))[1])
+    return routes
+
+
+def test_the_same_samples_are_laid_out_once(bound):
+    first, again = (solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy() for _ in range(2))
+    assert len(bound) == 1
+    np.testing.assert_array_equal(first, again)
+    for k, other in enumerate([{"values": STROKES[:-1]}, {"rate": 2.0}, {"values": STROKES + 1e-15}, {"order": 1}], start=2):
+        solve(mcpherson(), "stroke", **({"values": STROKES} | other))
+        assert len(bound) == k
+
+
+def test_samples_of_the_users_may_change_afterwards():
+    strokes = STROKES.copy()
+    far = solve(mcpherson(), "stroke", strokes).points["wheel"].position[0].copy()
+    strokes *= 0.5
+    near = solve(mcpherson(), "stroke", strokes).points["wheel"].position
+    assert np.abs(near[0] - far).max() > 1e-3
+    np.testing.assert_array_equal(solve(mcpherson(), "stroke", STROKES).points["wheel"].position[0], far)
+
+
+def test_motions_of_a_users_own_are_followed_anew(bound):
+    """They may be equal, and yet not mean the same."""
+
+    @dataclass(frozen=True)
+    class Mine(Motion):
+        def at(self, t):
+            return 0.0 * t, 0.0 * t, 0.0 * t
+
+    assert Path({}, np.ones(2)) == Path({}, np.ones(2)) != Path({}, np.ones(3))
+    assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})  # their messages differ
+    for motion in (Mine(), Absolute(Mine(), 0.0)):
+        assert not Path({"steer": motion}, np.ones(1)).ours
+    assert not Path({"steer": Ramp(np.array(1.0))}, np.ones(1)).ours  # whoever has it may change it
+    for motion in (Ramp(1.0), Absolute(Sine(1.0, 1.0, 0.0), 0.2), Table(np.arange(2.0), [0.0, 1.0])):
+        assert Path({"steer": motion}, np.ones(1)).ours
+    request = samples.Request(("stroke",), ("wheel",))
+    for number in (1, 2):
+        path = Path({"stroke": Mine()}, STROKES)
+        walk.march(samples.recent_route(mcpherson(), request, path), 1e-12)
+        assert len(bound) == number
+
+
+def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
+    monkeypatch.setattr(samples, "LONGEST_KEPT", 20)
+    for number in (1, 2):
+        solve(mcpherson(), "stroke", STROKES)
+        assert len(bound) == number
+
+
+@pytest.mark.parametrize(
+    ("large", "kind"), [(chain(12), (block_solver.Cascade, "__init__")), (circle(21).mechanism, (sparse.SparseModel, "__init__"))]
+)
+def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
+    made, make = [], getattr(*kind)
+    monkeypatch.setattr(*kind, lambda self, *given, **named: (made.append(given[0]), make(self, *given, **named))[1])
+    values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
+    first = solve(large, driver, values).points
+    other = solve(large, driver, values[::2]).points
+    again = solve(large, driver, values).points
+    assert len(made) == 1
+    for name, motion in first.items():
+        np.testing.assert_array_equal(again[name].acceleration, motion.acceleration)
+        # predicted from other samples: round-off, by the condition and once more for each derivative
+        assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-10
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(solve, large, driver, values).result()
+    assert len(made) == 2
+
+
+def test_what_was_made_for_a_thread_goes_with_it():
+    bound = ThreadCache()
+    made = WeakSet()
+
+    class Made:
+        pass
+
+    def ask():
+        one, other = (bound("key", Made) for _ in range(2))
+        assert one is other
+        made.add(one)
+
+    ask()
+    thread = Thread(target=ask)
+    thread.start()
+    thread.join()
+    collect()
+    assert len(made) == 1

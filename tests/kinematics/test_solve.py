@@ -1,0 +1,287 @@
+"""The McPherson strut against its 40-digit reference and against the paper's unsimplified equations; what is asked is computed."""
+
+import pickle
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, SolveError, Translational, Universal
+from kincheck.core.joints import Cylindrical, Screw
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import RATE, RATE_T, Request
+from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics.solve import solve
+from kincheck.core.mechanism.motions import Ramp
+from kincheck.core.trajectory import Motions, PointMotion
+
+from ..oracles import naive
+from ..support.mechanisms import four_bar, mcpherson, slider_crank, swapped, without_fixed_bodies
+
+STROKES = np.linspace(-0.08, 0.08, 161)
+MOVING = ("lca", "knuckle", "strut")
+
+
+@cache
+def reference():
+    """Columns by name, shape (161,) each."""
+    table = np.genfromtxt(Path(__file__).parents[1] / "data" / "mcpherson_reference.csv", delimiter=",", names=True, skip_header=2)
+    assert table.shape == (161,)
+    return {name: table[name] for name in table.dtype.names}
+
+
+@cache
+def solution(style="native"):
+    found = solve(mcpherson(), "stroke", STROKES, bodies=MOVING, style=style)
+    assert found.solved.all()
+    return found
+
+
+def deviation(found, *columns):
+    return np.abs(found - np.column_stack([reference()[name] for name in columns])).max()
+
+
+# Against the reference
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+def test_wheel_against_the_reference(style):
+    """Round-off of numbers near one, amplified by the condition (36) and the second derivatives (3 1/m)."""
+    wheel = solution(style).points["wheel"]
+    assert deviation(wheel.position, "x_W", "y_W", "z_W") <= 5e-16
+    assert deviation(wheel.velocity[:, :2], "vx", "vy") <= 1e-14
+    assert deviation(wheel.acceleration[:, :2], "ax", "ay") <= 1e-13
+    assert np.abs(wheel.velocity[:, 2] - 1.0).max() <= 1e-15
+    assert np.abs(wheel.acceleration[:, 2]).max() <= 1e-14
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+def test_knuckle_against_the_reference(style):
+    """The body's own frame, in the paper's variables: its origin is the wheel centre."""
+    knuckle = solution(style).bodies["knuckle"]
+    assert deviation(knuckle.r, "x_W", "y_W", "z_W") <= 5e-16
+    assert deviation(knuckle.p, "e0", "e1", "e2", "e3") <= 1e-15
+    assert np.abs(np.linalg.norm(knuckle.p, axis=1) - 1.0).max() <= 5e-16
+
+
+def test_iterations_and_residual():
+    found = solution()
+    assert found.iterations.max() <= 4
+    assert found.iterations.min() >= 1
+    assert found.residual <= 1e-15
+    assert found.message == ""
+
+
+# Against the unsimplified equations
+
+
+def universal_chain():
+    """A crank that drives, through a universal joint, a shaft askew, with a plate welded on."""
+    return Mechanism(
+        "cardan",
+        [Body("crank", (0.1, 0.2, 0.3), (0.5, 0.5, -0.5, 0.5)), Body("shaft", (0.0, 0.3, 1.5)), Body("plate", (0.2, 0.0, 2.0))],
+        [
+            Revolute("in", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+            Universal("cross", "crank", "shaft", (0.0, 0.0, 1.0), ((1.0, 0.0, 0.0), (0.0, 0.8, -0.6))),
+            Revolute("out", "shaft", "ground", (0.0, 0.6, 1.8), (0.0, 0.6, 0.8)),
+            Fixed("weld", "shaft", "plate"),
+        ],
+        [Point("tip", "plate", (0.3, 0.5, 2.0))],
+        [replace(four_bar().driver("turn"), joint="in")],
+    )
+
+
+def jack():
+    """A nut on a screw askew, and a slider that it moves by a rod."""
+    return Mechanism(
+        "jack",
+        [Body("screw", (0.1, 0.0, 0.2)), Body("nut", (0.5, 0.1, 0.0), (0.8, 0.0, 0.6, 0.0)), Body("slider", (1.5, 0.4, 0.0))],
+        [
+            Revolute("bearing", "ground", "screw", (0.0, 0.0, 0.0), (1.0, 0.2, 0.1)),
+            Screw("thread", "screw", "nut", (0.3, 0.06, 0.03), (1.0, 0.2, 0.1), 0.15),
+            Cylindrical("keeper", "ground", "nut", (0.0, 0.3, 0.0), (1.0, 0.2, 0.1)),
+            Distance("rod", "nut", "slider", ((0.4, 0.1, 0.1), (1.4, 0.4, 0.0))),
+            Translational("guide", "ground", "slider", (1.5, 0.4, 0.0), (1.0, 0.5, 0.0)),
+        ],
+        [Point("end", "slider", (1.5, 0.4, 0.0))],
+        [replace(four_bar().driver("turn"), joint="bearing")],
+    )
+
+
+SWEEPS = {
+    "jack": (jack, "turn", np.linspace(-8.0, 6.0, 3)),
+    "mcpherson": (mcpherson, "stroke", np.linspace(-0.08, 0.06, 3)),
+    "slider_crank": (slider_crank, "turn", np.linspace(-4.0, 9.0, 3)),
+    "four_bar": (four_bar, "turn", np.linspace(-4.0, 9.0, 3)),
+    "universal_chain": (universal_chain, "turn", np.linspace(-4.0, 9.0, 3)),
+}
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+@pytest.mark.parametrize("write", [lambda m: m, swapped], ids=["as given", "swapped"])
+@pytest.mark.parametrize("name", SWEEPS)
+def test_the_papers_equations_hold(name, write, style):
+    """Residuals of all joints at the solved poses, and their first two derivatives by time along r, p, v and a.
+
+    omega' and its derivative enter through pdot and pddot: another frame or sign of theirs would show. All joints hold
+    undriven, so every derivative is zero; redundant rows are among them.
+    """
+    make, driver, values = SWEEPS[name]
+    mechanism = write(make())
+    found = solve(mechanism, driver, values, rate=1.3, bodies=[body.name for body in mechanism.moving], style=style)
+    assert found.solved.all()
+    for k in range(len(values)):
+        path = naive.along(naive.sample(found, k))
+        phi, phi_t, phi_tt = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
+        assert np.abs(naive.residuals(mechanism, path(0.0))).max() <= 4e-15  # some roundings of coordinates of 2 m
+        assert np.abs(phi).max() <= 4e-15
+        # speeds reach 4 m/s, accelerations 10 m/s^2; the circle of 0.1 s costs one and two digits
+        assert np.abs(phi_t).max() <= 1e-13
+        assert np.abs(phi_tt).max() <= 1e-11
+
+
+def test_wrong_angular_velocities_would_show():
+    """The check above has teeth: omega' in the wrong frame or with the wrong sign breaks it by orders of magnitude."""
+    mechanism, found = mcpherson(), solution()
+    r, p, v, a = naive.sample(found, 0)["knuckle"]
+    A = naive.A(p)
+    for wrong in (A @ v[3:], -v[3:]):
+        bodies = naive.sample(found, 0) | {"knuckle": (r, p, np.r_[v[:3], wrong], a)}
+        assert np.abs(naive.taylor(lambda t, b=bodies: naive.residuals(mechanism, naive.along(b)(t)))[1]).max() > 1e-2
+    bodies = naive.sample(found, 0) | {"knuckle": (r, p, v, np.r_[a[:3], A @ a[3:]])}
+    assert np.abs(naive.taylor(lambda t: naive.residuals(mechanism, naive.along(bodies)(t)))[2]).max() > 1e-2
+
+
+def test_points_are_carried_by_their_bodies():
+    """Position, velocity and acceleration of a point by the bodies' r, p, omega' alone."""
+    mechanism, found = mcpherson(), solution()
+    arm = naive.arm(naive.design(mechanism)["knuckle"], mechanism.point("rod_end").position)
+    for k in range(0, 161, 20):
+        r, p, v, a = naive.sample(found, k)["knuckle"]
+        A, w, w_t = naive.A(p), naive.tilde(v[3:]), naive.tilde(a[3:])
+        rod_end = found.points["rod_end"]
+        assert rod_end.position[k] == pytest.approx(r + A @ arm, abs=5e-16)
+        assert rod_end.velocity[k] == pytest.approx(v[:3] + A @ w @ arm, abs=5e-15)
+        assert rod_end.acceleration[k] == pytest.approx(a[:3] + A @ (w_t + w @ w) @ arm, abs=5e-14)
+
+
+# What is asked for, and no more
+
+
+def flops(found):
+    return {name: size["flops"] for name, size in found.details["program"].items()}
+
+
+def test_lower_orders_give_the_same_and_cost_less():
+    by_order = [solve(mcpherson(), "stroke", STROKES, bodies=MOVING, order=order) for order in (0, 1, 2)]
+    position, velocity, acceleration = by_order
+    for found in by_order:  # all are predicted by rates and accelerations, and end at the same pose but for its rounding
+        assert (found.iterations == acceleration.iterations).all()
+        assert np.abs(found.points["wheel"].position - acceleration.points["wheel"].position).max() <= 3e-16
+        assert np.abs(found.bodies["strut"].p - acceleration.bodies["strut"].p).max() <= 3e-16
+    assert position.points["wheel"].velocity is None
+    assert position.bodies["strut"].v is None
+    assert velocity.points["wheel"].acceleration is None
+    assert velocity.bodies["strut"].a is None
+    assert np.abs(velocity.points["wheel"].velocity - acceleration.points["wheel"].velocity).max() <= 2e-15
+    assert np.abs(velocity.bodies["strut"].v - acceleration.bodies["strut"].v).max() <= 2e-15
+    cost = [sum(flops(found).get(name, 0) for name in ("newton", "outputs")) for found in by_order]
+    assert cost[0] < cost[1] < cost[2]
+    for order, wanted in enumerate([set(), {RATE}, {RATE, RATE_T}]):
+        model = compile_model(mcpherson(), Request(("stroke",), (), MOVING, order=order))
+        put_out = model.programs["outputs"].outputs.keys()
+        assert {name for name in (RATE, RATE_T) if put_out & {*model.vectors[name]}} == wanted
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+def test_fixed_bodies_cost_nothing(style):
+    """Chassis and rack as fixed bodies, or as the ground itself: the same programs, the same bits."""
+    free, fixed = (solve(each, "stroke", STROKES, style=style) for each in (without_fixed_bodies(mcpherson()), mcpherson()))
+    assert flops(free) == flops(fixed)
+    assert (free.points["wheel"].position == fixed.points["wheel"].position).all()
+    assert free.details["rank"] == fixed.details["rank"]
+
+
+def test_the_ground_may_be_either_body():
+    """Which body of a joint is the fixed one costs nothing either."""
+    m = mcpherson()
+    turned = [joint.reversed() if any(map(m.is_fixed, joint.bodies)) else joint for joint in m.joints]
+    assert sum(joint is not other for joint, other in zip(turned, m.joints, strict=True)) == 3
+    assert flops(solve(replace(m, joints=turned), "stroke", [0.0])) == flops(solve(m, "stroke", [0.0]))
+
+
+def test_only_what_is_asked_for_is_there():
+    everything = solve(mcpherson(), "stroke", [0.0, 0.01], bodies=MOVING)
+    assert set(everything.points) == {"wheel", "rod_end"}
+    assert set(everything.bodies) == set(MOVING)
+    little = solve(mcpherson(), "stroke", [0.0, 0.01], points=["rod_end"])
+    assert set(little.points) == {"rod_end"}
+    assert little.bodies == {}
+    nothing = solve(mcpherson(), "stroke", [0.0, 0.01], points=[])
+    assert nothing.points == {}
+    assert flops(nothing)["outputs"] < flops(little)["outputs"] < flops(everything)["outputs"]
+    assert flops(nothing)["newton"] == flops(everything)["newton"]
+
+
+def test_fixed_bodies_and_their_points_stay():
+    mechanism = mcpherson()
+    mechanism = replace(mechanism, points=[*mechanism.points, Point("top", "chassis", (1.0, 0.55, 0.6))])
+    found = solve(mechanism, "stroke", [-0.05, 0.05], points=["top"], bodies=["rack"])
+    top, rack = found.points["top"], found.bodies["rack"]
+    assert (top.position == (1.0, 0.55, 0.6)).all()
+    assert not top.velocity.any()
+    assert not top.acceleration.any()
+    assert (rack.r == (1.14, 0.0, 0.1455)).all()
+    assert not rack.v.any()
+    assert not rack.a.any()
+
+
+def test_motions_are_views_by_name_made_when_looked_at():
+    table = np.arange(12.0).reshape(2, 6)
+    motions = Motions(PointMotion, table, {"P": [slice(0, 3), slice(3, 6), None]})
+    assert (list(motions), len(motions), "Q" in motions) == (["P"], 1, False)
+    motion = pickle.loads(pickle.dumps(motions))["P"]
+    assert (motion.position == table[:, :3]).all()
+    assert (motion.velocity == table[:, 3:]).all()
+    assert motion.acceleration is None
+    assert np.shares_memory(motions["P"].velocity, table)
+    with pytest.raises(KeyError, match="Q"):
+        motions["Q"]
+
+
+@pytest.mark.parametrize("name", ["rssr", "four_bar", "iftomm_n_four_bar"])
+def test_of_no_values_there_are_no_samples(name):
+    """Also where rows are left out, which may be chosen anew."""
+    case = cases.load(name)
+    found = solve(case.mechanism, case.sweep.driver, [])
+    assert found.solved.shape == (0,)
+    assert {motion.position.shape for motion in found.points.values()} == {(0, 3)}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"driver": "steer"}, "there is no driver 'steer'; known: stroke"),
+        ({"points": ["hub"]}, "there is no point 'hub'; known: rod_end, wheel"),
+        ({"bodies": ["hub"]}, "there is no body 'hub'; known: "),
+        ({"order": 3}, "order is 3, expected 0, 1 or 2"),
+        ({"rate": 0.0}, "rate is 0.0, expected driver units"),
+        ({"tol": np.nan}, "tol is nan, expected a positive number"),
+        ({"tol": np.inf}, "tol is inf"),
+        ({"values": 0.1}, r"values have shape \(\), expected \(n,\)"),
+        ({"values": [[0.0, 0.1]]}, r"values have shape \(1, 2\)"),
+        ({"values": [0.0, np.nan]}, "values are not all finite"),
+        ({"values": ["a"]}, r"values are \['a'\], expected numbers"),
+        ({"values": [1j]}, r"values are \[1j\], expected numbers"),
+        ({"rate": 1e-320}, "rate is 1e-320: no number is the time of the values then"),
+        ({"motions": {"stroke": Ramp(1.0)}}, "motions has 'stroke', which is swept; leave it out"),
+        ({"motions": {"steer": Ramp(1.0)}}, "there is no driver 'steer'"),
+        ({"motions": {"steer": 3.0}}, r"motions\['steer'\] is 3.0, expected a motion"),
+        ({"style": "dads"}, "there is no style 'dads'; known: native, paper, conventional, mixed, relative"),
+    ],
+)
+def test_an_argument_that_makes_no_sense_is_told(arguments, message):
+    with pytest.raises(SolveError, match=message):
+        solve(mcpherson(), **({"driver": "stroke", "values": [0.0, 0.1]} | arguments))

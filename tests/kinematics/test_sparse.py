@@ -1,0 +1,289 @@
+"""Large mechanisms as one sparse system: the motions that one program gives, rings of any size, and refusals with names."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import (
+    Body,
+    Distance,
+    Gear,
+    JointAngle,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    RackPinion,
+    Revolute,
+    Screw,
+    SolveError,
+    Spherical,
+    Translational,
+    solve,
+)
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.continuation.sweep import follow
+from kincheck.core.kinematics.formulation.constraints import frames
+from kincheck.core.kinematics.solver_selection import IRREDUCIBLE
+from kincheck.core.kinematics.sparse.determinant_signs import Blocks
+from kincheck.core.kinematics.sparse.sparse_model import FailedError, SparseModel
+from kincheck.core.kinematics.sparse.sweep import solve_sparse
+from kincheck.core.kinematics.structure.components import components
+from kincheck.core.kinematics.structure.sparse_lu import Factors
+from kincheck.core.mechanism.motions import Path, Ramp, Sine
+from kincheck.core.studies.bench import scaling
+from kincheck.core.studies.bench.ring import LEAN, pivot, ring
+
+from ..support.mechanisms import four_bar, mcpherson, slider_crank
+from .test_cascade import assert_alike
+from .test_chain import chain
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+WAYS = pytest.mark.parametrize("compiled", [False, True], ids=["one by one", "together"])
+
+
+def turning(*values, rate=1.0):
+    return Path({"turn": Ramp(rate)}, np.array(values))
+
+
+def both(mechanism, path, points, compiled=False):
+    bodies = tuple(body.name for body in mechanism.moving)
+    expected = follow(Route(compile_model(mechanism, Request(tuple(path.motions), points, bodies)), path), 1e-12)
+    return solve_sparse(SparseModel(mechanism, compiled=compiled), path, points, bodies), expected
+
+
+# several drivers, redundant rows, all kinds of joints, a sweep that does not start at the design
+@WAYS
+@pytest.mark.parametrize(
+    "name", ["mcpherson_strut", "mcpherson_steered", "four_bar", "andrews_squeezer", "delta_robot", "bricard", "double_cardan"]
+)
+def test_it_gives_what_one_program_gives(name, compiled):
+    case = cases.load(name)
+    assert_alike(*both(case.mechanism, case.sweep.path, case.points, compiled))
+
+
+@WAYS
+def test_couplers_and_their_coordinates(compiled):
+    mechanism = Mechanism(
+        "gears",
+        [Body("wheel"), Body("pinion", (1.0, 0.0, 0.0)), Body("rack"), Body("nut", (1.0, 0.0, 0.5))],
+        [
+            Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), Z),
+            Revolute("second", "pinion", "ground", (1.0, 0.0, 0.0), Z),
+            Translational("guide", "ground", "rack", (1.0, 0.3, 0.0), X),
+            Screw("thread", "pinion", "nut", (1.0, 0.0, 0.5), Z, 0.02),
+            Translational("held", "ground", "nut", (1.0, 0.1, 0.5), Z),
+        ],
+        [Point("tooth", "rack", (1.0, 0.3, 0.0)), Point("top", "nut", (1.0, 0.1, 0.5))],
+        [JointAngle("turn", "first")],
+        [Gear("mesh", ("first", "second"), -2.0), RackPinion("rolls", ("second", "guide"), 0.3)],
+    )
+    found, expected = both(mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"), compiled)
+    assert_alike(found, expected)
+    # the pinion makes half the turns, the nut a lead for each
+    assert np.ptp(found.points["top"].position[:, 2]) == pytest.approx(6.0 / 2.0 * 0.02 / (2.0 * np.pi), rel=1e-12)
+
+
+@WAYS
+@pytest.mark.parametrize(
+    "times", [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 30)[::-1], np.zeros(1), np.array([0.5, 0.5, -0.5])]
+)
+def test_any_samples(times, compiled):
+    for mechanism in (slider_crank(1.01), four_bar()):
+        assert_alike(*both(mechanism, turning(*times, rate=2.0), tuple(point.name for point in mechanism.points), compiled))
+
+
+@WAYS
+def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample(compiled):
+    for times in (np.linspace(0.0, 3.0, 31), np.linspace(2.0, 1.0, 7)):
+        assert_alike(*both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",), compiled))
+    steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))  # begins beyond the travel
+    assert solve_sparse(SparseModel(mcpherson(), compiled=compiled), steep).message.startswith(
+        "on the way to the first sample: cannot be followed beyond"
+    )
+
+
+def test_small_steps_take_one_iteration_each():
+    found = solve_sparse(SparseModel(ring(12), compiled=False), turning(*np.linspace(0.0, 0.8, 33)))
+    assert (found.iterations[4:] == 1).all()  # after the steps from which the predictor learns
+
+
+CRANK = Mechanism("crank", [Body("b")], [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)], (), [JointAngle("turn", "axle")])
+
+
+def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another():
+    path = turning(6.0 * np.pi + 0.3)
+    found = solve_sparse(CRANK, path, (), ["b"])  # an odd number of turns changes the sign
+    assert found.bodies["b"].p[0] == pytest.approx([-np.cos(0.15), 0.0, 0.0, -np.sin(0.15)], abs=1e-14)
+    model = SparseModel(CRANK, compiled=False)
+    here = model.moving(model.design, 0.0, model.drives(path, np.zeros(1))[:, 0])
+    assert model.reach(here, 0.9, model.drives(path, np.array([0.9]))[:, 0], 1e-12).iterations
+    with pytest.raises(FailedError, match="too long to be believed"):
+        model.reach(replace(here, slopes=np.array([1e-3])), 1.1, model.drives(path, np.array([1.1]))[:, 0], 1e-12)
+
+
+def test_a_wrong_branch_is_no_solution():
+    model = SparseModel(CRANK, compiled=False)
+    here = model.moving(model.design, 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0])
+    over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])  # half a turn about x: the axes are parallel, but opposite
+    with pytest.raises(FailedError, match="wrong branch"):
+        model.reach(replace(here, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12)
+
+
+@pytest.mark.parametrize("cranks", [16, 120])
+def test_every_crank_of_a_ring_turns_as_the_first(cranks):
+    """Of a ring of 31 bodies as one program, whose samples are beyond doubt, and of a large one as a sparse system."""
+    turn = np.linspace(-0.8, 0.8, 17)
+    found = solve(ring(cranks), "turn", turn)
+    assert found.solved.all(), found.message
+    assert found.residual <= 1e-15
+    assert ("factor_entries" in found.details) == (2 * cranks - 1 > IRREDUCIBLE)
+    s, c, o = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
+    for k in range(cranks):
+        motion = found.points[f"tip{k}"]
+        # an angle is known to the sum of the round-offs on the way to it; each derivative multiplies it again
+        assert np.abs(motion.position - np.column_stack([pivot(k, cranks) + s, c, o])).max() <= 1e-15 * cranks
+        assert np.abs(motion.velocity - np.column_stack([-c, s, o])).max() <= 1e-14 * cranks
+        assert np.abs(motion.acceleration - np.column_stack([-s, -c, o])).max() <= 1e-13 * cranks
+
+
+def test_a_ring_cannot_be_taken_apart_and_its_factors_grow_with_it():
+    sizes = [len(part.bodies) for part in components(ring(20), frames(ring(20)))]
+    assert sorted(sizes) == [1, 38]  # the driven crank, and all others
+    small, large = (SparseModel(ring(n), compiled=False).factors.entries for n in (40, 160))
+    assert large < 4.4 * small
+
+
+def test_numpy_and_machine_code_agree():
+    path = turning(*np.linspace(-0.5, 0.5, 5))
+    assert_alike(*(solve_sparse(SparseModel(ring(12), compiled=each), path, ["tip6"], ["plate5"]) for each in (True, False)))
+
+
+def test_redundant_rows_of_many_loops_are_found_where_they_are():
+    loops = 60
+    n, s, c = range(loops), np.sin(0.3), np.cos(0.3)
+    pivots = [Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), Z) for k in range(loops + 1)]
+    pins = [Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), Z) for k in n for at in (0, 1)]
+    bodies = [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)]
+    planar = Mechanism("planar", bodies, [*pivots, *pins], [Point("end", f"crank{loops}", (loops + s, c, 0.0))])
+    driven = Mechanism("planar", bodies, planar.joints, planar.points, [JointAngle("turn", "pivot0")])
+    found = solve_sparse(driven, turning(-0.5, 0.5), ["end"])
+    assert found.solved.all(), found.message
+    assert len(found.details["dof_account"]["redundant_rows"]) == 3 * loops
+    assert found.details["redundant_residual"] <= 1e-15
+    expected = [[loops + np.sin(0.3 - turn), np.cos(0.3 - turn), 0.0] for turn in (-0.5, 0.5)]
+    assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
+
+
+def test_redundant_rows_that_contradict_are_told():
+    mechanism = four_bar()
+    joints = [joint.changed(axis=(0.0, 1.0, 1e-3)) if joint.name == "D" else joint for joint in mechanism.joints]
+    found = solve_sparse(Mechanism("askew", mechanism.bodies, joints, mechanism.points, mechanism.drivers), turning(0.5))
+    assert not found.solved.any()
+    assert "the redundant rows (" in found.message
+    assert "contradict" in found.message
+
+
+def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
+    values = np.linspace(-0.05, 0.4, 46)
+    model = SparseModel(mcpherson())
+    found = solve_sparse(model, Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1)
+    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
+    assert np.isnan(found.points["wheel"].position[~found.solved]).all()
+    assert "cannot be followed beyond stroke = 0.293" in found.message
+    assert "last reachable sample at stroke = 0.29;" in found.message
+    assert 0.0 < found.details["smallest_pivot"] < 1e-2
+    assert found.points["wheel"].acceleration is None
+    assert found.bodies["knuckle"].a is None
+    far = solve_sparse(model, Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
+    assert "no sample reached on this side" in far.message
+    assert not far.solved.any()
+    assert np.isnan([far.residual, far.details["redundant_residual"]]).all()
+
+
+def without_driver(mechanism):
+    return Mechanism(mechanism.name, mechanism.bodies, mechanism.joints, mechanism.points)
+
+
+def test_what_cannot_be_solved_is_refused_by_name():
+    whole = chain(40)
+    with pytest.raises(SolveError, match=r"1 degree of freedom .* but 0 drivers; what can still move is most of all 'crank0', "):
+        SparseModel(without_driver(whole), compiled=False)
+    second = JointAngle("second", "pivot20")
+    with pytest.raises(SolveError, match=r"1 degree of freedom .* but 2 drivers; not independent are .*'second'"):
+        SparseModel(Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]), compiled=False)
+    stretched = slider_crank()
+    push = [PointCoordinate("push", "end", X)]
+    with pytest.raises(SolveError, match=r"driven by 'push' it does not move .*dead centre"):
+        SparseModel(Mechanism("stuck", stretched.bodies, stretched.joints, stretched.points, push), compiled=False)
+    m = mcpherson()
+    joints = [joint.changed(length=3.0) if isinstance(joint, Distance) else joint for joint in m.joints]
+    with pytest.raises(SolveError, match="does not close at the design position: residual"):
+        SparseModel(Mechanism("apart", m.bodies, joints, m.points, m.drivers), compiled=False)
+    with pytest.raises(SolveError, match="no body can move"):
+        SparseModel(Mechanism("still", [Body("wall", fixed=True)], []), compiled=False)
+
+
+def test_a_rod_that_spins_freely_is_named():
+    mechanism = mcpherson()
+    rod = [
+        Spherical("inner", "chassis", "rod", (1.14, 0.355, 0.1455)),
+        Spherical("outer", "knuckle", "rod", (1.115, 0.665, 0.118)),
+    ]
+    joints = [*(joint for joint in mechanism.joints if not isinstance(joint, Distance)), *rod]
+    with pytest.raises(SolveError, match=r"but 1 driver; 'rod' can turn; .*use distance"):
+        SparseModel(Mechanism("spinning", [*mechanism.bodies, Body("rod")], joints, mechanism.points, mechanism.drivers))
+
+
+def test_costs_are_measured_with_residuals_and_errors():
+    rows = scaling.measure([3], [5], rounds=1)
+    assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [("chain", 3, 7, 42), ("ring", 5, 9, 54)]
+    assert all(row.residual <= 1e-15 for row in rows)
+    assert all(row.error <= 1e-14 for row in rows)
+    assert all(row.us_per_value.median > 0.0 for row in rows)
+
+
+@pytest.mark.parametrize("n", [6, 40])
+def test_the_sign_of_the_determinant(n):
+    """Of matrices of one pattern it is that of the signed pivot, or always the other."""
+    rng = np.random.default_rng(n)
+    rows, columns = np.nonzero((rng.random((n, n)) < 3.0 / n) | np.eye(n, k=1, dtype=bool) | np.eye(n, k=1 - n, dtype=bool))
+    factors = Factors(rows, columns, rng.normal(size=len(rows)), n)
+    products: set[float] = set()
+    signs: set[float] = set()
+    for _ in range(50):
+        values = rng.normal(size=len(rows))
+        factors.update(values)
+        factors.factor()
+        dense = np.zeros((n, n))
+        dense[rows, columns] = values
+        sign = np.linalg.slogdet(dense)[0]
+        signs.add(float(sign))
+        products.add(float(np.sign(factors.signed_pivot) * sign))
+    assert len(products) == 1
+    assert len(signs) == 2
+
+
+def test_orientation_tells_the_sign_of_every_block():
+    """Of blocks solved one after the other, rows and columns mixed: of each that of its determinant, or always the other."""
+    sizes = [1, 2, 5, 1, 2, 3]
+    rng, n = np.random.default_rng(4), sum(sizes)
+    block = np.repeat(np.arange(len(sizes)), sizes)
+    i, j = np.nonzero(block[:, None] >= block)
+    rows, columns = rng.permutation(n), rng.permutation(n)
+    blocks = Blocks(rows[i], columns[j], n)
+    known: list[tuple[float, ...]] = []
+    found: list[bytes] = []
+    for _ in range(64):
+        matrix, mixed = rng.normal(size=(n, n)), np.zeros((n, n))
+        mixed[rows[i], columns[j]] = matrix[i, j]
+        known.append(
+            tuple(float(np.linalg.slogdet(matrix[np.ix_(at, at)])[0]) for at in (np.flatnonzero(block == k) for k in range(6)))
+        )
+        found.append(blocks.orientation(matrix[i, j, None], np.array([np.linalg.slogdet(mixed)[0]]))[0])
+    # one answer for each combination of signs
+    assert len(set(known)) == len(set(found)) == len(set(zip(known, found, strict=True))) > 20

@@ -1,0 +1,159 @@
+"""Machine code without LLVM: images of what it compiled, and what it said of the processor."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from ctypes import CFUNCTYPE, c_double, c_int64
+
+import numpy as np
+import pytest
+from kincheck.core import solve
+from kincheck.core.program.llvm import code_cache, compiler, elf_loader, jit
+
+from ..support.mechanisms import mcpherson
+from ..support.running import forget_recent
+
+pytest.importorskip("llvmlite", reason="llvmlite is not installed")
+images = pytest.mark.skipif(not elf_loader.possible(), reason="images run on x86-64 under Linux")
+
+TEXT = """
+define i64 @chosen(i64 %k) noinline {
+entry:
+  switch i64 %k, label %other [ i64 0, label %a i64 1, label %b i64 2, label %c i64 3, label %d i64 4, label %e ]
+a:
+  ret i64 7
+b:
+  %twice = mul i64 %k, 21
+  ret i64 %twice
+c:
+  %less = sub i64 %k, 9
+  ret i64 %less
+d:
+  %shifted = shl i64 %k, 33
+  ret i64 %shifted
+e:
+  %turned = xor i64 %k, -1
+  ret i64 %turned
+other:
+  ret i64 -1
+}
+define i64 @of_next(i64 %k) {
+  %next = add i64 %k, 1
+  %found = call i64 @chosen(i64 %next)
+  ret i64 %found
+}
+define double @scaled(double %x) {
+  %product = fmul double %x, 0x400921FB54442D18
+  ret double %product
+}
+"""
+"""A table to jump by, a call, a constant that is loaded."""
+
+
+@images
+def test_an_image_does_what_its_text_says():
+    code = code_cache.load(TEXT, lambda: TEXT, {"chosen": 1, "of_next": 1})
+    assert [code.calls["chosen"](k) for k in range(6)] == [7, 21, -7, 3 << 33, ~4, -1]
+    assert [code.calls["of_next"](k) for k in range(5)] == [21, -7, 3 << 33, ~4, -1]
+    assert CFUNCTYPE(c_double, c_double)(code.address("scaled"))(2.0) == 2.0 * np.pi
+
+
+@images
+def test_many_images_stand_side_by_side():
+    text = "define i64 @f(i64 %k) {{ %sum = add i64 %k, {} ret i64 %sum }}".format
+    made = [elf_loader.placed(elf_loader.joined(compiler.emitted(text(k)))) for k in range(5)]
+    assert [CFUNCTYPE(c_int64, c_int64)(address("f"))(100) for address in made] == [100, 101, 102, 103, 104]
+
+
+@images
+def test_code_that_calls_something_outside_makes_no_image():
+    text = "declare double @outside(double)\ndefine double @f(double %x) { %y = call double @outside(double %x) ret double %y }"
+    with pytest.raises(ValueError, match="'outside'"):
+        elf_loader.joined(compiler.emitted(text))
+
+
+def positions() -> np.ndarray:
+    forget_recent()
+    jit._made.cache_clear()
+    return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
+
+
+def test_where_images_do_not_run_llvm_loads_what_it_compiled(tmp_path, monkeypatch):
+    expected = positions()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    loaded, load = list[str](), compiler.loaded
+    monkeypatch.setattr(elf_loader, "possible", lambda: False)
+    monkeypatch.setattr(compiler, "loaded", lambda file: loaded.append("once") or load(file))
+    monkeypatch.setattr(jit, "OFTEN", 0)
+    for _ in range(2):  # compiled, then kept
+        np.testing.assert_array_equal(positions(), expected)
+        assert loaded
+        loaded.clear()
+    monkeypatch.undo()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    np.testing.assert_array_equal(positions(), expected)  # an object file is not taken for an image
+
+
+SOLVE = """
+import sys
+import numpy as np
+from kincheck import cases
+from kincheck.core import solve
+for _ in range(10):
+    solve(cases.load("mcpherson_strut").mechanism, "stroke", np.linspace(-0.08, 0.08, 161))
+print("llvmlite" in sys.modules)
+"""
+
+
+@images
+def test_who_comes_back_does_not_import_llvm(tmp_path):
+    here = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+
+    def imported() -> str:
+        return subprocess.run([sys.executable, "-c", SOLVE], env=here, capture_output=True, text=True, check=True).stdout.strip()
+
+    assert [imported() for _ in range(2)] == ["True", "False"]
+
+
+@images
+def test_what_llvm_says_of_the_processor_is_kept_for_this_one(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    expected, asked, ask = compiler.processor(), list[str](), compiler._asked
+    monkeypatch.setattr(compiler, "_asked", lambda: asked.append("once") or ask())
+
+    def found() -> compiler.Processor:
+        compiler.processor.cache_clear()  # as another process
+        return compiler.processor()
+
+    assert [found() for _ in range(2)] == [expected] * 2
+    assert len(asked) == 1
+    (entry,) = (tmp_path / "kincheck").iterdir()
+    entry.write_bytes(entry.read_bytes()[:-1])
+    assert found() == expected
+    assert len(asked) == 2
+    described = compiler._described()
+    assert described is not None
+    monkeypatch.setattr(compiler, "_described", lambda: described.replace(b" sse2", b" no_sse2"))
+    assert found() == expected
+    monkeypatch.setattr(compiler, "_described", lambda: None)
+    assert found() == expected
+    assert len(asked) == 4
+
+
+@images
+def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
+    described = compiler._described()
+    assert described is not None
+    assert {line.split(b"\t")[0] for line in described.splitlines() if b"\t" in line} == {*compiler.TRAITS}
+    assert b"MHz" not in described  # changes from one moment to the next
+    from llvmlite import __version__
+
+    assert __version__.encode() in described
+
+
+def test_code_is_known_by_how_it_is_made(monkeypatch):
+    before = code_cache.told(TEXT)
+    monkeypatch.setattr(code_cache, "_sources", lambda: "another way")
+    assert code_cache.told(TEXT) != before

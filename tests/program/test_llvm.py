@@ -1,0 +1,268 @@
+"""Machine code against numpy: every operation, whole models, lanes that end in the middle of a vector, and the cache on disk."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from kincheck.core import Revolute, solve, solve_designs
+from kincheck.core.algebra import root
+from kincheck.core.kinematics.compiled import program_cache
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.continuation.sweep import sweep
+from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.program import (
+    NODES,
+    NumpyExecutor,
+    Plan,
+    Tape,
+    absolute,
+    cos,
+    maximum,
+    minimum,
+    place_of,
+    program,
+    sin,
+    where_larger,
+)
+from kincheck.core.program.llvm import compiler, jit
+from kincheck.core.program.llvm.executor import LlvmExecutor
+from kincheck.core.program.llvm.jit import LlvmCode
+
+from ..kinematics.test_chain import chain
+from ..support.mechanisms import four_bar, mcpherson
+from ..support.running import forget_recent
+
+llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
+
+
+def executors(function, inputs: int, lanes: int):
+    """The same program of `inputs` slots, its value in the next one, in both executors."""
+    tape = Tape()
+    traced = program("f", tape, {inputs: function(*(tape.input(k) for k in range(inputs)))})
+    plan = Plan({"f": traced}, {str(k): k for k in range(inputs + 1)})
+    return NumpyExecutor(plan, lanes), LlvmExecutor(LlvmCode(plan), lanes)
+
+
+OPERATIONS = {
+    "plus": lambda a, b: a + b,
+    "minus": lambda a, b: a - b,
+    "times": lambda a, b: a * b,
+    "over": lambda a, b: a / b,
+    "negative": lambda a, b: -a,
+    "root": lambda a, b: root(a * a),
+    "size": lambda a, b: absolute(a),
+    "smaller": minimum,
+    "larger": maximum,
+    "larger size": lambda a, b: maximum(absolute(a), absolute(b)),
+    "choice": lambda a, b: where_larger(a, b, a + 1.0, b - 1.0),
+}
+
+
+@pytest.mark.parametrize("lanes", [1, 7, 8, 9, 33])
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_operations_are_numpys(name, lanes):
+    rng = np.random.default_rng(lanes)
+    both = executors(OPERATIONS[name], 2, lanes)
+    values = rng.normal(size=(2, lanes)) * 10.0 ** rng.integers(-3, 4, size=(2, lanes))
+    values[:, -1] = math.nan, 1.0  # min and max must hand on what is not a number
+    for executor in both:
+        executor.put([0, 1], values)
+        executor.run("f")
+    a, b = (executor.get([2])[0] for executor in both)
+    np.testing.assert_array_equal(np.isnan(a), np.isnan(b))
+    np.testing.assert_allclose(b, a, rtol=2e-16, atol=0.0)
+
+
+def test_all_lanes_may_read_a_few_of_their_group():
+    """The first of them, the last, and some between; of machine code a group is a vector."""
+    lanes = compiler.vector_width()
+    values = np.random.default_rng(0).normal(size=(1, lanes))
+    read = values[0, [place_of(k, lanes)[1] for k in range(NODES)]]
+    for executor in executors(lambda x: sum((10.0**k * x.tape.at(k, 0) for k in range(NODES)), 0.0), 1, lanes):
+        executor.put([0], values)
+        executor.run("f")
+        np.testing.assert_allclose(executor.get([1])[0], np.full(lanes, 10.0 ** np.arange(NODES) @ read), rtol=1e-14)
+
+
+@pytest.mark.parametrize(("traced", "true"), [(sin, np.sin), (cos, np.cos)])
+def test_sine_and_cosine_hold_over_thousands_of_turns(traced, true):
+    rng = np.random.default_rng(0)
+    _, executor = executors(lambda x: traced(x), 1, 256)
+    for extent in (1e-9, 1.0, 10.0, 1e4):
+        x = rng.uniform(-extent, extent, size=256)
+        executor.put([0], x[None])
+        executor.run("f")
+        assert np.abs(executor.get([1])[0] - true(x)).max() <= 4e-16  # two units in the last place of one
+
+
+@pytest.mark.parametrize("style", Style)
+def test_models_give_numpys_results(style):
+    for mechanism, values in ((mcpherson(), np.linspace(-0.08, 0.08, 33)), (four_bar(), np.linspace(0.0, 2.0 * np.pi, 37))):
+        driver = mechanism.drivers[0].name
+        path = Path({driver: Ramp(1.0)}, values)
+        found = []
+        for compiled in (False, True):
+            points = tuple(point.name for point in mechanism.points)
+            request = Request((driver,), points, style=style, compiled=compiled)
+            found.append(sweep(compile_model(mechanism, request), path, 1e-12))
+        for name in found[0].points:
+            a, b = (each.points[name] for each in found)
+            # ten units in the last place of one, each derivative losing the mechanisms' condition (about ten) once more
+            assert np.abs(a.position - b.position).max() <= 2e-15
+            assert np.abs(a.velocity - b.velocity).max() <= 2e-14
+            assert np.abs(a.acceleration - b.acceleration).max() <= 2e-13
+
+
+def test_a_lane_that_cannot_be_reached_is_reported_alike():
+    mechanism = mcpherson()
+    messages = []
+    for compiled in (False, True):
+        request = Request((mechanism.drivers[0].name,), (), compiled=compiled)
+        path = Path({mechanism.drivers[0].name: Ramp(1.0)}, np.array([0.0, 0.2, 0.6]))
+        trajectory = sweep(compile_model(mechanism, request), path, 1e-12)
+        assert trajectory.solved.tolist() == [True, True, False]
+        messages.append(trajectory.message.split(":")[0][:60])
+    assert messages[0] == messages[1]
+
+
+def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    wanted = np.linspace(0.0, 1.0, 5)
+
+    def positions(*, often: bool = False):
+        jit._made.cache_clear()  # as another process
+        mechanism = four_bar()
+        driver, point = mechanism.drivers[0].name, mechanism.points[0].name
+        model = compile_model(mechanism, Request((driver,), (point,)))
+        if often and model._code.interpreted:
+            model._code.count(10**9)
+        return sweep(model, Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
+
+    fresh = positions()
+    interpreted = {*(tmp_path / "kincheck").iterdir()}
+    assert len(interpreted) == 4  # what was traced, its tables, what goes through them and the loops
+    np.testing.assert_array_equal(positions(often=True), fresh)
+    entries = [*(tmp_path / "kincheck").iterdir()]
+    assert len(entries) == 5  # and its machine code
+    for name in ("_trace", "bytecode", "_text"):
+        owner = {"_trace": program_cache, "bytecode": jit.bytecode, "_text": LlvmCode}[name]
+        monkeypatch.setattr(owner, name, None)
+    np.testing.assert_array_equal(positions(), fresh)
+    monkeypatch.undo()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (code,) = {*entries} - interpreted
+    for entry, other in zip(entries, [*entries[1:], entries[0]], strict=True):
+        kept = entry.read_bytes()
+        for damage in (b"", kept[:100], kept[:-1] + bytes([kept[-1] ^ 1]), b"\0" * len(kept), other.read_bytes()):
+            entry.write_bytes(damage)
+            if entry != code:
+                code.unlink()  # where there is code, neither tables nor what goes through them is looked for
+            np.testing.assert_array_equal(positions(often=True), fresh)
+            assert entry.read_bytes() == kept
+
+
+def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    times: list[str] = []
+    trace = program_cache._trace
+    monkeypatch.setattr(program_cache, "_trace", lambda *given: times.append("traced") or trace(*given))
+    mechanism = four_bar()
+    request = Request((mechanism.drivers[0].name,), ())
+    moved = replace(mechanism.bodies[0], origin=(1e-16, 0.0, 0.0))
+    for different in (
+        lambda: (mechanism, request),
+        lambda: (mechanism, replace(request, order=1)),
+        lambda: (replace(mechanism, bodies=[moved, *mechanism.bodies[1:]]), request),
+        lambda: monkeypatch.setattr(program_cache, "_source", lambda: b"changed") or (mechanism, request),
+    ):
+        times.clear()
+        for _ in range(2):
+            program_cache.traced(*different())
+        assert times == ["traced"]
+
+
+def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    known = four_bar()
+    hinge = next(joint for joint in known.joints if isinstance(joint, Revolute))
+
+    class Mine(Revolute):
+        type = "mine"
+
+    monkeypatch.setattr(Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine"})
+    mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
+    mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])
+    program_cache.traced(mechanism, Request((known.drivers[0].name,), ()))
+    assert not (tmp_path / "kincheck").exists()
+
+
+def test_a_program_may_need_more_values_at_once_than_there_are_registers_and_exchange_its_inputs():
+    tape, rng, n = Tape(), np.random.default_rng(0), 80
+    x = [tape.input(k) for k in range(n)]
+    products = [a * b for a, b in pairwise(x)]
+    back = [where_larger(a, b, a - c, a * b) for a, b, c in zip(products, reversed(products), reversed(x[1:]), strict=True)]
+    outputs = {0: x[1], 1: x[0], 2: sum(back[1:], back[0]), 3: products[40], 70: x[30], n: products[7], n + 1: products[7]}
+    traced = program("f", tape, outputs | {slot: back[slot] for slot in range(4, 60)})
+    plan = Plan({"f": traced}, {str(k): k for k in range(n + 2)})
+    values, found = rng.normal(size=(n, 9)), list[Any]()
+    for executor in (NumpyExecutor(plan, 9), LlvmExecutor(LlvmCode(plan), 9)):
+        executor.put(range(n), values)
+        executor.run("f")
+        found.append(executor.get(range(n + 2)))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-13)  # a product and a sum may be rounded once
+
+
+def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
+    (tmp_path / "kincheck").write_text("a file where the folder should be")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    mechanism = four_bar()
+    assert solve(mechanism, mechanism.drivers[0].name, [0.0, 0.5]).solved.all()
+
+
+def test_without_llvmlite_numpy_takes_over(monkeypatch):
+    monkeypatch.setattr("kincheck.core.kinematics.compiled.compiled_model.available", lambda: False)
+    mechanism = four_bar()
+    model = compile_model(mechanism, Request((mechanism.drivers[0].name,), ()))
+    assert isinstance(model.executor(3), NumpyExecutor)
+
+
+def test_the_width_is_that_of_the_processor():
+    assert compiler.vector_width() in (2, 4, 8)
+
+
+WAYS = {
+    "one program": lambda: solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points,
+    "one program, positions": lambda: solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33), order=0).points,
+    "components": lambda: solve(chain(8), "turn", np.linspace(-0.5, 0.5, 33)).points,
+    "designs": lambda: (
+        solve_designs(
+            mcpherson(),
+            "stroke",
+            [-0.05, 0.0, 0.05],
+            {"joints.tie_rod.points.0": TIE_ROD + np.linspace(0.0, 0.01, 11)[:, None]},
+            order=2,
+        ).points
+    ),
+}
+TIE_ROD = np.array([1.115, 0.665, 0.118])
+
+
+@pytest.mark.parametrize("width", [2, 4])
+@pytest.mark.parametrize("way", WAYS)
+def test_vectors_of_every_width_give_the_same(way, width, monkeypatch):
+    expected, asked = WAYS[way](), list[int]()
+    monkeypatch.setattr(compiler, "vector_width", lambda: asked.append(width) or width)
+    forget_recent()
+    found = WAYS[way]()
+    assert asked  # whatever was kept was made for other vectors
+    for name, motion in expected.items():
+        for label, limit in (("position", 2e-15), ("velocity", 2e-14), ("acceleration", 2e-13)):
+            if getattr(motion, label) is not None:
+                assert np.abs(getattr(motion, label) - getattr(found[name], label)).max() <= limit

@@ -1,0 +1,282 @@
+"""Traced programs: folding, sharing, dead code, executing in place."""
+
+import math
+from dataclasses import dataclass
+from operator import neg
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from kincheck.core.algebra import root
+from kincheck.core.program import (
+    Tape,
+    absolute,
+    maximum,
+    minimum,
+    program,
+    where_larger,
+)
+
+from ..support.running import numpy_executor, run_on
+
+INPUTS = 4
+
+
+def run(outputs, block):
+    """Run a program that puts out these scalars (slot -> scalar) over a block, in place."""
+    tape = next(value.tape for value in outputs.values() if hasattr(value, "tape"))
+    run_on([program("p", tape, outputs)], block)
+    return block
+
+
+def traced(function, *columns):
+    """The program of function(inputs...) -> sequence of scalars, and what it gives for the inputs' lanes."""
+    tape = Tape()
+    values = function(*(tape.input(k) for k in range(len(columns))))
+    compiled = program("p", tape, {len(columns) + k: value for k, value in enumerate(values)})
+    block = np.vstack([np.array(columns, dtype=float), np.full((len(values), len(columns[0])), np.nan)])
+    run_on([compiled], block)
+    return compiled, block[len(columns) :]
+
+
+# Random expressions: what is folded while tracing must not change a bit of the result
+
+
+CONSTANTS = st.sampled_from([0.0, 1.0, -1.0, 2.0, -2.0, 0.5, -0.25, 3.0])
+LEAVES = st.one_of(st.integers(0, INPUTS - 1), CONSTANTS)
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operation on expressions: integers are inputs, floats are constants."""
+
+    name: str
+    operands: tuple
+
+
+def expressions():
+    def extend(smaller):
+        binary = st.builds(lambda op, a, b: Operation(op, (a, b)), st.sampled_from("+-*/<>"), smaller, smaller)
+        unary = st.builds(lambda op, a: Operation(op, (a,)), st.sampled_from(["neg", "neg", "sqrt", "abs"]), smaller)
+        select = st.builds(lambda *each: Operation("where", each), smaller, smaller, smaller, smaller)
+        twice = st.builds(lambda op, a: Operation(op, (a, a)), st.sampled_from("+-*<>"), smaller)
+        return binary | unary | select | twice
+
+    return st.recursive(LEAVES, extend, max_leaves=25)
+
+
+def evaluate(expression, inputs):
+    """The expression over any scalar, by the functions under test."""
+    if isinstance(expression, int):
+        return inputs[expression]
+    if isinstance(expression, float):
+        return expression
+    values = [evaluate(each, inputs) for each in expression.operands]
+    match expression.name:
+        case "+":
+            return values[0] + values[1]
+        case "-":
+            return values[0] - values[1]
+        case "*":
+            return values[0] * values[1]
+        case "/":
+            return values[0] / values[1]
+        case "<":
+            return minimum(*values)
+        case ">":
+            return maximum(*values)
+        case "neg":
+            return -values[0]
+        case "sqrt":
+            return root(values[0])
+        case "abs":
+            return absolute(values[0])
+        case "where":
+            return where_larger(*values)
+
+
+def directly(expression, inputs):
+    """The expression in plain floats, nothing folded; ArithmeticError or ValueError where it is not defined."""
+    if isinstance(expression, int):
+        return inputs[expression]
+    if isinstance(expression, float):
+        return expression
+    a, *rest = (directly(each, inputs) for each in expression.operands)
+    match expression.name, rest:
+        case "+", [b]:
+            return a + b
+        case "-", [b]:
+            return a - b
+        case "*", [b]:
+            return a * b
+        case "/", [b]:
+            return a / b
+        case "<", [b]:
+            return min(a, b)
+        case ">", [b]:
+            return max(a, b)
+        case "neg", []:
+            return -a
+        case "sqrt", []:
+            return math.sqrt(a)
+        case "abs", []:
+            return abs(a)
+        case "where", [b, p, q]:
+            return p if abs(a) > abs(b) else q
+
+
+numbers = st.floats(-8.0, 8.0).map(lambda x: round(x, 3)) | CONSTANTS
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(expressions(), min_size=1, max_size=INPUTS),
+    st.lists(st.tuples(*[numbers] * INPUTS), min_size=1, max_size=5),
+)
+def test_tracing_changes_no_bit(wanted, samples):
+    """Outputs go where inputs stand, lane by lane; all folds are exact in floating-point arithmetic."""
+    try:
+        expected = np.array([[directly(each, sample) for sample in samples] for each in wanted])
+    except (ZeroDivisionError, ValueError):
+        assume(False)
+    tape = Tape()
+    inputs = [tape.input(k) for k in range(INPUTS)]
+    try:
+        outputs = {k: evaluate(each, inputs) for k, each in enumerate(wanted)}
+    except (ZeroDivisionError, ValueError):  # folded first, where the plain one takes the other way
+        assume(False)
+    block = np.array(samples).T.copy()
+    run_on([program("p", tape, outputs)], block)
+    np.testing.assert_array_equal(block[: len(wanted)], expected)
+    np.testing.assert_array_equal(block[len(wanted) :], np.array(samples).T[len(wanted) :])
+
+
+# Folding, one rule at a time
+
+FOLDS = {
+    "x + 0": (lambda x, y: x + 0.0, lambda x, y: x),
+    "0 + x": (lambda x, y: 0.0 + x, lambda x, y: x),
+    "x - 0": (lambda x, y: x - 0.0, lambda x, y: x),
+    "0 - x": (lambda x, y: 0.0 - x, lambda x, y: -x),
+    "x - x": (lambda x, y: x - x, lambda x, y: 0.0),
+    "0 x": (lambda x, y: 0.0 * x, lambda x, y: 0.0),
+    "x 0": (lambda x, y: x * 0, lambda x, y: 0.0),
+    "1 x": (lambda x, y: 1.0 * x, lambda x, y: x),
+    "x (-1)": (lambda x, y: x * -1.0, lambda x, y: -x),
+    "0 / x": (lambda x, y: 0.0 / x, lambda x, y: 0.0),
+    "x / 1": (lambda x, y: x / 1.0, lambda x, y: x),
+    "x / (-1)": (lambda x, y: x / -1.0, lambda x, y: -x),
+    "-(-x)": (lambda x, y: neg(neg(x)), lambda x, y: x),
+    "x + (-y)": (lambda x, y: x + (-y), lambda x, y: x - y),
+    "(-x) + y": (lambda x, y: (-x) + y, lambda x, y: y - x),
+    "x - (-y)": (lambda x, y: x - (-y), lambda x, y: x + y),
+    "(-x) - y": (lambda x, y: (-x) - y, lambda x, y: -(x + y)),
+    "x + (-2)": (lambda x, y: x + (-2.0), lambda x, y: x - 2.0),
+    "(-x) y": (lambda x, y: (-x) * y, lambda x, y: -(x * y)),
+    "(-x) (-y)": (lambda x, y: (-x) * (-y), lambda x, y: x * y),
+    "(-x) / (-y)": (lambda x, y: (-x) / (-y), lambda x, y: x / y),
+    "(-2) x": (lambda x, y: -2.0 * x, lambda x, y: -(2.0 * x)),
+    "y + x": (lambda x, y: y + x, lambda x, y: x + y),
+    "y x": (lambda x, y: y * x, lambda x, y: x * y),
+    "min x x": (lambda x, y: minimum(x, x), lambda x, y: x),
+    "where p p": (lambda x, y: where_larger(x, y, x, x), lambda x, y: x),
+    "where of numbers": (lambda x, y: where_larger(2.0, -3.0, x, y), lambda x, y: y),
+}
+
+
+@pytest.mark.parametrize("rule", FOLDS)
+def test_folding(rule):
+    """Both ways of writing it are the same node of the tape, or the same number."""
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    written, folded = (function(x, y) for function in FOLDS[rule])
+    assert getattr(written, "number", written) == getattr(folded, "number", folded)
+
+
+def test_numbers_stay_numbers():
+    assert (root(4.0), absolute(-3.0), minimum(1.0, 2.0), maximum(1.0, 2.0)) == (2.0, 3.0, 1.0, 2.0)
+    assert where_larger(-2.0, 1.0, 5.0, 6.0) == 5.0
+
+
+def test_equal_operations_are_written_once():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    first = root(x * y + 2.0)
+    count = len(tape.nodes)
+    assert root(2.0 + y * x).number == first.number
+    assert len(tape.nodes) == count
+
+
+def test_dead_work_is_left_out():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    _, live = (x * y) * (x + y), x * y
+    compiled = program("p", tape, {2: live})
+    assert compiled.operations == {"input": 2, "*": 1}
+    assert compiled.flops == 1
+    assert program("p", tape, {2: 0.0 * (x / y)}).flops == 0
+
+
+def test_flops_count_every_operation_once():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    z = root(x * x + y * y)
+    compiled = program("p", tape, {2: where_larger(x, y, z, -z), 3: maximum(z, absolute(x)) / (z - 1.0)})
+    assert compiled.flops == sum(compiled.operations.values()) - 2 - 1  # but the two inputs and the one constant
+    assert compiled.flops == 11
+
+
+# Executing in place
+
+
+def test_outputs_may_overwrite_inputs():
+    """All inputs are read before any output is written."""
+    tape = Tape()
+    x, y, z = (tape.input(k) for k in range(3))
+    block = np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 30.0]])
+    run({0: y, 1: x, 2: x + y * z}, block)
+    assert block.tolist() == [[2.0, 20.0], [1.0, 10.0], [7.0, 610.0]]
+
+
+def test_one_scalar_may_go_to_many_slots():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    block = run({0: x + y, 1: x + y, 2: x, 3: 5.0}, np.array([[1.0], [2.0], [0.0], [0.0]]))
+    assert block[:, 0].tolist() == [3.0, 3.0, 1.0, 5.0]
+
+
+def test_programs_share_a_block():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    block = np.array([[1.0], [2.0]])
+    executor = numpy_executor([program("sum", tape, {0: x + y}), program("product", tape, {1: x * y})], block)
+    for name in ("sum", "product", "sum"):
+        executor.run(name)
+    assert executor.get([0, 1])[:, 0].tolist() == [9.0, 6.0]
+
+
+def test_lanes_choose_for_themselves():
+    a, b = [1.0, -3.0, 2.0, np.nan], [2.0, 1.0, -2.0, 1.0]
+    p, q = [10.0, 20.0, 30.0, 40.0], [-10.0, -20.0, -30.0, -40.0]
+    _, found = traced(lambda a, b, p, q: [where_larger(a, b, p, q), where_larger(a, b, p, 0.0)], a, b, p, q)
+    assert found.tolist() == [[-10.0, 20.0, -30.0, -40.0], [0.0, 20.0, 0.0, 0.0]]
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize("extreme", [minimum, maximum])
+@pytest.mark.parametrize(("a", "b"), [(NAN, 1.0), (1.0, NAN)])
+def test_nan_is_not_lost(extreme, a, b):
+    """Of two lanes, of a lane and a number, of two numbers: a NaN residual must never look converged."""
+    _, found = traced(lambda x, y: [extreme(x, y), extreme(x, b), extreme(a, y)], [a], [b])
+    assert np.isnan(found).all()
+    assert math.isnan(extreme(a, b))
+
+
+def test_division_by_zero_is_a_value():
+    _, found = traced(lambda x, y: [x / y, x / 0.0, root(-x)], [1.0, -1.0], [0.0, 0.0])
+    assert found[0].tolist() == [np.inf, -np.inf]
+    assert found[1].tolist() == [np.inf, -np.inf]
+    assert np.isnan(found[2, 0])

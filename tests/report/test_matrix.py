@@ -1,0 +1,103 @@
+"""The matrix of cases and engines, on the terminal and as Markdown, and that of all joint types in the README."""
+
+import re
+from pathlib import Path
+
+import kincheck.adapters
+import kincheck.cases
+import pytest
+from kincheck.core.cli import main as cli
+from kincheck.core.joints import Coupler, Joint
+
+from ..support.fakes import (Fake, crank, off, raising)
+
+README = Path(__file__).parents[2] / "README.md"
+BUILT_IN = [
+    name
+    for registry in (Joint.registry, Coupler.registry)
+    for name, each in registry.items()
+    if each.__module__.startswith("kincheck.")
+]
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path, capsys):
+    """Runs the command line with fake engines; (exit status, what it printed, the Markdown it wrote)."""
+
+    def main(*argv, engines, cases=()):
+        by_name = {engine.name: engine for engine in engines}
+        monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
+        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
+        monkeypatch.setattr(kincheck.adapters, "engine", by_name.get)
+        monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(case.name for case in cases))
+        monkeypatch.setattr(kincheck.cases, "load", {case.name: case for case in cases}.get)
+        status = cli.main(["run", *argv, "--jobs", "0", "--markdown", str(tmp_path / "matrix.md")])
+        return status, capsys.readouterr().out, (tmp_path / "matrix.md").read_text("utf-8")
+
+    return main
+
+
+ENGINES = (
+    Fake("native"),
+    Fake("close", answer=off("velocity", lambda v: v + 3e-11)),
+    Fake("wrong", answer=off("position", lambda p: p + 2e-3)),
+    Fake("unable", refusal="joint 'pivot' (revolute) has no | counterpart"),
+    Fake("broken", answer=raising(ValueError("no [axis] there"))),
+    Fake("missing", installed=None),
+)
+
+
+def test_cells_say_how_far_off_or_why_not(run):
+    status, _, markdown = run(engines=ENGINES, cases=[crank(reference=False)])
+    assert status == 1
+    head, _, row = ([cell.strip() for cell in line.split("|")[1:-1]] for line in markdown.splitlines()[:3])
+    assert head == ["", *(f"{each.name} {each.installed or ''}".strip() for each in ENGINES)]
+    assert row == [
+        "`crank`",
+        "not judged, residual 1e-15",
+        "0e+00 · 3e-11 · 0e+00",
+        "fail: 2e-03 · 0e+00 · 0e+00",
+        "unsupported",
+        "error",
+        "unavailable",
+    ]
+    assert "against native: position [m]" in markdown
+    assert r"Unsupported: crank in unable: joint 'pivot' (revolute) has no \| counterpart." in markdown
+    assert "no [axis] there" in markdown
+
+
+def test_joints_are_run_instead_of_the_built_in_cases_and_printed_as_a_matrix(run):
+    """A fake engine has no such points, so every cell is an error; what counts here is which cells there are."""
+    _, printed, markdown = run("--joints", engines=[Fake("native"), Fake("other")], cases=[crank()])
+    found = re.findall(r"^\| `(\w+)` \|", markdown, re.MULTILINE)
+    assert sorted(found) == sorted([*Joint.registry, *Coupler.registry])
+    lines = [line.split() for line in printed.splitlines()]
+    assert lines[0] == ["case", "native", "other"]
+    assert [line[0] for line in lines[1 : len(found) + 1]] == found
+
+
+def test_without_anything_to_compare_with_there_are_no_errors(run):
+    _, _, markdown = run(engines=[Fake("native")], cases=[crank(reference=False)])
+    assert "No errors: nothing was compared with anything" in markdown
+    assert "Largest errors" not in markdown
+
+
+def test_joints_and_cases_can_be_run_together(run):
+    _, _, markdown = run("--joints", "crank", engines=[Fake("native")], cases=[crank()])
+    assert "| `crank` |" in markdown
+    assert "| `revolute` |" in markdown
+
+
+def test_markdown_is_refused_before_the_run_where_it_cannot_be_written(capsys):
+    assert cli.main(["run", "--markdown", "no/such/folder/matrix.md"]) == 2
+    assert "--markdown no/such/folder/matrix.md: cannot be written" in capsys.readouterr().err
+
+
+def test_every_joint_type_is_in_the_readme():
+    """`kincheck run --joints --markdown FILE` makes the table anew."""
+    found = re.search(r"<!-- joints:begin -->(.*)<!-- joints:end -->", README.read_text("utf-8"), re.DOTALL)
+    if found is None:
+        pytest.skip("the README has no table of joints")
+    rows = re.findall(r"^\| `(\w+)` \|(.*)$", found[1], re.MULTILINE)
+    assert sorted(name for name, _ in rows) == sorted(BUILT_IN)
+    assert [name for name, cells in rows if "fail" in cells or "error" in cells] == []

@@ -1,0 +1,279 @@
+"""The benchmark of engines: turns are taken, error and outcome stand beside the time, modes are kept apart. No time is judged."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import subprocess
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+import pytest
+from kincheck.core.case.case import Truth
+from kincheck.core.cli import bench as command
+from kincheck.core.cli import main
+from kincheck.core.harness.engine import Floor
+from kincheck.core.harness.provenance import THREADS
+from kincheck.core.harness.record import Outcome
+from kincheck.core.report.sections import page
+from kincheck.core.studies.bench import engines, precision, rounds
+from kincheck.core.studies.bench.diagrams import precision_diagram
+from kincheck.core.studies.bench.engines_report import report
+from kincheck.core.studies.paper import formulation
+
+from ..support.fakes import Fake, crank, off, partial, raising, solution
+
+TOL = 1e-12
+
+
+# Rounds
+
+
+def test_contestants_take_turns(monkeypatch):
+    monkeypatch.setattr(rounds, "TURN", 1e-12)  # one call a turn
+    called = []
+    found = rounds.take_turns({name: lambda name=name: called.append(name) for name in "ab"}, 3)
+    assert "".join(called) == rounds.FIRST * "a" + rounds.FIRST * "b" + 3 * "ab"
+    assert [each.rounds for each in found.values()] == [3, 3]
+
+
+def test_quick_work_is_done_several_times_and_warmed(monkeypatch):
+    clock = iter(range(1000))
+    monkeypatch.setattr(rounds, "perf_counter", lambda: 1.1e-3 * next(clock))  # every work seems to take a millisecond
+    called = []
+    found = rounds.take_turns({"a": lambda: called.append("a")}, 2)
+    assert len(called) == rounds.FIRST + 2 * (1 + 2)  # a turn of 2 ms, and a call before each
+    assert found["a"].median == pytest.approx(0.55e-3)  # the clock goes on once in a turn, for two calls
+
+
+def test_work_that_is_slow_at_first_is_timed_by_what_it_takes_later(monkeypatch):
+    now, took = [0.0], iter([0.1, 0.2, *[0.001] * 200])
+    monkeypatch.setattr(rounds, "perf_counter", lambda: now[0])
+
+    def work() -> None:
+        now[0] += next(took)
+
+    assert rounds.warmed(work) == pytest.approx(0.001)
+    took = iter([0.3] * 100)
+    begin = now[0]
+    assert rounds.warmed(work) == pytest.approx(0.3)
+    assert now[0] - begin == pytest.approx(0.6)  # it is slow: twice is enough
+
+
+def test_spread():
+    found = rounds.spread([4.0, 1.0, 2.0, 3.0, 100.0])
+    assert (found.least, found.lower, found.median, found.upper, found.rounds) == (1.0, 2.0, 3.0, 4.0, 5)
+    assert found.times(10.0).upper == 40.0
+
+
+# Work and precision
+
+
+@dataclass
+class Measured(Fake):
+    """With efforts, off by a micrometre or not at all, and a floor."""
+
+    def efforts(self):
+        return {
+            "coarse": Fake(self.name, off("position", lambda p: p + 1e-6), mode=self.mode),
+            "fine": Fake(self.name, mode=self.mode),
+        }
+
+    def floor(self, case):
+        return Floor(0.5, "half a microsecond", {"all": 0.5}) if self.mode == "projection" else None
+
+
+def test_an_entry_has_error_and_outcome():
+    coarse, fine = precision.contestants(crank(), Measured().efforts(), TOL)
+    assert (coarse.entry.setting, coarse.entry.outcome, fine.entry.outcome) == ("coarse", Outcome.FAIL, Outcome.PASS)
+    assert coarse.entry.errors.position == pytest.approx(1e-6)
+    assert (fine.entry.errors.velocity, fine.entry.iterations, fine.entry.against) == (0.0, 3.0, "closed_form")
+    entry = fine.timed(rounds.spread([9e-6]))
+    assert entry.us_per_sample.median == pytest.approx(1.0)  # nine samples
+
+
+@pytest.mark.parametrize(
+    ("engine", "outcome"),
+    [
+        (Fake(installed=None), Outcome.UNAVAILABLE),
+        (Fake(refusal="no cranks"), Outcome.UNSUPPORTED),
+        (Fake(answer=raising(RuntimeError("broken"))), Outcome.ERROR),
+        (Fake(answer=partial), Outcome.FAIL),
+    ],
+)
+def test_what_cannot_be_timed_is_still_an_entry(engine, outcome):
+    found = precision.contestants(crank(), {"one": engine}, TOL)
+    assert [(each.entry.outcome, each.work) for each in found] == [(outcome, None)]
+    assert found[0].entry.message
+    (needed, *_) = precision.needed([each.timed(None) for each in found])
+    assert needed.us_per_sample is None
+    assert needed.reason
+
+
+def entries():
+    """A coarse, fast effort and a fine, slow one; a third that is slower still."""
+    case = crank()
+    efforts = {**Measured().efforts(), "finest": Fake()}
+    found = precision.contestants(case, efforts, TOL)
+    return [each.timed(rounds.spread([seconds])) for each, seconds in zip(found, (9e-6, 18e-6, 27e-6), strict=True)]
+
+
+def test_the_fastest_effort_that_meets_the_error():
+    by_error = {each.required: each for each in precision.needed(entries())}
+    assert {required: each.setting for required, each in by_error.items()} == {
+        1e-3: "coarse",
+        1e-6: "fine",
+        1e-9: "fine",
+        1e-12: "fine",
+    }
+    assert by_error[1e-3].us_per_sample == pytest.approx(1.0)
+    (none,) = [each for each in precision.needed(entries()[:1]) if each.required == 1e-9]
+    assert none.us_per_sample is None
+    assert "1.0e-06 m" in none.reason
+
+
+def test_a_case_without_a_reference_is_proved():
+    pytest.importorskip("flint")
+    case, known = crank(reference=False), crank()
+    found = precision.with_truth(case, TOL)
+    assert found.truth is Truth.IN_HOUSE_ORACLE
+    for name, series in known.reference.items():
+        assert np.abs(found.reference[name].position - series.position).max() <= 1e-16
+        assert np.abs(found.reference[name].acceleration - series.acceleration).max() <= 1e-15
+    assert precision.with_truth(known, TOL) is known
+
+
+# The whole
+
+
+def measured(tell=print):
+    """Of fake engines in both modes."""
+    both = [Measured("native"), Measured("fake"), Measured("fake", mode="simulate"), Fake("gone", installed=None)]
+    return engines.measure({"crank": crank()}, both, tol=TOL, rounds=1, parts=("work",), command="kincheck bench", tell=tell)
+
+
+def test_modes_share_neither_table_nor_diagram():
+    found = measured()
+    assert {(each.engine, each.mode) for each in found.entries} == {
+        ("native", "projection"),
+        ("fake", "projection"),
+        ("fake", "simulate"),
+        ("gone", "projection"),
+    }
+    drawn = {mode: precision_diagram(found, "crank", mode).figure["data"] for mode in ("projection", "simulate")}
+    assert {trace["meta"] for trace in drawn["projection"]} == {"native", "fake", "native: floor", "fake: floor"}
+    captions = {mode: precision_diagram(found, "crank", mode).plot.caption for mode in drawn}
+    assert {mode for mode, caption in captions.items() if "A cross is a simulator's floor" in caption} == {"projection"}
+    assert {trace["meta"] for trace in drawn["simulate"]} == {"fake · simulate"}
+    tables = {section.title: section.rows for section in report(found).sections}
+    assert {row[0] for row in tables["crank, simulate: work and precision"]} == {"fake"}
+    assert {row[0] for row in tables["crank, projection: time at a required error"]} == {"native", "fake", "gone"}
+    assert "none" in tables["crank, projection: time at a required error"][-1]
+
+
+def test_every_row_has_loop_error_and_outcome_beside_the_time():
+    for entry in measured().entries:
+        assert entry.loop
+        assert entry.message if entry.us_per_sample is None else entry.errors.position is not None
+
+
+def test_results_are_read_as_they_were_written(tmp_path):
+    found = measured()
+    file = tmp_path / "bench.json"
+    file.write_bytes(msgspec.json.encode(found))
+    efforts = engines.efforts_in(file)
+    assert [(each.engine, each.mode) for each in efforts["crank"]][2:] == [("fake", "projection")] * 2 + [
+        ("fake · simulate", "simulate")
+    ] * 2
+    html = page(report(found))
+    assert 'data-figure="crank-simulate"' in html
+    assert "https:" not in html.partition("<script")[0]
+
+
+# The command
+
+
+@pytest.fixture
+def one_thread(monkeypatch):
+    monkeypatch.setenv(THREADS[0], "1")
+
+
+@pytest.mark.usefixtures("one_thread")
+def test_command_and_report_of_a_run(tmp_path, capsys):
+    asked = ["bench", "engines", "--rounds", "1", "--engine", "native", "--cases", "rssr", "--parts", "work"]
+    assert main.main([*asked, "--json", "-", "--out", str(tmp_path)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "kincheck-bench/1"
+    assert {each["case"] for each in found["entries"]} == {"rssr"}
+    assert json.loads((tmp_path / "bench.json").read_text("utf-8")) == found
+    run = ["run", "rssr", "--engine", "native", "--out", str(tmp_path)]
+    assert main.main(run) == 0
+    assert "Work and precision" not in (tmp_path / "report.html").read_text("utf-8")
+    assert main.main([*run, "--bench", str(tmp_path / "bench.json")]) == 0
+    assert "Work and precision" in (tmp_path / "report.html").read_text("utf-8")
+
+
+@pytest.mark.usefixtures("one_thread")
+def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
+    found = measured()  # of an engine "gone" too
+    monkeypatch.setattr(engines, "measure", lambda cases, engines, **options: found)
+    for name, status in (("gone", 2), ("native", 0)):
+        monkeypatch.setattr("kincheck.core.cli.registry.House.find_engines", lambda house, names, *rest: [])
+        assert main.main(["bench", "engines", "--engine", name, "--cases", "rssr"]) == status
+        assert ("engine 'gone' is named and missing" in capsys.readouterr().err) is (status == 2)
+
+
+def test_an_effort_leaves_a_residual_on_purpose():
+    def answer(case):
+        return replace(solution(case), residual=1e-6)
+
+    (effort,) = precision.contestants(crank(), {"one step": Fake(answer=answer)}, TOL)
+    assert (effort.entry.outcome, effort.entry.residual) == (Outcome.PASS, 1e-6)
+
+
+def test_run_refuses_what_is_no_benchmark(tmp_path, capsys):
+    (tmp_path / "bench.json").write_text("{}")
+    bad = str(tmp_path / "bench.json")
+    assert main.main(["run", "rssr", "--engine", "native", "--bench", bad]) == 2
+    assert "give --out" in capsys.readouterr().err
+    assert main.main(["run", "rssr", "--engine", "native", "--bench", bad, "--out", str(tmp_path)]) == 2
+    assert "kincheck bench wrote" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("one_thread")
+def test_plain_bench_is_everything(monkeypatch, tmp_path):
+    asked = {}
+    found = measured()
+    monkeypatch.setattr(engines, "measure", lambda cases, engines, **options: asked.update(options, cases=cases) or found)
+    monkeypatch.setattr(formulation, "STATES", 3)
+    assert main.main(["bench", "--out", str(tmp_path)]) == 0
+    assert (tuple(asked["cases"]), asked["parts"]) == (command.CASES, engines.PARTS)
+    found = json.loads((tmp_path / "bench.json").read_text("utf-8"))
+    assert found["formulation"]["case"] == "mcpherson_strut"
+
+
+def test_linear_algebra_has_one_thread(monkeypatch):
+    for name in THREADS:
+        monkeypatch.delenv(name, raising=False)
+    started = []
+    monkeypatch.setattr(
+        subprocess, "run", lambda arguments, env, check: started.append((arguments, env)) or subprocess.CompletedProcess([], 5)
+    )
+    assert main.main(shlex.split("bench engines --rounds 2")) == 5
+    ((arguments, env),) = started
+    assert arguments[-4:] == ["bench", "engines", "--rounds", "2"]
+    assert {env[name] for name in THREADS} == {"1"}
+
+
+@pytest.mark.usefixtures("one_thread")
+def test_bad_options_are_named(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    for options, said in (
+        (["--cases", "rsr"], "'rssr'"),
+        (["--engine", "natve"], "'native'"),
+        (["--rounds", "0"], "not a whole number of 1 or more"),
+        (["--out", str(tmp_path / "file")], "cannot be made a folder"),
+    ):
+        assert main.main(["bench", "engines", *options]) == 2
+        assert said in capsys.readouterr().err

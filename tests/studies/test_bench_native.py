@@ -1,0 +1,130 @@
+"""The native engine's own benchmarks: they measure what they say, and solve what they time. No time is judged."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import adapters, cases
+from kincheck.core import SolveError
+from kincheck.core.harness.record import Outcome
+from kincheck.core.studies.bench import batch, native_breakdown, peak, precision, processes, rounds, size, study_throughput
+
+TOL = 1e-12
+
+
+def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
+    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)  # twice four predict to 3e-9
+    case = cases.load("rssr")
+    found = [each.entry for each in precision.contestants(case, adapters.engine("native").efforts(), TOL)]
+    errors, iterations = [each.errors.position for each in found], [each.iterations for each in found]
+    assert iterations[0] == 1.0
+    assert iterations == sorted(iterations)
+    assert errors == sorted(errors, reverse=True)
+    assert errors[0] > 1e-8
+    assert errors[-1] < 1e-14
+    assert len({json.dumps(dict(each.settings)) for each in found}) == len(found)
+
+
+def test_levels_give_what_is_asked_and_no_more():
+    case = cases.load("rssr")
+    found = {each.entry.setting: each.entry for each in precision.contestants(case, native_breakdown.LEVELS, TOL)}
+    assert {each.outcome for each in found.values()} == {Outcome.PASS}
+    assert found["every body and point: position"].errors.velocity is None
+    assert found[native_breakdown.EVERYTHING].errors.acceleration < 1e-11
+    assert found[native_breakdown.NUMPY].loop == "python"
+
+
+def test_loops_alone_reach_every_sample_or_say_so():
+    pytest.importorskip("llvmlite")
+    case = cases.load("mcpherson_strut")
+    assert np.isfinite(native_breakdown.loops_alone(case, TOL)()).all()
+    out_of_reach = replace(case, sweep=replace(case.sweep, values=np.linspace(0.0, 0.6, 61)))
+    with pytest.raises(SolveError, match="of 61 samples"):
+        native_breakdown.loops_alone(out_of_reach, TOL)()
+
+
+def test_flops_of_a_sample():
+    model = native_breakdown.Level().build(cases.load("rssr")).model
+    sizes = {name: each["flops"] for name, each in model.sizes.items()}
+    once, twice = (native_breakdown.flops_of(model, n) for n in (1.0, 2.0))
+    assert twice - once == sizes["newton"]
+    assert once == sum(sizes[name] for name in ("extrapolate", "newton", "outputs", "joined_gaps", "joined"))
+
+
+def test_the_peak_kernel_does_its_arithmetic():
+    pytest.importorskip("llvmlite")
+    kernel = peak.prepare()
+    factor, term, *rest = kernel.memory.reshape(-1, kernel.width)[:, 0]
+    assert (factor, term) == (0.5, 1.0)
+    assert rest[0] == 1.0
+    kernel()
+    assert (kernel.memory[2 * kernel.width :] == 2.0).all()  # where x = 0.5 x + 1 ends
+    assert kernel.flops == 2 * kernel.width * peak.CHAINS * peak.STEPS
+    assert kernel.rate(rounds.spread([1.0, 2.0])) == kernel.flops
+
+
+def test_batches(monkeypatch):
+    monkeypatch.setattr(batch, "SIZES", (1, 5))
+    one, five = batch.measure_batches(cases.load("mcpherson_strut"), TOL, 1, None)
+    assert (one.variants, five.variants) == (1, 5)
+    assert (five.solved, five.retried, five.of_peak) == (1.0, 0, None)
+    assert max(one.error, five.error) < 1e-15
+
+
+def test_a_study_takes_turns_on_one_thread_and_on_two(monkeypatch):
+    pytest.importorskip("llvmlite")
+    monkeypatch.setattr(study_throughput, "VARIANTS", 512)
+    monkeypatch.setattr(study_throughput.os, "cpu_count", lambda: 4)
+    one, two = study_throughput.measure_studies(cases.load("mcpherson_strut"), TOL, 3, peak.prepare())
+    assert (one.jobs, two.jobs, one.unsolved, two.unsolved) == (1, 2, 0, 0)
+    assert (one.times.least, one.peak_times.median, one.us_per_sample.rounds) == (1.0, 1.0, 3)
+    assert (two.times.rounds, two.peak_times.rounds) == (3, 3)
+    monkeypatch.setattr(study_throughput.os, "cpu_count", lambda: 1)
+    (alone,) = study_throughput.measure_studies(cases.load("mcpherson_strut"), TOL, 1, None)
+    assert (alone.variants, alone.peak_times) == (512, None)
+
+
+def test_chains_are_solved_until_they_take_too_long(monkeypatch):
+    monkeypatch.setattr(size, "LOOPS", (1, 2))
+    monkeypatch.setattr(size, "MANY", (3, 4))
+    monkeypatch.setattr(size, "CRANKS", (4,))
+    found = size.measure_sizes([adapters.engine("native")], TOL, 1)
+    assert [(each.engine, each.loops, each.bodies) for each in found] == [
+        ("native", 1, 3),
+        ("native", 2, 5),
+        ("native, by components", 3, 7),
+        ("native, by components", 4, 9),
+        ("native", 4, 7),
+    ]
+    assert all(each.outcome is Outcome.PASS and each.error < 1e-13 for each in found)
+    monkeypatch.setattr(size, "LONGEST", 0.0)
+    _, second, *_ = size.measure_sizes([adapters.engine("native")], TOL, 1)
+    assert (second.outcome, second.us_per_sample) == (None, None)
+    assert second.message.startswith("not tried: 1 took")
+
+
+def test_growth_is_that_of_the_largest():
+    timed = [(1, 1.0), (100, 2.0), (1000, 9.0), (10000, 200.0)]
+    sizes = [
+        size.Size(mechanism="", loops=n, bodies=0, engine="", mode="", loop="", message="", us_per_sample=rounds.spread([t]))
+        for n, t in timed
+    ]
+    assert size.growth(sizes) == pytest.approx((100, 10000, 1.0))
+    assert size.growth(sizes[:2]) == pytest.approx((1, 100, np.log10(2.0) / 2.0))
+    assert size.growth(sizes[:1]) is None
+
+
+def test_processes(monkeypatch):
+    name = "mcpherson_strut"
+    found = processes.measure_processes(cases.load(name), name, [adapters.engine("native")], TOL, 1)
+    by_name = {each.what: each for each in found}
+    assert list(by_name) == [processes.NUMPY, processes.EMPTY, processes.CACHED, "kincheck run --engine native"]
+    assert {each.status for each in found} == {0}
+    assert by_name[processes.EMPTY].beyond_numpy > 0.0
+    assert by_name[processes.NUMPY].beyond_numpy is None
+    monkeypatch.setattr(processes, "_IMPORT_NUMPY", "raise SystemExit(3)")
+    with pytest.raises(RuntimeError, match="exit status 3"):
+        processes.measure_processes(cases.load(name), name, [], TOL, 1)

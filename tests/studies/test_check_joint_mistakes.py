@@ -1,0 +1,201 @@
+"""Joints with one mistake each, and the check that must name it."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import pytest
+from kincheck.core import ConstantVelocity, InPlane, Revolute, Spherical, Translational, Universal, check_joint
+from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, vec
+from kincheck.core.joints.base import triad, unit
+from kincheck.core.primitives import Row
+from kincheck.core.studies.joint_check.loading import load_joint
+
+pytestmark = pytest.mark.usefixtures("own_joint_types")
+
+
+def mistaken(base, primitive=None, **changes):
+    """A joint type like the base, its primitives of one type with methods or fields changed."""
+
+    def primitives(self, i, j):
+        composed = base.primitives(self, i, j)
+        return [_retyped(each, primitive, changes) if type(each) is primitive else each for each in composed]
+
+    body = {"type": "mistaken", "primitives": primitives} if primitive else {"type": "mistaken", **changes}
+    return dataclass(frozen=True)(type("Mistaken", (base,), body))
+
+
+def _retyped(native, primitive, changes):
+    fields = {each.name: getattr(native, each.name) for each in dataclasses.fields(native)}
+    methods = {name: change for name, change in changes.items() if name not in fields}
+    kind = type(f"Mistaken{primitive.__name__}", (primitive,), methods)
+    return kind(**fields | {name: change(fields[name]) for name, change in changes.items() if name in fields})
+
+
+def negative_gamma(self, i, j, vi, vj):
+    return tuple(-x for x in super(type(self), self).gamma(i, j, vi, vj))
+
+
+def doubled_rows(self, i, j):
+    return tuple(Row(*(2.0 * a for a in row)) for row in super(type(self), self).rows(i, j))
+
+
+def rows_without_arm(self, i, j):
+    return tuple(row._replace(pj=ZERO) for row in super(type(self), self).rows(i, j))
+
+
+def steady(self, i, j):
+    return (0.1,) * self.n
+
+
+def negative_branch(self, i, j):
+    return tuple(-x for x in super(type(self), self).branch(i, j))
+
+
+def no_branch(self, i, j):
+    return ()
+
+
+def rough(self, i, j):
+    return tuple(abs_of(x) for x in super(type(self), self).phi(i, j))
+
+
+def abs_of(x):
+    from kincheck.core.program import absolute
+
+    return absolute(x)
+
+
+def cancelling(self, i, j):
+    # a difference of numbers ten million times larger than what it is of
+    x = i.u.x + j.u.x
+    return tuple((each + 1e7 * x) - 1e7 * x for each in super(type(self), self).phi(i, j))
+
+
+def left_handed(self, i, j):
+    f, g, h = triad(self.axis)
+    P = vec(self.point)
+    return p.Spherical(i.arm(P), j.arm(P)), p.Dot11(g, f, h)
+
+
+def long_axis(self, i, j):
+    f, g, _ = triad(self.axis)
+    P = vec(self.point)
+    return p.Spherical(i.arm(P), j.arm(P)), p.Dot11(f, g, vec(self.axis))
+
+
+def long_row(self, i, j):
+    P = vec(self.point)
+    return (p.Dot20(vec(self.axis), i.arm(P), j.arm(P), ZERO),)
+
+
+def missing_row(self, i, j):
+    f, _, h = triad(self.axis)
+    P = vec(self.point)
+    return p.Spherical(i.arm(P), j.arm(P)), p.Dot10(f, h)
+
+
+def repeated_row(self, i, j):
+    f, _, h = triad(self.axis)
+    P = vec(self.point)
+    return p.Spherical(i.arm(P), j.arm(P)), p.Dot10(f, h), p.Dot10(h, f)
+
+
+def wrong_body(self, i, j):
+    P = vec(self.point)
+    return (p.Spherical(j.arm(P), j.arm(P)),)
+
+
+def global_arm(self, i, j):
+    return (p.Spherical(vec(self.point), vec(self.point)),)
+
+
+def open_at_design(self, i, j):
+    P, (f, g, _) = vec(self.point), triad(self.axis)
+    arms = i.arm(P), j.arm(P)
+    return p.Spherical(*arms, d0=0.01 * f), p.Dot11(f, g, unit(self.axis))
+
+
+def untraceable(self, i, j):
+    class Root(p.Spherical):
+        def phi(self, i, j):
+            return tuple(math.sqrt(x) for x in super().phi(i, j))
+
+    P = vec(self.point)
+    return (Root(i.arm(P), j.arm(P)),)
+
+
+def unscaled(self, i, j):
+    P, (f, g, _) = vec(self.point), triad(self.axis)
+    arms = i.arm(P), j.arm(P)
+    return tuple(p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in (f, g))
+
+
+def no_rows(self, i, j):
+    return ()
+
+
+def one_short(self, i, j, vi, vj):
+    return super(type(self), self).gamma(i, j, vi, vj)[1:]
+
+
+MISTAKES = {
+    "sign of gamma": ("gamma", lambda: mistaken(Revolute, p.Dot11, gamma=negative_gamma)),
+    "gamma of a line": ("gamma", lambda: mistaken(Translational, p.Dot21, gamma=negative_gamma)),
+    "gamma one short": ("equations", lambda: mistaken(Spherical, p.Spherical, gamma=one_short)),
+    "no rows": ("equations", lambda: mistaken(InPlane, primitives=no_rows)),
+    "rows without an arm": ("rows", lambda: mistaken(InPlane, p.Dot20, rows=rows_without_arm)),
+    "rows too long": ("newton", lambda: mistaken(Spherical, p.Spherical, rows=doubled_rows)),
+    "axes swapped": ("newton", lambda: mistaken(Revolute, primitives=left_handed)),
+    "axis not unit": ("axis lengths", lambda: mistaken(Revolute, primitives=long_axis)),
+    "a row as long as the axis": ("axis lengths", lambda: mistaken(InPlane, primitives=long_row)),
+    "a row missing": ("freedoms", lambda: mistaken(Revolute, primitives=missing_row)),
+    "a row twice": ("rank", lambda: mistaken(Revolute, primitives=repeated_row)),
+    "a freedom too many": ("freedoms", lambda: mistaken(Universal, freedoms=("rotation i", "rotation j", "slide"))),
+    "rows miscounted": ("freedoms", lambda: mistaken(Universal, rows=property(lambda self: 5))),
+    "nu": ("nu", lambda: mistaken(Spherical, p.Spherical, nu=steady)),
+    "sign of a branch test": ("branch tests", lambda: mistaken(Revolute, p.Dot11, branch=negative_branch)),
+    "no branch test": ("spurious branches", lambda: mistaken(ConstantVelocity, p.ConstantVelocity, branch=no_branch)),
+    "arm of the wrong body": ("rigid motion", lambda: mistaken(Spherical, primitives=wrong_body)),
+    "global arms": ("place", lambda: mistaken(Spherical, primitives=global_arm)),
+    "not closed at design": ("design", lambda: mistaken(Revolute, primitives=open_at_design)),
+    "a length that is none": ("size", lambda: mistaken(InPlane, primitives=unscaled)),
+    "called symmetric": ("exchange", lambda: mistaken(InPlane, symmetric=True)),
+    "not smooth": ("differences", lambda: mistaken(InPlane, p.Dot20, phi=rough)),
+    "cancellation": ("round-off", lambda: mistaken(Spherical, p.Spherical, phi=cancelling)),
+    "math.sqrt": ("equations", lambda: mistaken(Spherical, primitives=untraceable)),
+    "other coordinates": ("mixed style", lambda: mistaken(Revolute, freedoms=("rotation", "translation"))),
+    "loop": ("loop: acceleration", lambda: mistaken(Revolute, p.Dot11, gamma=negative_gamma)),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_are_caught(mistake):
+    check, make = MISTAKES[mistake]
+    report = check_joint(make())
+    assert check in report.failures, report
+    found = report[check]
+    assert found.limit is None or found.figure > found.limit
+    assert found.message
+
+
+def test_a_joint_without_rows_is_told_what_is_missing():
+    assert "has 0 rows, expected one or more; return its primitives" in check_joint(MISTAKES["no rows"][1]())["equations"].message
+
+
+def test_the_base_of_a_mistake_is_sound():
+    """The machinery of these tests makes no mistakes by itself."""
+    assert check_joint(mistaken(Revolute, p.Dot11)).passed
+    assert check_joint(mistaken(ConstantVelocity, p.ConstantVelocity)).passed
+
+
+def test_a_wrong_equivalent_is_caught(in_folder):
+    right = load_joint("pin_in_slot:PinInSlot")
+
+    def equivalent(self):
+        return [], [Spherical(f"{self.name}_ball", self.i, self.j, self.point)]
+
+    report = check_joint(mistaken(right, equivalent=equivalent))
+    assert report.failures == ("loop: native, equivalent",), report
+    assert "2 degrees of freedom" in report["loop: native, equivalent"].message

@@ -1,0 +1,90 @@
+"""Sweeps on a dask.distributed cluster: a real scheduler and two workers on loopback, one of which is lost on the way."""
+
+import importlib
+import os
+import signal
+
+import msgspec
+import pytest
+from kincheck.cases import load
+from kincheck.core.harness.workers import distributed as ours
+from kincheck.core.harness.workers.distributed import ClusterError
+from kincheck.core.harness.workers.messages import pack
+from kincheck.core.studies.tolerance import chunk_execution
+from kincheck.core.studies.tolerance.chunk_execution import on_cluster, solve_there
+from kincheck.core.studies.tolerance.study import Study
+from kincheck.core.studies.tolerance.sweep import sweep_designs
+
+from ..case.test_vary import vary
+from ..support.fakes import crank
+
+POINTS = {"ball": {"at": "ball", "sigma": 1.0}, "axis": {"at": "joints.lca_pivot.axis", "sigma": 0.1}}
+pytest.importorskip("distributed")
+# its own, of sockets and loops it leaves to the collector when a worker is killed
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+
+
+def timeless(results):
+    """All but how long it took and when."""
+    return msgspec.json.encode(msgspec.structs.replace(results, run={}, measured={}))
+
+
+def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluster, tmp_path):
+    """To the last bit, in whatever order the chunks were solved, and with those of the killed worker solved by the other."""
+    case = load("mcpherson_strut")
+    variation = vary(tmp_path, case, **POINTS)
+    victims = [nanny.pid for nanny in cluster.workers.values()]
+    seen = []
+
+    def hear(progress):
+        seen.append(progress.done)
+        if len(seen) == 5:
+            os.kill(victims[0], signal.SIGKILL)
+
+    common = {"samples": 40_000, "seed": 5, "order": 1}
+    there = sweep_designs(case, variation, source=on_cluster(cluster.scheduler_address), progress=hear, **common)
+    assert victims[0] not in [nanny.pid for nanny in cluster.workers.values()]
+    assert seen == [*range(576, 40_000, 576), 40_000]
+    assert there.measured["seconds"] > 0
+    assert timeless(there) == timeless(sweep_designs(case, variation, jobs=2, **common))
+
+
+def test_a_cluster_that_goes_is_a_message(cluster, tmp_path, monkeypatch):
+    monkeypatch.setattr(ours, "CONNECT", 1.0)  # the time that a client waits for it to come back, too
+    case = crank()
+
+    def hear(progress):
+        if progress.done == 4096:
+            cluster.close()
+
+    with pytest.raises(ClusterError, match=r"scheduler tcp://.+: (has gone|every worker that had)"):
+        sweep_designs(
+            case,
+            vary(tmp_path, case, tip={"at": "tip", "sigma": 1}),
+            samples=500_000,
+            source=on_cluster(cluster.scheduler_address),
+            progress=hear,
+        )
+
+
+def test_no_scheduler_is_a_message(tmp_path, monkeypatch):
+    monkeypatch.setattr(ours, "ANSWER", 0.25)
+    case = crank()
+    variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})
+    with pytest.raises(ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"):
+        sweep_designs(case, variation, samples=5, source=on_cluster("tcp://127.0.0.1:1"))
+    monkeypatch.setattr(importlib, "import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
+    with pytest.raises(ClusterError, match=r"pip install 'kincheck\[distributed\]'"):
+        sweep_designs(case, variation, samples=5, source=on_cluster("tcp://127.0.0.1:1"))
+
+
+def test_a_worker_solves_chunks_and_keeps_the_model(tmp_path):
+    case = crank()
+    packed = pack(Study(case, vary(tmp_path, case, tip={"at": "tip", "sigma": 1}), 600, 0))
+    version = importlib.metadata.version("kincheck")
+    assert [solve_there(packed, k, version).index for k in (1, 2)] == [1, 2]
+    (kept,) = (ready for ready in chunk_execution._ready.values() if ready.study.samples == 600)
+    solve_there(packed, 0, version)
+    assert kept in chunk_execution._ready.values()
+    with pytest.raises(ClusterError, match=r"on the cluster's worker, expected 0.0.1 as in the sweep; install the same there"):
+        solve_there(packed, 0, "0.0.1")

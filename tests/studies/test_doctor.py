@@ -1,0 +1,126 @@
+"""kincheck doctor: what is missing or broken is named with its remedy, and never taken for sound."""
+
+import importlib.metadata
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from kincheck.core.cli import installation
+from kincheck.core.cli.main import main
+from kincheck.core.program import disk_cache
+
+
+@pytest.fixture
+def without_imports(monkeypatch):
+    """Nothing is imported in processes of their own: that takes seconds."""
+    monkeypatch.setattr(installation, "_imported", lambda found, modules: found)
+
+
+def missing(monkeypatch, *names):
+    version = importlib.metadata.version
+
+    def found(name):
+        if name in names:
+            raise importlib.metadata.PackageNotFoundError(name)
+        return version(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", found)
+
+
+def test_a_sound_installation_is_found_able(without_imports, tmp_path, capsys):
+    assert main(["doctor", "--json", str(tmp_path / "found.json")]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"pin +\S+ +engine +ok", out)
+    assert "self-check mcpherson_strut: pass" in out
+    assert "kincheck can do its work" in out
+    found = json.loads((tmp_path / "found.json").read_text())
+    names = {part["name"] for part in found["parts"]}
+    assert {"numpy", "scipy", "llvmlite", "mujoco", "pin", "exudyn", "python-flint", "distributed", "pyarrow", "chromium"} <= names
+    assert found["check"]["error"] < 1e-3 * found["check"]["tolerance"]
+    assert found["machine"]["processor"]
+
+
+def test_a_missing_engine_is_no_obstacle_and_its_remedy_is_named(without_imports, monkeypatch, capsys):
+    missing(monkeypatch, "pin")
+    assert main(["doctor"]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("pin "))
+    assert "not installed: pip install 'pin>=" in line
+
+
+def test_an_llvmlite_that_cannot_be_loaded_leaves_the_work_to_numpy(tmp_path):
+    """Its package is there, and its library is not; nothing that it made before is kept here."""
+    for file, text in (("__init__.py", ""), ("binding.py", 'raise OSError("no libllvmlite.so")')):
+        (tmp_path / "llvmlite").mkdir(exist_ok=True)
+        (tmp_path / "llvmlite" / file).write_text(text)
+    here = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    ran = subprocess.run(
+        [sys.executable, "-c", "import sys; from kincheck.core.cli.main import main; sys.exit(main())", "doctor", "--json", "-"],
+        env=here,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    found = json.loads(ran.stdout)
+    (llvmlite,) = (part for part in found["parts"] if part["name"] == "llvmlite")
+    assert "no libllvmlite.so" in llvmlite["problem"]
+    assert (found["check"]["outcome"], found["machine"]["vector_width"]) == ("pass", None)
+
+
+def test_a_missing_essential_is_an_obstacle(without_imports, monkeypatch, capsys):
+    missing(monkeypatch, "scipy")
+    assert main(["doctor"]) == 2
+    out = capsys.readouterr().out
+    assert "kincheck cannot do its work" in out
+    assert "pip install 'scipy>=" in out
+
+
+@pytest.mark.parametrize(
+    ("imported", "said"),
+    [
+        ("os; os.abort()", "the process ended with status"),
+        ("no_such_module", "No module named 'no_such_module'"),
+        ("time; time.sleep(60)", "does not end within"),
+    ],
+)
+def test_what_is_installed_and_broken_is_told_from_what_works(imported, said, monkeypatch):
+    monkeypatch.setattr(installation, "PATIENCE", 5.0 if "sleep" not in imported else 0.5)
+    part = installation.Part("numpy", "1.0", "kincheck", True, "", "")
+    (found,) = installation._imported([part], {"numpy": imported})
+    assert said in found.problem
+    assert found.remedy == "pip install --force-reinstall numpy"
+
+
+def test_a_sound_module_has_no_problem():
+    part = installation.Part("msgspec", "1.0", "kincheck", True, "", "")
+    assert installation._imported([part], {}) == [part]
+
+
+def test_a_cache_that_cannot_be_written_is_said(without_imports, monkeypatch, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "every process compiles anew" in out
+    assert "XDG_CACHE_HOME" in out
+
+
+def test_a_user_without_a_home_solves_and_keeps_nothing(without_imports, monkeypatch, capsys):
+    """As in a container that is run as a user whom it does not know."""
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", nobody)
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "nowhere" in out
+    assert "the user has no home directory; every process compiles anew" in out
+    assert disk_cache.kept(b"said", lambda: b"made") == b"made"
+    assert disk_cache.find(b"said") is None
+    assert not disk_cache.known(b"said")
+
+
+def nobody():
+    raise RuntimeError("Could not determine home directory.")

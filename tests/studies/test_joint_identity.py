@@ -1,0 +1,62 @@
+"""A run is another one when the code of its joint types is: --resume never puts records of two joints into one run."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from kincheck.core.studies.joint_check.loading import sources
+
+from .test_check_joint import SLOT
+
+HERE = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    shutil.copy(HERE / "user_joints" / "pin_in_slot.py", tmp_path)
+    text = (tmp_path / "pin_in_slot.py").read_text()
+    (tmp_path / "pin_in_slot.py").write_text("import beside\n" + text.replace("from __future__ import annotations\n", ""))
+    (tmp_path / "beside.py").write_text("NUMBER = 1\n")
+    (tmp_path / "elsewhere.py").write_text("NUMBER = 1\n")
+    (tmp_path / "slot.toml").write_text(SLOT)
+    return tmp_path
+
+
+def run(folder, *arguments):
+    """Run as a user does, in the folder of the module."""
+    command = [sys.executable, "-m", "kincheck", "run", "slot.toml", "--joint-type", "pin_in_slot:PinInSlot", "--engine", "native"]
+    done = subprocess.run([*command, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
+def killed(folder):
+    """Have the last run of the history without an end."""
+    import sqlite3
+
+    connection = sqlite3.connect(folder / "h.sqlite")
+    connection.execute("UPDATE runs SET status = 'interrupted'")
+    connection.commit()
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    ("edited", "same"), [(None, True), ("pin_in_slot.py", False), ("beside.py", False), ("elsewhere.py", True)]
+)
+def test_an_edit_of_the_joints_code_makes_another_run(folder, edited, same):
+    run(folder, "--history", "h.sqlite")
+    killed(folder)
+    if edited is not None:
+        (folder / edited).write_text((folder / edited).read_text() + "\n# edited\n")
+    said = run(folder, "--history", "h.sqlite", "--resume")
+    assert ("run 1 goes on, 1 records are there" in said) is same
+    assert ("run 2 is new" in said) is not same
+
+
+def test_installed_modules_and_kinchecks_own_are_not_among_the_sources():
+    assert sources([]) == {}
+    found = sources([f"{__name__}:Nothing"])
+    assert __name__ in found
+    assert not any(name.split(".")[0] in ("kincheck", "numpy", "pytest") for name in found)

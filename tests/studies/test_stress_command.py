@@ -1,0 +1,207 @@
+"""kincheck stress on the command line, its files, and the writing of case files."""
+
+import json
+import re
+from dataclasses import replace
+
+import kincheck.adapters
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.adapters.native import Native
+from kincheck.core import solve
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.joint_probe import probes
+from kincheck.core.cli import main
+from kincheck.core.errors import CaseError
+from kincheck.core.studies.stress.report import headline, markdown, report
+from kincheck.core.studies.stress.results import Cell, Finding, Stress
+
+from ..support.fakes import Fake
+
+
+class Shifted(Native):
+    """The native engine, off by a micrometre beyond 2 rad."""
+
+    def build(self, case):
+        found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
+        far = (np.abs(case.sweep.change) > 2.0)[:, None]
+        points = {name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()}
+        return replace(found, points=points)
+
+    def solve(self, model, case, tol):
+        return model
+
+
+@pytest.fixture
+def shifted(monkeypatch):
+    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": Shifted())
+    monkeypatch.setattr("kincheck.core.studies.stress.run.suited", lambda engine, case, number: engine)
+
+
+def test_a_run_writes_tables_and_data(tmp_path, capsys):
+    assert (
+        main.main(["stress", "--family", "units", "degenerate", "--samples", "40", "--out", str(tmp_path / "new"), "--json", "-"])
+        == 0
+    )
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert found["schema"] == "kincheck-stress/1"
+    assert [cell["family"] for cell in found["cells"]] == ["units", "degenerate"]
+    assert sum(found["cells"][0]["samples"].values()) >= 20
+    assert found["findings"] == []
+    assert "None of" in err
+    assert {file.name for file in (tmp_path / "new").iterdir()} == {"stress.json", "stress.html", "stress.md"}
+    assert "| units | native projection |" in (tmp_path / "new" / "stress.md").read_text(encoding="utf-8")
+    assert "silently wrong" in (tmp_path / "new" / "stress.html").read_text(encoding="utf-8")
+
+
+def test_what_is_silently_wrong_is_reduced_saved_and_replayed(tmp_path, capsys, shifted):
+    assert main.main(["stress", "--family", "units", "--samples", "30", "--out", str(tmp_path), "--no-proofs"]) == 1
+    capsys.readouterr()
+    (file,) = tmp_path.glob("*.toml")
+    (finding,) = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))["findings"]
+    assert (finding["file"], finding["verdict"]) == (file.name, "silently wrong")
+    assert len(load_case(file).sweep.values) == 1
+    assert main.main(["stress", "--replay", str(file)]) == 1
+    assert "silently wrong first at turn = " in capsys.readouterr().out
+
+
+def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
+    file = tmp_path / "rssr.toml"
+    file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
+    assert main.main(["stress", "--replay", str(file)]) == 0
+    assert "right 181" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("engine", "why"),
+    [
+        (Fake("native", refusal="no joint of that kind"), "choose other families or another engine"),
+        (Fake("native", installed=None, refusal="not there"), "it is not installed"),
+    ],
+    ids=["unable", "missing"],
+)
+def test_an_engine_that_supports_nothing_is_not_praised(tmp_path, capsys, monkeypatch, engine, why):
+    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
+    assert main.main(["stress", "--family", "units", "--samples", "20", "--no-proofs"]) == 2
+    out, err = capsys.readouterr()
+    count = re.search(r"^No sample was examined, (\d+) unsupported$", out, re.MULTILINE)
+    assert count, out
+    assert f"kincheck: native projection: no sample was examined, {count[1]} unsupported: {why}\n" in err
+    file = tmp_path / "rssr.toml"
+    file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
+    assert main.main(["stress", "--replay", str(file)]) == 2
+    out, err = capsys.readouterr()
+    assert "unsupported 181" in out
+    assert "kincheck: no sample was examined of native: give another engine or other files\n" in err
+
+
+def test_samples_without_a_verdict_are_counted_apart():
+    samples = {"right": 5, "refused, right reason": 2, "refused, wrong reason": 0, "silently wrong": 0}
+    cell = {"engine": "one", "mode": "projection", "version": "1", "settings": {}, "worst": [None] * 3, "seconds": 0.0}
+    cell |= {"family": "arms", "specimens": 1, "elsewhere": 0, "bad": 0}
+    found = Cell(samples=samples | {"not judged": 3, "unsupported": 4}, **cell)
+    assert headline([found]) == "None of 7 samples silently wrong, 3 not judged, 4 unsupported"
+    wrong = Cell(samples=samples | {"silently wrong": 1, "not judged": 0, "unsupported": 0}, **cell)
+    assert headline([found, wrong]) == "1 of 15 samples silently wrong, 3 not judged, 4 unsupported"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--family", "unit"], "there is no family 'unit'; did you mean 'units'?"),
+        (["--engine", "nativ"], "there is no engine 'nativ'"),
+        (["--samples", "0"], "'0' is not a whole number of 1 or more"),
+        (["--replay", "nowhere.toml"], "no such file"),
+        (["--tol", "-1"], "is not a positive number"),
+    ],
+)
+def test_what_makes_no_sense_is_said_before_anything_is_run(options, said, capsys):
+    assert main.main(["stress", *options]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_families_are_listed_with_their_sizes(capsys):
+    assert main.main(["stress", "--list"]) == 0
+    out = capsys.readouterr().out
+    assert "units" in out
+    assert "1e7 m" in out
+
+
+def test_text_of_files_is_no_markup():
+    """Names and messages come from files and simulators."""
+    evil = "<script>|*x*`"
+    cell = {"engine": evil, "mode": "projection", "version": "1", "settings": {}, "worst": [None] * 3, "seconds": 0.0}
+    counts = dict.fromkeys(
+        ["right", "refused, right reason", "refused, wrong reason", "silently wrong", "not judged", "unsupported"], 1
+    )
+    found = Stress(
+        kincheck="1",
+        command="",
+        seed=0,
+        samples=6,
+        abouts={evil: evil},
+        cells=[Cell(family=evil, specimens=1, samples=counts, elsewhere=0, bad=1, **cell)],
+        findings=[
+            Finding(
+                family=evil, engine=evil, mode="projection", verdict="silently wrong", specimen=evil, number=0, sample=0,
+                value=0.0, message=evil, tol=1e-12, worst=[2.0, None, None],
+            )
+        ],
+        proofs=[],
+        acceptances=[],
+        seconds={},
+    )  # fmt: skip
+    text = markdown(report(found))
+    assert "<script>" not in text
+    assert "\\|" in text
+    assert "1 (20 %)" in text  # of the five that are supported
+
+
+# Case files, written
+
+
+@pytest.mark.parametrize("name", sorted(set(cases.names()) - {"mcpherson_suspension"}))
+def test_built_in_cases_are_read_as_they_were_written(name, tmp_path):
+    same_after_writing(cases.load(name), tmp_path)
+
+
+@pytest.mark.parametrize("case", probes(), ids=lambda case: case.name)
+def test_every_joint_type_is_read_as_it_was_written(case, tmp_path):
+    same_after_writing(case, tmp_path)
+
+
+def same_after_writing(case, folder):
+    file = folder / "case.toml"
+    file.write_text(case_text(case, ["what it is", "and why"]), encoding="utf-8")
+    read = load_case(file)
+    assert (read.name, read.source, read.mechanism, read.outputs) == (case.name, case.source, case.mechanism, case.outputs)
+    assert read.sweep.motions == case.sweep.motions
+    assert (read.sweep.driver, read.sweep.rate, read.sweep.design) == (case.sweep.driver, case.sweep.rate, case.sweep.design)
+    # a grid in degrees is even but for its last places
+    assert np.abs(read.sweep.values - case.sweep.values).max() <= 4 * np.spacing(np.abs(case.sweep.values).max())
+
+
+def test_what_a_case_file_cannot_say_is_named():
+    case = cases.load("rssr")
+    uneven = replace(case, sweep=replace(case.sweep, values=np.array([0.0, 1.0, 1.5])))
+    with pytest.raises(CaseError, match="no even grid"):
+        case_text(uneven)
+    with pytest.raises(CaseError, match="'toe' is not a coordinate"):
+        case_text(cases.load("mcpherson_suspension"))
+
+
+def test_names_that_need_quotes_get_them(tmp_path):
+    case = next(case for case in probes() if case.name == "revolute")
+    odd = 'ti "p"\\1'
+    points = [replace(point, name=odd) if point.name == "tip_1" else point for point in case.mechanism.points]
+    outputs = tuple(replace(each, point=odd) if each.point == "tip_1" else each for each in case.outputs)
+    same_after_writing(replace(case, mechanism=replace(case.mechanism, points=points), outputs=outputs), tmp_path)
+
+
+def test_what_is_replayed_is_only_printed(tmp_path, capsys):
+    file = tmp_path / "case.toml"
+    assert main.main(["stress", "--replay", str(file), "--json", str(tmp_path / "found.json")]) == 2
+    assert "--replay prints what it finds; leave out --out and --json" in capsys.readouterr().err

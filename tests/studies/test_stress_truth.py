@@ -1,0 +1,223 @@
+"""The truth of the stress run: conditions in extended precision, the motion followed from the design, proofs of it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import SolveError, solve
+from kincheck.core.case.case import Output
+from kincheck.core.case.joint_probe import probes
+from kincheck.core.errors import KincheckError
+from kincheck.core.joints import Spherical
+from kincheck.core.studies.stress.families.base import as_case
+from kincheck.core.studies.stress.families.degenerate import WRONG
+from kincheck.core.studies.stress.families.pairs import beside, beside_motion
+from kincheck.core.studies.stress.families.planar import (
+    any_plane,
+    crank_rocker,
+    flats,
+    four_bar,
+    four_bar_motion,
+    slider_crank,
+    slider_crank_motion,
+)
+from kincheck.core.studies.stress.truth.conditions import NotStatedError, conditions
+from kincheck.core.studies.stress.truth.evaluation import Evaluator, Poses
+from kincheck.core.studies.stress.truth.long_double import extended
+from kincheck.core.studies.stress.truth.proofs import distance_from_proof
+from kincheck.core.studies.stress.truth.reference_motion import ROUND_OFF, DefectError, Reach, closed, followed
+
+PROBES = {case.name: case for case in probes()}
+CRANK, ROD = 0.3, 1.0
+
+
+def worst(truth, positions):
+    """The largest error of positions over what is round-off, where the truth is known."""
+    known = truth.reach == Reach.REACHED
+    errors = [
+        np.abs(positions[name] - x)[known].max(axis=1) / truth.bounds[name][0, known] for name, (x, _, _) in truth.points.items()
+    ]
+    return max(float(each.max()) for each in errors)
+
+
+@pytest.fixture
+def poses():
+    rng = np.random.default_rng(3)
+    still = Poses.design(2, 1)
+    return still.moved(extended(rng.normal(size=(2, 6, 1))))
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_the_jacobian_and_what_is_beyond_it_are_derivatives(name, poses):
+    case = PROBES[name]
+    rows = Evaluator(conditions(case.mechanism))
+    bodies, rng, h = rows.bodies, np.random.default_rng(5), 1e-5
+    at = poses if bodies == 2 else Poses.design(bodies, 1).moved(extended(rng.normal(size=(bodies, 6, 1))))
+    rates, near = extended(rng.normal(size=(bodies, 6, 1))), rows.angles(at)
+    before, here, after = (rows.residual(at.moved(s * h * rates), extended(np.zeros((1, 1))), near) for s in (-1, 0, 1))
+    first, second = (after - before) / (2 * h), (after - 2 * here + before) / h**2
+    # an angle's derivatives are those on the joint's own conditions, which these bodies are not
+    others = np.setdiff1d(np.arange(len(second)), [term.row for term in rows.stated.turns])
+    assert np.abs(rows.jacobian(at)[0] @ rates.reshape(-1) - first[:, 0])[others].max() < 1e-8
+    assert np.abs(rows.beyond(at, rates) - second)[others].max() < 1e-6
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_every_joint_type_moves_as_in_the_native_solver(name):
+    """That one is held to the paper's equations elsewhere; here it is the other way round: the same motion from other equations."""
+    case = PROBES[name]
+    found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
+    truth = followed(case)
+    assert (truth.reach == Reach.REACHED).all()
+    assert worst(truth, {name: motion.position for name, motion in found.points.items()}) < 1.0
+
+
+@pytest.mark.parametrize("name", ["four_bar", "rssr", "rssr_other_branch", "hooke_joint", "stewart_platform", "bricard", "bennett"])
+def test_the_motion_followed_is_the_closed_form(name):
+    """Position, velocity and acceleration, of mechanisms whose closed forms are in the case library."""
+    case = cases.load(name)
+    truth = followed(case)
+    assert (truth.reach == Reach.REACHED).all()
+    for output in case.outputs:
+        assert isinstance(output, Output)
+        start = case.mechanism.point(output.point).position if output.relative else np.zeros(3)
+        for order, (moved, quantity) in enumerate(
+            zip(truth.points[output.point], ("position", "velocity", "acceleration"), strict=True)
+        ):
+            along = (moved - (extended(start) if order == 0 else 0.0)) @ extended(output.direction)
+            # the closed form is computed in doubles, from design values that the table has rounded
+            assert np.abs(along - getattr(case.reference[output.name], quantity)).max() < 1e-11
+
+
+def test_a_joint_type_that_it_does_not_know_is_named():
+    @dataclass(frozen=True)
+    class Odd(Spherical):
+        type = "odd"
+
+    try:
+        case = PROBES["spherical"]
+        joints = [Odd(j.name, j.i, j.j, j.point) if j.type == "spherical" else j for j in case.mechanism.joints]
+        with pytest.raises(NotStatedError, match="odd"):
+            conditions(replace(case.mechanism, joints=joints))
+    finally:
+        del Spherical.registry["odd"]
+
+
+# Near and beyond singular poses
+
+
+def parallelogram(off, samples=9):
+    """With the rocker longer by off, and how it moves."""
+    b = (CRANK * np.cos(1.2), CRANK * np.sin(1.2))
+    q = CRANK + off
+    # C on the circles of the coupler, 1 m about B, and of the rocker about (1, 0), above both
+    d, at = np.subtract((1.0, 0.0), b), np.array(b)
+    e = d @ d
+    along = (1.0 - q**2 + e) / (2.0 * e)
+    c = at + along * d + np.sqrt(1.0 / e - along**2) * np.array([-d[1], d[0]])
+    plane = any_plane(np.random.default_rng(1))
+    points = b, (1.0, 0.0), (float(c[0]), float(c[1]))
+    return as_case(four_bar(plane, *points, "rod"), "turn", np.linspace(-3.0, 3.0, samples)), four_bar_motion(plane, *points)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("ratio", [1.0, 1e-3])
+def test_two_loops_on_one_crank_move_as_followed(ratio, seed):
+    """The second with points of its own, of any size beside the first; its closed form is that of both."""
+    rng = np.random.default_rng(seed)
+    plane, first, second = any_plane(rng), crank_rocker(rng), crank_rocker(rng, ratio)
+    mechanism = beside(four_bar(plane, *first), plane, *second, "rod", "second ")
+    case = as_case(mechanism, "turn", np.linspace(-3.0, 3.0, 7))
+    truth = closed(case, beside_motion(four_bar_motion(plane, *first), four_bar_motion(plane, *second), "second "))
+    assert (truth.reach == Reach.REACHED).all()
+    assert {"C", "second C"} < {*truth.points}
+    assert worst(truth, {name: x for name, (x, _, _) in followed(case).points.items()}) < 1.0
+
+
+@pytest.mark.parametrize("off", [1e-9, 1e-6, 1e-3])
+def test_a_gap_narrower_than_the_grid_is_not_jumped(off):
+    """The sweep has nine samples; what is nearly a change point turns the motion round within the root of off."""
+    case, motion = parallelogram(off)
+    truth, known = followed(case), closed(case, motion)
+    assert (truth.reach == Reach.REACHED).all()
+    assert worst(truth, {name: x for name, (x, _, _) in known.points.items()}) < 1.0
+    x = known.points["C"][0] - known.points["B"][0]
+    assert min(np.abs(x[end] - x[4]).max() for end in (0, -1)) > 0.1  # at both ends it is no parallelogram any more
+
+
+@pytest.mark.parametrize("off", [-1e-9, -1e-6, -1e-3])
+def test_what_cannot_pass_is_beyond(off):
+    case, motion = parallelogram(off)
+    truth, known = followed(case), closed(case, motion)
+    assert list(truth.reach) == list(known.reach)
+    assert (truth.reach == Reach.BEYOND).sum() in (2, 3, 4, 5)
+
+
+def test_the_end_of_a_stroke_is_found_to_the_last_digits():
+    """A slider-crank driven at its slider: it ends where the rod is stretched."""
+    b = (CRANK * np.cos(0.4), CRANK * np.sin(0.4))
+    c = (float(b[0] + np.sqrt(ROD**2 - b[1] ** 2)), 0.0)
+    plane, left = any_plane(np.random.default_rng(2)), CRANK + ROD - c[0]
+    for part, reach in ((1.0 - 1e-7, Reach.REACHED), (1.0 + 1e-7, Reach.BEYOND)):
+        case = as_case(slider_crank(plane, b, c, "rod", "slide"), "slide", np.array([part * left]))
+        assert followed(case).reach[0] == reach
+        assert closed(case, slider_crank_motion(plane, b, c, "slide")).reach[0] == reach
+
+
+@pytest.mark.parametrize(("off", "told"), [(1e-8, True), (1e-3, False)])
+def test_an_engine_may_give_up_behind_what_is_singular_to_rounding_only(off, told):
+    """A kite's crank passes the rocker's pivot by a little, between two samples."""
+    plane, b, d = any_plane(np.random.default_rng(1)), (0.0, 0.4 * (1.0 - off)), (0.4, 0.0)
+    c = (0.2 + 0.9 / 2**0.5, 0.2 + 0.9 / 2**0.5)
+    case = as_case(four_bar(plane, b, d, c, "rod"), "turn", np.linspace(-2.5, 2.5, 4))
+    truth = closed(case, four_bar_motion(plane, b, d, c), nearest=flats(b, d))
+    assert min(flats(b, d), key=abs) == pytest.approx(-np.pi / 2.0)
+    assert (truth.reach == Reach.REACHED).all()
+    assert truth.singular.tolist() == [told, False, False, False]
+
+
+def test_what_is_round_off_grows_with_size_and_condition():
+    near, far = (parallelogram(off, samples=2)[0] for off in (1e-1, 1e-3))
+    bounds = [followed(replace(case, sweep=replace(case.sweep, values=np.array([-1.2])))).bounds["C"][0, 0] for case in (near, far)]
+    assert ROUND_OFF < bounds[0] < 0.3 * bounds[1] < 1e-10
+
+
+def test_a_closed_form_that_is_wrong_is_a_defect_of_ours():
+    case, motion = parallelogram(1e-3)
+    wrong = replace(
+        case.mechanism, joints=[replace(j, length=1.0 + 1e-9) if j.type == "distance" else j for j in case.mechanism.joints]
+    )
+    with pytest.raises(DefectError, match="correct the family"):
+        closed(replace(case, mechanism=wrong), motion)
+
+
+@pytest.mark.parametrize("name", ["rssr", "spatial_slider_crank", "gear", "rack_pinion", "screw"])
+def test_the_truth_is_proved(name):
+    """Krawczyk's test, about the equations of the engine: the two sets of equations have the same solution, to 19 digits."""
+    case = PROBES.get(name) or cases.load(name)
+    truth = followed(case)
+    assert distance_from_proof(truth, 3) < 1e-2
+    off = {name: (x + 1e-14, v, a) for name, (x, v, a) in truth.points.items()}
+    assert distance_from_proof(replace(truth, points=off), 3) > 1e-2
+
+
+def test_a_proof_is_about_rows_that_are_good_at_the_sample():
+    """The Bennett loop after a quarter turn, where those chosen at the design depend on each other."""
+    case = cases.load("bennett")
+    truth = followed(replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 45.0, 90.0]))))
+    assert distance_from_proof(truth, 2) < 1e-2
+
+
+@pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
+def test_what_is_no_mechanism_is_refused_by_its_reason(make, reasons):
+    """The reasons are searched for in messages: one that is worded anew is to be worded anew here too."""
+
+    def solved():
+        mechanism = make(np.random.default_rng(7))
+        found = solve(mechanism, mechanism.drivers[0].name, [-0.3, 0.3])
+        if not found.solved.all():
+            raise SolveError(found.message)
+
+    with pytest.raises(KincheckError, match=reasons):
+        solved()

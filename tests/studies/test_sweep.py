@@ -1,0 +1,274 @@
+"""Marching over a sweep: grids of all kinds, closed forms over several turns, the ends of travel."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.core import Body, Distance, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute, Spherical, Translational
+from kincheck.core.kinematics.by_components.block_solver import Cascade
+from kincheck.core.kinematics.by_components.sweep import CascadeSweep
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.continuation.sweep import follow
+from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.sparse.sweep import solve_sparse
+from kincheck.core.mechanism.motions import Path, Ramp
+
+from ..support.mechanisms import CRANK, ROD, four_bar, four_bar_motion, mcpherson, slider_crank, slider_crank_motion
+
+STROKES = np.linspace(-0.08, 0.08, 33)
+
+
+def wheel(values=STROKES):
+    found = solve(mcpherson(), "stroke", values)
+    assert found.solved.all(), found.message
+    return found.points["wheel"]
+
+
+# Grids
+
+
+def test_order_of_the_samples_does_not_matter():
+    shuffled = np.random.default_rng(1).permutation(STROKES)
+    back = np.argsort(shuffled)
+    expected, found = wheel(), wheel(shuffled)
+    for each in ("position", "velocity", "acceleration"):
+        assert (getattr(found, each)[back] == getattr(expected, each)).all()
+    assert (wheel(list(STROKES[::-1])).position[::-1] == expected.position).all()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [[0.0], [0.05], [-0.08], [0.05, 0.08], [-0.08, -0.03], [0.08, -0.08], [0.02, 0.02, -0.02, 0.02]],
+    ids=str,
+)
+def test_few_samples(values):
+    """Without zero, on one side, alone, repeated: all the same pose at the same stroke."""
+    k = [round((value + 0.08) / 0.005) for value in values]
+    expected = wheel()
+    found = wheel(values)
+    assert np.abs(found.position - expected.position[k]).max() <= 2e-16
+    assert np.abs(found.acceleration - expected.acceleration[k]).max() <= 2e-14
+
+
+def test_no_sample():
+    found = solve(mcpherson(), "stroke", [])
+    assert found.solved.shape == (0,)
+    assert found.points["wheel"].position.shape == (0, 3)
+
+
+def test_more_samples_than_lanes():
+    """1200 samples pass in several blocks; every hundredth is one of a short sweep."""
+    many = np.linspace(-0.08, 0.08, 1201)
+    found, short = wheel(many), wheel(many[::100])
+    assert np.abs(found.position[::100] - short.position).max() <= 2e-16
+    assert np.abs(found.acceleration[::100] - short.acceleration).max() <= 2e-14
+
+
+# Closed forms
+
+
+TURNS = 2.0 * np.pi * np.linspace(-3.0, 3.0, 31)
+"""Three turns either way, five samples a turn."""
+
+
+@pytest.mark.parametrize("angles", [TURNS, np.linspace(-7.0, 7.0, 301)], ids=["coarse", "fine"])
+@pytest.mark.parametrize("rate", [1.0, -3.0])
+def test_slider_crank(angles, rate):
+    found = solve(slider_crank(), "turn", angles, rate=rate)
+    assert found.solved.all(), found.message
+    expected, end = slider_crank_motion(angles, rate), found.points["end"]
+    assert np.abs(end.position[:, 0] - expected.x).max() <= 1e-15
+    assert np.abs(end.velocity[:, 0] - expected.v).max() <= 1e-15 * abs(rate)
+    assert np.abs(end.acceleration[:, 0] - expected.a).max() <= 5e-15 * rate**2
+    assert not end.position[:, 1:].any()
+    pin = found.points["pin"]
+    assert pin.position[:, 0] == pytest.approx(CRANK * np.cos(angles), abs=1e-15)
+    assert pin.position[:, 2] == pytest.approx(-CRANK * np.sin(angles), abs=1e-15)
+
+
+def test_several_turns_come_back_to_the_design():
+    found = solve(slider_crank(), "turn", 2.0 * np.pi * np.arange(-20, 21), bodies=["crank"])
+    assert np.abs(found.points["end"].position[:, 0] - (CRANK + ROD)).max() <= 1e-14  # the angle itself rounds at 126 rad
+    sign = found.bodies["crank"].p[:, 0]  # Euler parameters know odd from even turns
+    assert sign == pytest.approx((-1.0) ** np.arange(-20, 21), abs=1e-14)
+
+
+def test_four_bar():
+    found = solve(four_bar(), "turn", TURNS)
+    assert found.solved.all(), found.message
+    x, z = four_bar_motion(TURNS)
+    C = found.points["C"]
+    for column, jet in ((0, x), (2, z)):
+        assert np.abs(C.position[:, column] - jet.x).max() <= 2e-15
+        assert np.abs(C.velocity[:, column] - jet.v).max() <= 4e-15
+        assert np.abs(C.acceleration[:, column] - jet.a).max() <= 2e-14
+
+
+@pytest.mark.parametrize("rod", [0.8, 0.999, 1.3])
+def test_a_rod_of_another_length_than_designed(rod):
+    """The design is closed first: the slider moves to where the rod reaches."""
+    found = solve(slider_crank(rod), "turn", TURNS)
+    assert found.solved.all(), found.message
+    expected, end = slider_crank_motion(TURNS, rod=rod), found.points["end"]
+    assert np.abs(end.position[:, 0] - expected.x).max() <= 1e-15
+    assert np.abs(end.velocity[:, 0] - expected.v).max() <= 2e-15
+    assert np.abs(end.acceleration[:, 0] - expected.a).max() <= 1e-14
+
+
+def test_a_driven_slider():
+    """A joint displacement from an open angle: the crank angle by the cosine rule."""
+    angle = 1.0
+    design = float(slider_crank_motion([angle]).x[0])
+    pin = (CRANK * np.cos(angle), 0.0, -CRANK * np.sin(angle))
+    m = slider_crank()
+    bent = Distance("rod", "crank", "slider", (pin, (design, 0.0, 0.0)))
+    guide = Translational("guide", "ground", "slider", (design, 0.0, 0.0), (-2.0, 0.0, 0.0))
+    joints, points = [m.joint("pivot"), bent, guide], [Point("pin", "crank", pin)]
+    pushed = replace(m, joints=joints, points=points, drivers=[JointDisplacement("push", "guide")])
+    values = np.linspace(-0.1, 0.1, 21)  # along -x
+    found = solve(pushed, "push", values)
+    x = design - values
+    cosine = (x * x + CRANK**2 - ROD**2) / (2.0 * x * CRANK)
+    assert found.points["pin"].position[:, 0] == pytest.approx(CRANK * cosine, abs=1e-15)
+
+
+def test_a_relative_angle_between_moving_bodies():
+    """Two arms in line: the second driven against the first, which is held."""
+    arms = Mechanism(
+        "arms",
+        [Body("upper"), Body("lower")],
+        [
+            Revolute("shoulder", "ground", "upper", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+            Revolute("elbow", "lower", "upper", (1.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
+        ],
+        [Point("hand", "lower", (2.0, 0.0, 0.0))],
+        [replace(slider_crank().driver("turn"), name=name, joint=name) for name in ("shoulder", "elbow")],
+    )
+    angles = np.linspace(-5.0, 5.0, 21)
+    for driver, expected in (
+        ("shoulder", [2.0 * np.cos(angles), 2.0 * np.sin(angles)]),
+        ("elbow", [1.0 + np.cos(angles), -np.sin(angles)]),  # of the upper relative to the lower
+    ):
+        hand = solve(arms, driver, angles).points["hand"]
+        assert pytest.approx(np.array(expected), abs=2e-15) == hand.position[:, :2].T
+
+
+def test_an_open_chain():
+    """Three links in line, without a loop: the middle hinge swept, the others held."""
+    links = [Body(f"link {k}") for k in range(3)]
+    hinges = [
+        Revolute(f"hinge {k}", "ground" if k == 0 else f"link {k - 1}", f"link {k}", (float(k), 0.0, 0.0), (0.0, 1.0, 0.0))
+        for k in range(3)
+    ]
+    held = [replace(slider_crank().driver("turn"), name=f"turn {k}", joint=f"hinge {k}") for k in range(3)]
+    m = Mechanism("chain", links, hinges, [Point("tip", "link 2", (3.0, 0.0, 0.0))], held)
+    angles = np.linspace(-3.0, 3.0, 13)
+    tip = solve(m, "turn 1", angles).points["tip"]
+    assert tip.position[:, 0] == pytest.approx(1.0 + 2.0 * np.cos(angles), abs=2e-15)
+    assert tip.position[:, 2] == pytest.approx(-2.0 * np.sin(angles), abs=2e-15)
+    assert tip.acceleration[:, 0] == pytest.approx(-2.0 * np.cos(angles), abs=5e-15)
+
+
+def test_an_arm_on_a_ball_and_two_rods():
+    """No joint with an axis: the arm swings about the line through the ball and where the rods meet, driven at its tip."""
+    m = Mechanism(
+        "fork",
+        [Body("arm")],
+        [
+            Spherical("ball", "ground", "arm", (0.0, 0.0, 0.0)),
+            Distance("stay", "ground", "arm", ((0.0, 2.0, 1.0), (0.0, 2.0, 0.0))),
+            Distance("brace", "ground", "arm", ((1.0, 2.0, 0.0), (0.0, 2.0, 0.0))),
+        ],
+        [Point("tip", "arm", (0.5, 0.0, 0.0))],
+        [PointCoordinate("lift", "tip", (0.0, 0.0, 1.0))],
+    )
+    heights = np.linspace(-0.45, 0.45, 19)
+    tip = solve(m, "lift", heights).points["tip"]
+    assert tip.position[:, 0] == pytest.approx(np.sqrt(0.25 - heights**2), abs=1e-15)
+    assert tip.velocity[:, 0] == pytest.approx(-heights / np.sqrt(0.25 - heights**2), abs=2e-14)
+
+
+# The ends of travel
+
+
+@pytest.mark.parametrize(
+    ("way", "turn", "solved"),
+    [
+        ("one program", 1000.0, True),
+        ("one program", 1e6, False),
+        ("components", 1000.0, True),
+        ("components", 1e6, False),
+        ("sparse", 100.0, True),  # a part takes it a hundred times as long
+    ],
+)
+def test_a_step_of_many_turns_is_gone_part_by_part_or_refused_as_what_it_is(way, turn, solved):
+    m = slider_crank()
+    path, request = Path({"turn": Ramp(1.0)}, np.array([0.0, turn])), Request(("turn",), ("end",))
+    if way == "components":
+        found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
+    else:
+        found = solve_sparse(m, path, ("end",)) if way == "sparse" else follow(Route(compile_model(m, request), path), 1e-12)
+    assert found.solved.tolist() == [True, solved], found.message
+    assert ("give samples in between" in found.message) is not solved
+    assert "assembly" not in found.message
+    if solved:
+        x = slider_crank_motion(turn).x
+        assert np.abs(found.points["end"].position[1, 0] - x) <= 1e-12  # a thousand radians round at 1e-13
+
+
+@pytest.mark.parametrize(("far", "limit"), [(0.4, 0.29337), (-0.4, -0.31674)])
+@pytest.mark.parametrize("steps", [401, 9])
+def test_lock_up(far, limit, steps):
+    """Formulation section 10: the first extrema of the wheel's height along the branch, to the digits given there."""
+    values = np.linspace(0.0, far, steps)
+    found = solve(mcpherson(), "stroke", values)
+    within = np.abs(values) < abs(limit)
+    assert (found.solved == within).all()
+    assert np.isnan(found.points["wheel"].position[~within]).all()
+    assert np.isfinite(found.points["wheel"].acceleration[within]).all()
+    beyond, wanted, pivot, last = (
+        float(x)
+        for x in re.match(
+            r"cannot be followed beyond stroke = (\S+) \(wanted stroke = (\S+)\): .*; smallest singular value there "
+            r"about (\S+) .*lock-up.*"
+            r"last reachable sample at stroke = (\S+); shorten the sweep",
+            found.message,
+        ).groups()
+    )
+    assert beyond == pytest.approx(limit, abs=1e-4)
+    assert wanted == pytest.approx(values[~within][0], rel=1e-8)
+    assert last == pytest.approx(values[within][-1], rel=1e-8)
+    assert 0.0 < pivot < 0.02
+
+
+def test_both_ends_are_told():
+    found = solve(mcpherson(), "stroke", [-0.5, -0.1, 0.1, 0.5])
+    assert found.solved.tolist() == [False, True, True, False]
+    assert found.message.count("cannot be followed") == 2
+
+
+def test_an_end_before_the_first_sample():
+    found = solve(mcpherson(), "stroke", [0.4])
+    assert not found.solved.any()
+    assert "no sample reached on this side" in found.message
+    assert found.points["wheel"].position.shape == (1, 3)
+
+
+def test_what_lies_beyond_an_end_is_not_reached_from_elsewhere():
+    """Past a dead centre the crank could be assembled again, but not without passing where it cannot."""
+    m = slider_crank(rod=0.1)  # shorter than the crank: the pin cannot pass overhead
+    found = solve(m, "turn", np.linspace(0.0, np.pi, 61))
+    limit = np.arcsin(0.1 / CRANK)
+    assert (found.solved == (np.linspace(0.0, np.pi, 61) < limit)).all()
+    assert "cannot be followed" in found.message
+
+
+@pytest.mark.parametrize("samples", [3, 5, 9, 20])
+def test_both_directions_may_end_on_a_coarse_grid(samples):
+    """Both fronts divide their steps at once, in one block of lanes."""
+    found = solve(mcpherson(), "stroke", np.linspace(-1.5, 1.5, samples))
+    assert found.message.count("cannot be followed beyond stroke = ") == 2
+    assert not found.solved.all()

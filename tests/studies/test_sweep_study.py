@@ -1,0 +1,268 @@
+"""Sweeps over designs: held against closed forms, against runs of single variants, and against themselves in any number of jobs."""
+
+import json
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.cases import load
+from kincheck.core import SolveError, solve
+from kincheck.core.algebra import Vec3
+from kincheck.core.case.suspension.base import where_moving
+from kincheck.core.case.variation.variation_file import read_variation
+from kincheck.core.errors import KincheckError
+from kincheck.core.harness.compare import output_series
+from kincheck.core.harness.execution import here
+from kincheck.core.harness.record import Outcome
+from kincheck.core.jet import Jet
+from kincheck.core.studies.tolerance.cross_check import chosen
+from kincheck.core.studies.tolerance.reduce import QUANTILES
+from kincheck.core.studies.tolerance.study import Ready, Study
+from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
+
+from ..case.test_vary import vary
+from ..support.fakes import Fake, crank, exact
+
+TIP = {"at": "tip", "sigma": [1.0, 2.0, 0.0]}
+PIVOT = {"at": "pivot", "half_width": [0.0, 5.0, 0.0]}
+STRUT = {
+    "tie_rod_outer": {"at": "joints.tie_rod.points.0", "sigma": 1.0},
+    "ball": {"at": "ball", "sigma": 1.0},
+    "wheel_center": {"at": "wheel_center", "half_width": 2.0},
+    "pivot_axis": {"at": "joints.lca_pivot.axis", "sigma": 0.1},
+}
+
+
+def cranks(case, variation, seed, count):
+    """x, from design, and y of the tip of every variant by the closed form p + R(angle) (tip - p), shape (2, n, count)."""
+    angle = case.sweep.change[:, None]
+    dx, dy, py = np.array([variation.of_variant(seed, k) for k in range(count)]).T
+    ax, ay = 0.5 + dx, dy - py
+    x = np.cos(angle) * ax - np.sin(angle) * ay
+    return np.stack([x - ax, py + np.sin(angle) * ax + np.cos(angle) * ay])
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_a_sweep_is_the_closed_form_of_every_variant(tmp_path, jobs):
+    case, count = crank(), 700
+    variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
+    found = sweep_designs(case, variation, samples=count, seed=11, jobs=jobs)
+    right = cranks(case, variation, 11, count)
+    assert (found.samples, found.unsolved, found.quantiles_of) == (count, 0, count)
+    for values, name in zip(right, ("x", "y"), strict=True):
+        each = found.outputs[name]
+        assert each.count == [count] * 9
+        for mine, theirs in (
+            (each.min, values.min(axis=1)),
+            (each.max, values.max(axis=1)),
+            (each.mean, values.mean(axis=1)),
+            (each.standard_deviation, values.std(axis=1, ddof=1)),
+            *((each.quantiles[f"{p:g}"], np.quantile(values, p, axis=1)) for p in QUANTILES),
+        ):
+            np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-14)
+        assert values[:, each.min_variant].min() == pytest.approx(values.min(), abs=1e-14)
+        assert values[:, each.max_variant].max() == pytest.approx(values.max(), abs=1e-14)
+    p, _, _ = exact(case)
+    np.testing.assert_allclose(found.outputs["y"].nominal, p[:, 1], atol=1e-15)
+
+
+def test_the_results_are_the_same_in_any_number_of_jobs(tmp_path):
+    case = load("mcpherson_strut")
+    variation = vary(tmp_path, case, **STRUT)
+
+    def swept(jobs):
+        found = sweep_designs(case, variation, samples=1500, seed=3, order=1, jobs=jobs)
+        return msgspec.json.encode(msgspec.structs.replace(found, run={}, measured={}))
+
+    assert swept(1) == swept(2) == swept(5)
+
+
+def test_fewer_variants_are_the_first_of_more(tmp_path):
+    case = crank()
+    variation = vary(tmp_path, case, tip=TIP)
+    assert Study(case, variation, 300, 9).of_variant(299).mechanism == Study(case, variation, 5000, 9).of_variant(299).mechanism
+    assert Study(case, variation, 300, 9).of_variant(299).mechanism != Study(case, variation, 300, 8).of_variant(299).mechanism
+
+
+def test_many_quantiles_are_of_a_random_subset(tmp_path, monkeypatch):
+    from kincheck.core.studies.tolerance import sweep
+
+    monkeypatch.setattr(sweep, "KEPT", 400)
+    case, count = crank(), 4000
+    variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
+    found = sweep_designs(case, variation, samples=count, seed=1, jobs=2)
+    assert 300 < found.quantiles_of < 500  # five standard errors of a share of a tenth
+    right = np.quantile(cranks(case, variation, 1, count), 0.95, axis=2)[1]
+    each = found.outputs["y"]
+    off = (np.array(each.quantiles["0.95"]) - right) / np.array(each.standard_errors["0.95"])
+    assert 0.0 < np.abs(off).max() < 5.0
+    assert each.count == [count] * 9
+
+
+def test_outputs_of_variants_are_those_of_their_own_cases(tmp_path):
+    """All outputs of a suspension and their derivatives by travel: markers, vectors and quotients of velocities."""
+    case = load("mcpherson_suspension")
+    study = Study(case, vary(tmp_path, case, **STRUT), 40, 2, picked=frozenset({0, 17, 39}))
+    chunk = Ready(study).chunk(0)
+    engine = adapters.engine("native")
+    assert len(study.rows) == len(case.outputs) == 26
+    for variant, values in chunk.picked.items():
+        own = study.of_variant(variant)
+        trajectory = engine.solve(engine.build(own), own, 1e-12)
+        for row, mine in zip(study.rows, values, strict=True):
+            theirs = output_series(own, row.output, trajectory).position
+            # a derivative by travel divides twice by what changes by a thousandth
+            scale = max(1.0, np.nanmax(np.abs(theirs)))
+            np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-11 * scale, err_msg=row.name)
+
+
+def test_variants_are_not_judged_still_by_one_that_moves_fast():
+    """A quotient by the speed of travel is left out where that is small beside the fastest point: of the same variant."""
+    one = np.ones((5, 2))
+    fast = one * [1.0, 1e6]
+    corner: Any = SimpleNamespace(center=SimpleNamespace(z=Jet(one, one, one)))
+    at = {"slow": Vec3(*[Jet(one, one, one)] * 3), "fast": Vec3(*[Jet(one, fast, one)] * 3)}
+    assert np.isnan(where_moving(Jet(one, one, one), corner, at).x).tolist() == [[False, True]] * 5
+
+
+def test_derivatives_are_reduced_where_they_are_asked_for(tmp_path):
+    case = crank()
+    variation = vary(tmp_path, case, tip=TIP)
+    assert list(sweep_designs(case, variation, samples=3, order=0).outputs) == ["x", "y"]
+    found = sweep_designs(case, variation, samples=200, order=2)
+    assert list(found.outputs) == ["x", "x.velocity", "x.acceleration", "y", "y.velocity", "y.acceleration"]
+    _, v, a = exact(case)
+    np.testing.assert_allclose(found.outputs["y.velocity"].nominal, v[:, 1], atol=1e-14)
+    np.testing.assert_allclose(found.outputs["x.acceleration"].nominal, a[:, 0], atol=1e-14)
+    assert found.outputs["y.acceleration"].unit == "m/s^2"
+
+
+def test_large_motions_are_solved_in_parts_of_a_chunk(tmp_path, monkeypatch):
+    from kincheck.core.studies.tolerance import study as room
+
+    case = crank()
+    variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
+    study = Study(case, variation, 300, 4)
+    whole = Ready(study).chunk(0)
+    monkeypatch.setattr(room, "ROOM", 22_000)
+    ready = Ready(study)
+    assert 8 < ready.lanes < 100
+    parts = ready.chunk(0)
+    np.testing.assert_array_equal(parts.kept, whole.kept)
+    np.testing.assert_allclose(parts.summary.mean, whole.summary.mean, rtol=0, atol=1e-16)
+    np.testing.assert_array_equal(parts.summary.extremes, whole.summary.extremes)
+
+
+def test_one_at_a_time_tells_what_each_coordinate_does(tmp_path):
+    case = crank()
+    variation = vary(tmp_path, case, "one_at_a_time", tip={"at": "tip", "values": [[-2, 2], [1], [0]]})
+    found = sweep_designs(case, variation)
+    assert [(each.coordinate, round(each.offset, 6)) for each in found.effects] == [
+        ("tip.x", -0.002),
+        ("tip.x", 0.002),
+        ("tip.y", 0.001),
+    ]
+    # y changes by sin(angle) dx, most at -1 and 1 rad, and x by -sin(angle) dy
+    assert abs(found.effects[1].changes["y"]) == pytest.approx(0.002 * np.sin(1.0), abs=1e-14)
+    assert abs(found.effects[2].changes["x"]) == pytest.approx(0.001 * np.sin(1.0), abs=1e-14)
+    assert found.outputs["y"].standard_errors is None
+    many = {"at": "tip", "half_width": [1, 0, 0], "steps": 400}
+    long = sweep_designs(case, vary(tmp_path, case, "one_at_a_time", tip=many)).effects
+    assert [each.variant for each in long] == [*range(1, 401)]
+    np.testing.assert_allclose([each.offset for each in long], np.linspace(-1e-3, 1e-3, 400))
+    with pytest.raises(KincheckError, match="one_at_a_time has 4 variants as listed, none is drawn; leave it out"):
+        sweep_designs(case, variation, samples=3)
+
+
+def test_a_grid_is_swept_as_a_whole(tmp_path):
+    case = crank()
+    variation = vary(tmp_path, case, "grid", tip={"at": "tip", "values": [[-2, 2], [-1, 0, 3], [0]]})
+    found = sweep_designs(case, variation)
+    assert found.samples == 6
+    angle = case.sweep.change
+    np.testing.assert_allclose(found.outputs["y"].max, np.sin(angle) * np.where(angle > 0, 0.502, 0.498) + np.cos(angle) * 0.003)
+    tip = {"at": "tip", "half_width": 1, "steps": 9999}
+    with pytest.raises(KincheckError, match="999700029999 variants, expected 1 to 10000000000; vary less"):
+        sweep_designs(case, vary(tmp_path, case, "grid", tip=tip))
+    with pytest.raises(KincheckError, match="draws as many variants as it is told; give --samples"):
+        sweep_designs(case, vary(tmp_path, case, tip=TIP))
+
+
+def test_variants_without_a_solution_are_counted_and_named(tmp_path):
+    """A rod too short or too long for the crank to go round; each is what `solve` makes of it, NaN for what is not there."""
+    case = load("rssr")
+    variation = vary(tmp_path, case, rod={"at": "joints.rod.length", "half_width": 3500.0})
+    study = Study(case, variation, 60, 1)
+    found = sweep_designs(case, variation, samples=60, seed=1, jobs=2)
+    n, missing = len(case.sweep.values), {}
+    for variant in range(60):
+        try:
+            own = solve(study.of_variant(variant).mechanism, "crank", case.sweep.change)
+            missing[variant] = n - int(own.solved.sum())
+        except SolveError:
+            missing[variant] = n
+    assert {each.variant: each.samples for each in found.failed} == {k: count for k, count in missing.items() if count}
+    assert 5 < found.unsolved == len(found.failed) < 55
+    assert {n} < {each.samples for each in found.failed}
+    assert all("cannot be followed beyond" in each.message or "does not close" in each.message for each in found.failed)
+    assert sum(60 - count for count in found.outputs["rocker_pin_y"].count) == sum(missing.values())
+    assert None not in found.outputs["rocker_pin_y"].mean
+    later = Ready(Study(case, variation, 300, 1)).chunk(1).unsolved
+    assert later
+    assert {each.variant for each in later} <= set(range(64, 128))
+
+
+def deviating(at):
+    """The native engine but for one variant, whose tip is a micrometre off, and for another, which it refuses."""
+    native = adapters.engine("native")
+
+    def answer(case):
+        found = native.solve(native.build(case), case, 1e-12)
+        if f"variant {at} " in case.name:
+            found.points["tip"].position[4, 1] += 1e-6
+        return found
+
+    return Fake("off", answer=answer)
+
+
+def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
+    case = crank()
+    variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
+    (some,) = chosen(600, 1 / 600, 4)
+    picked = chosen(600, 0.05, 4)
+    assert len(picked) == 30
+    assert chosen(600, 1e-9, 4) == {some}
+    at = sorted(picked)[7]
+    found = sweep_designs(case, variation, samples=600, seed=4, check=Check(deviating(at), 0.05, here, 1e-12))
+    assert [each.variant for each in found.checked] == sorted(picked)
+    (bad,) = found.deviating
+    assert (bad.variant, bad.outcome, bad.row) == (at, Outcome.FAIL, "y")
+    assert bad.max_abs == pytest.approx(1e-6, rel=1e-3)
+    assert "y: position is off by 1e-06 m at sample 4" in bad.message
+    assert max(each.ratio for each in found.checked if each is not bad) < 1e-4
+
+
+def test_a_check_that_an_engine_cannot_make_is_refused_before_the_work(tmp_path):
+    case = crank()
+    variation = vary(tmp_path, case, tip=TIP)
+    for engine, message in (
+        (Fake("gone", installed=None), "--check gone: unavailable: gone is not installed"),
+        (Fake("poor", refusal="has no hinge"), "--check poor: unsupported: has no hinge"),
+    ):
+        with pytest.raises(KincheckError, match=message):
+            sweep_designs(case, variation, samples=10, check=Check(engine, 1.0, here, 1e-12))
+
+
+def test_a_check_with_a_simulator_agrees(tmp_path):
+    mujoco = adapters.engine("mujoco")
+    if mujoco.version() is None:
+        pytest.skip("mujoco is not installed")
+    case = load("mcpherson_suspension")
+    found = sweep_designs(case, vary(tmp_path, case, **STRUT), samples=200, seed=6, check=Check(mujoco, 0.02, here, 1e-12))
+    assert len(found.checked) == 4
+    assert found.deviating == []
+    assert read_variation(tmp_path / "vary.json", case).mode == "monte_carlo"
+    assert json.loads((tmp_path / "vary.json").read_text())["hardpoints"] == STRUT

@@ -1,0 +1,73 @@
+"""A small case file, ways to change it, and what a wrong one has to give: exactly one CaseError."""
+
+from pathlib import Path
+
+import pytest
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.errors import CaseError
+
+BASE = """
+schema = "kincheck-case/1"
+name = "slider"
+source = "made up for this test"
+truth = "closed_form"
+[bodies.slider]
+origin = [1.0, 2.0, 3.0]
+[joints.guide]
+type = "translational"
+bodies = ["ground", "slider"]
+point = [1.0, 2.0, 3.0]
+axis = [1.0, 0.0, 0.0]
+[points.tip]
+body = "slider"
+position = [1.5, 2.0, 3.0]
+[drivers.push]
+type = "joint_displacement"
+joint = "guide"
+[sweep]
+driver = "push"
+start = -0.1
+stop = 0.1
+steps = 3
+rate = 2.0
+[outputs.tip_x]
+point = "tip"
+component = "x"
+atol = 1e-9
+why = "made up for this test"
+"""
+
+INLINE = """
+[reference]
+columns = ["push", "tip_x", "tip_x.velocity"]
+rows = [[-0.1, 1.4, 2.0], [0.0, 1.5, 2.0], [0.1, 1.6, 2.0]]
+"""
+
+
+def write(folder: Path, text: str | bytes, name: str = "case.toml") -> Path:
+    file = folder / name
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return file
+
+
+def edited(*edits: tuple[str, str], base: str = BASE) -> str:
+    for old, new in edits:
+        assert base.count(old) == 1, f"{old!r} occurs {base.count(old)} times"
+        base = base.replace(old, new)
+    return base
+
+
+CSV = "# made up\n\npush, tip_x, tip_x.velocity\n-0.1, 1.4, 2.0\n 0.0, 1.5, 2.0\n0.1, 1.6, 2.0\n"
+BY_FILE = '\n[reference]\nfile = "tip.csv"\n'
+
+
+def complains(file: Path, fragments: list[str]) -> None:
+    """Exactly a CaseError, on one line, that begins with a file and contains all the fragments."""
+    with pytest.raises(CaseError) as caught:
+        load_case(file)
+    message = str(caught.value)
+    assert caught.type is CaseError
+    assert message.startswith(str(file.parent))
+    assert "\n" not in message
+    missing = [fragment for fragment in fragments if fragment not in message]
+    assert not missing, message

@@ -1,0 +1,36 @@
+"""A command line with made-up cases and engines, for runs that are killed, in processes of their own."""
+
+import sys
+import time
+from dataclasses import dataclass
+
+import kincheck.adapters
+import kincheck.cases
+from kincheck.core.cli import main as cli
+
+from .bad_engine import Bad
+from .fakes import Fake, crank, solution
+
+
+@dataclass
+class Slow(Fake):
+    """Takes its time for each solve."""
+
+    seconds: float = 0.005
+
+    def solve(self, model, case, tol):
+        time.sleep(self.seconds)
+        return solution(case)
+
+
+CASES = {name: crank(name, reference=name != "free") for name in ("first", "segfault", "free", "last")}
+ENGINES = {"native": Slow("native"), "slow": Slow("slow", seconds=0.01), "bad": Bad()}
+
+
+def main():
+    """`kincheck` with these, on the arguments of the process."""
+    kincheck.adapters.ENGINES = dict.fromkeys(ENGINES, "")
+    kincheck.adapters.engine = ENGINES.__getitem__
+    kincheck.cases.names = lambda: tuple(CASES)
+    kincheck.cases.load = CASES.__getitem__
+    return cli.main(sys.argv[1:])

@@ -1,0 +1,84 @@
+"""Histories made up night by night: the same two cases in two engines, with what a test plants in them."""
+
+import math
+import random
+
+import msgspec
+from kincheck.core.harness.record import Seconds
+from kincheck.core.harness.run import run
+from kincheck.core.history.regression.run_selection import find, find_against
+from kincheck.core.history.store import Store
+from kincheck.core.report.regression_report import regressions
+
+from .fakes import Fake, crank, off
+
+ENGINES = [Fake("native"), Fake("mujoco", answer=off("position", lambda p: p + 5e-13), installed="4.0.0")]
+RESULTS = run([crank("first"), crank("second")], ENGINES, tol=1e-12)
+FACTS = {"kincheck": "0.1.0", "python": "3.12.3", "numpy": "2.0.0", "host": "a-host", "processor": "a processor", "tol": 1e-12}
+
+
+def records(*, noise=None):
+    """Records as every night has them, each with 10 ms a solve; noise: a generator of random numbers, for up to 10 % about that."""
+
+    def timed(record):
+        warm = 0.010 * (math.exp(noise.uniform(-0.1, 0.1)) if noise else 1.0)
+        seconds = Seconds(build=0.1, first=0.05, warm=warm, waited=0.0, compare=0.001)
+        return msgspec.structs.replace(record, seconds=seconds, us_per_step=1e6 * warm / record.samples)
+
+    return [timed(record) for record in RESULTS.records]
+
+
+def changed(all_records, *, case="first", engine="mujoco", **changes):
+    """The records with one of them changed; a change is a value, or a function of the old one."""
+
+    def one(record):
+        if (record.case, record.engine) != (case, engine):
+            return record
+        values = {name: change(getattr(record, name)) if callable(change) else change for name, change in changes.items()}
+        return msgspec.structs.replace(record, **values)
+
+    return [one(record) for record in all_records]
+
+
+def times(factor):
+    """A change of seconds."""
+    return {"seconds": lambda seconds: msgspec.structs.replace(seconds, warm=factor * seconds.warm)}
+
+
+def worse(factor, output="x", motion="position"):
+    """A change of errors: one output's grows."""
+
+    def change(errors):
+        deviation = getattr(errors[output], motion)
+        grown = msgspec.structs.replace(deviation, max_abs=factor * deviation.max_abs)
+        return errors | {output: msgspec.structs.replace(errors[output], **{motion: grown})}
+
+    return {"errors": change}
+
+
+def keep(path, all_records, *, status="finished", **facts):
+    """One more run in a history; its number. facts: circumstances that are not as always."""
+    with Store(path) as store:
+        day = len(store.runs()) + 1
+        git = {"commit": f"{day:02x}" * 20, "branch": "main", "changed": False}
+        known = {**FACTS, "started": f"2026-11-{day:02d}T03:00:00+00:00", "command": "kincheck run", "git": git}
+        known |= {"calibration_seconds": 0.02, "cases": RESULTS.run["cases"], **facts}
+        run_number = store.begin_run("same", [(each.case, each.engine, each.mode) for each in all_records], known)
+        for record in all_records:
+            store.add_record(run_number, record)
+        if status != "running":
+            store.finish(run_number, msgspec.structs.replace(RESULTS, run=known, records=all_records), status)
+    return run_number
+
+
+def nights(path, count, seed=1):
+    """So many quiet nights."""
+    noise = random.Random(seed)
+    for _ in range(count):
+        keep(path, records(noise=noise))
+
+
+def reported(path, run=None, against="last-green"):
+    with Store(path, writable=False) as store:
+        subject = find(run, store)
+        return regressions(subject, *find_against(against, subject, store), store)
