@@ -1,4 +1,6 @@
-"""Adapters: one file an engine or a format, each made from the neutral mechanism. They are imported only when they are used."""
+"""Adapters: one file an engine or a format, each made from the neutral mechanism. They are imported
+only when they are used.
+"""
 
 import importlib
 from typing import Any
@@ -21,10 +23,12 @@ SIMULATIONS = {
     "exudyn-static": ("exudyn.solvers", "static"),
     "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
 }
-"""Name on the command line -> module and what makes the engine: simulate mode. A simulator's bare name is its recommended solver.
+"""Name on the command line -> module and what makes the engine: simulate mode. A simulator's bare
+name is its recommended solver.
 
-A record is one of a case, an engine and a mode, and the same name in two modes is two products; a further variant of a simulator
-needs a name. A mode of its own for each variant would have made what may be ranked with what a matter of a list.
+A record is one of a case, an engine and a mode, and the same name in two modes is two products; a
+further variant of a simulator needs a name. A mode of its own for each variant would have made what
+may be ranked with what a matter of a list.
 """
 
 
@@ -35,9 +39,13 @@ def engine(name: str, mode: str = "projection") -> Any:
 
 
 WRITERS = ("mjcf", "exudyn", "urdf")
-"""Formats, as on the command line; that of a name is the function `write` of the module write_NAME."""
+"""Formats, as on the command line; that of a name is the function `write` of the module
+write_NAME.
+"""
 
 
 def writer(name: str) -> Any:
-    """The function that writes a mechanism in the format of that name; no simulator is needed for it."""
+    """The function that writes a mechanism in the format of that name; no simulator is needed for
+    it.
+    """
     return importlib.import_module(f".writers.{name}", __name__).write

@@ -1,4 +1,6 @@
-"""The native engine: the formulation of kincheck.core, entering by the same door as the simulators."""
+"""The native engine: the formulation of kincheck.core, entering by the same door as the
+simulators.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from ..core.program.llvm.compiler import available
 from ..core.trajectory import Trajectory
 from ..core.version import VERSION
 
-# Residuals from which Newton's last step starts, by effort: what that step leaves is about its square.
+# Residuals from which Newton's last step starts, by effort: what that step leaves is about its
+# square.
 EFFORTS: Mapping[str, float] = {
     "1 Newton step": math.inf,
     "last step from below 1e-4": 1e-4,
@@ -25,11 +28,12 @@ EFFORTS: Mapping[str, float] = {
 
 @dataclass(frozen=True)
 class Native:
-    """Geometric constraints in global axes, traced, run over lanes of samples by machine code, or by numpy without llvmlite.
+    """Geometric constraints in global axes, traced, run over lanes of samples by machine code, or
+    by numpy without llvmlite.
 
     Attributes:
-        last_iteration: the step that starts from a residual below this is a sample's last [units of the mechanism's size]; above
-            the default, what it leaves is accepted whatever it is.
+        last_iteration: the step that starts from a residual below this is a sample's last [units of
+            the mechanism's size]; above the default, what it leaves is accepted whatever it is.
     """
 
     last_iteration: float = LAST_ITERATION
@@ -38,15 +42,25 @@ class Native:
 
     @property
     def loop(self) -> str:
-        """Newton's iteration over the samples runs in machine code where there is a compiler for it."""
+        """Newton's iteration over the samples runs in machine code where there is a compiler for
+        it.
+        """
         return "compiled" if available() else "python"
 
     @property
     def settings(self) -> Mapping[str, Any]:
         """Formulation, executor and how the loop ends."""
-        executor = "llvm, vectors of lanes" if available() else "numpy, one call an operation over all lanes"
+        executor = (
+            "llvm, vectors of lanes"
+            if available()
+            else "numpy, one call an operation over all lanes"
+        )
         last = self.last_iteration if math.isfinite(self.last_iteration) else "any"
-        return {"row_style": "native (global axes)", "executor": executor, "last_iteration_below": last}
+        return {
+            "row_style": "native (global axes)",
+            "executor": executor,
+            "last_iteration_below": last,
+        }
 
     def version(self) -> str | None:
         """Version of kincheck."""
@@ -57,16 +71,24 @@ class Native:
         return None
 
     def build(self, case: Case) -> Solver:
-        """Select the rows, trace the programs for the points that the outputs read, and lay out the samples."""
+        """Select the rows, trace the programs for the points that the outputs read, and lay out the
+        samples.
+        """
         path = case.sweep.path
-        return prepare(case.mechanism, Request(tuple(path.motions), case.points, last_iteration=self.last_iteration), path)
+        return prepare(
+            case.mechanism,
+            Request(tuple(path.motions), case.points, last_iteration=self.last_iteration),
+            path,
+        )
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""
         return model(tol if self.last_iteration <= LAST_ITERATION else math.inf)
 
     def efforts(self) -> Mapping[str, Native]:
-        """Return the efforts by how near to the solution Newton's last step starts; the predictor is the same."""
+        """Return the efforts by how near to the solution Newton's last step starts; the predictor
+        is the same.
+        """
         return {label: Native(last) for label, last in EFFORTS.items()}
 
     def floor(self, case: Case) -> None:

@@ -1,7 +1,8 @@
-"""Built-in cases: NAME.toml each, with samples (NAME.csv) or a closed form (NAME.py) beside it as the truth.
+"""Built-in cases: NAME.toml each, with samples (NAME.csv) or a closed form (NAME.py) beside it as
+the truth.
 
-Variants of a mechanism share a truth: NAME_VARIANT.toml names the samples in its [reference], or takes the closed form of NAME.py,
-there the function VARIANT where it has one, else `motion`.
+Variants of a mechanism share a truth: NAME_VARIANT.toml names the samples in its [reference], or
+takes the closed form of NAME.py, there the function VARIANT where it has one, else `motion`.
 """
 
 from __future__ import annotations
@@ -41,7 +42,9 @@ def load(name: str) -> Case:
 
 
 def closed_form(name: str) -> Callable[..., Motion] | None:
-    """Takes the drivers' changes from the design, as jets in the order of the case file, to the points; None if there is none."""
+    """Takes the drivers' changes from the design, as jets in the order of the case file, to the
+    points; None if there is none.
+    """
     stems = [file.stem for file in FOLDER.glob("*.py") if f"{name}_".startswith(f"{file.stem}_")]
     if not stems:
         return None
@@ -75,5 +78,8 @@ def _series(output: Output, moving: Motion, design: Motion) -> Series:
 
 
 def _along(output: Output, motion: Motion) -> Jet:
-    x, y, z = (component * jet for component, jet in zip(output.direction, motion[output.point], strict=True))
+    x, y, z = (
+        component * jet
+        for component, jet in zip(output.direction, motion[output.point], strict=True)
+    )
     return x + y + z

@@ -1,8 +1,10 @@
-"""Closed form of Andrews' squeezing mechanism: from the crank, every further point is where two circles meet.
+"""Closed form of Andrews' squeezing mechanism: from the crank, every further point is where two
+circles meet.
 
-Names and numbers are those of the Bari test set for initial value problems (problem andrews; Hairer and Wanner, Solving Ordinary
-Differential Equations II, VII.7). The crank leads from the origin to F, a rod from there to E; E is also on the circle of the
-triangle B D E about B. Two rods each lead over G and over H from E to A. The sides are those of the published start.
+Names and numbers are those of the Bari test set for initial value problems (problem andrews; Hairer
+and Wanner, Solving Ordinary Differential Equations II, VII.7). The crank leads from the origin to
+F, a rod from there to E; E is also on the circle of the triangle B D E about B. Two rods each lead
+over G and over H from E to A. The sides are those of the published start.
 """
 
 from __future__ import annotations
@@ -10,8 +12,10 @@ from __future__ import annotations
 from .jet import Jet, Motion, cos, sin
 from .vectors import Vec, fixed, meet_in_plane
 
-A, B = (-0.06934, -0.00227, 0.0), (-0.03635, 0.03273, 0.0)  # with the misprint x = +0.03635 found for B nothing closes
-RR, D_, SS, E_, ZT, ZF, U = 0.007, 0.028, 0.035, 0.02, 0.04, 0.02, 0.04  # OF, FE, BE, EG, AG, EH, AH [m]
+# with the misprint x = +0.03635 found for B nothing closes
+A, B = (-0.06934, -0.00227, 0.0), (-0.03635, 0.03273, 0.0)
+# OF, FE, BE, EG, AG, EH, AH [m]
+RR, D_, SS, E_, ZT, ZF, U = 0.007, 0.028, 0.035, 0.02, 0.04, 0.02, 0.04
 SC, SD = 0.018, 0.02  # D of the triangle: from B along B E, and to its left [m]
 START = -0.0617138900142764496358948458001  # published crank angle beta at the start [rad]
 

@@ -1,7 +1,9 @@
-"""Closed form of the Bennett linkage: four links and four hinges askew, no freedom by count and one by geometry.
+"""Closed form of the Bennett linkage: four links and four hinges askew, no freedom by count and one
+by geometry.
 
-Opposite links are alike, their lengths a and b in proportion to the sines of their twists alpha and beta. From hinge to hinge one
-turns by an angle about the axis z, goes the link's length along the new x, and turns by its twist about that. The angles are p, q,
+Opposite links are alike, their lengths a and b in proportion to the sines of their twists alpha and
+beta. From hinge to hinge one turns by an angle about the axis z, goes the link's length along the
+new x, and turns by its twist about that. The angles are p, q,
 -p and -q with  tan(p / 2) tan(q / 2) = K = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)  (Bennett, A new mechanism,
 Engineering 76, 1903). Twists of sines 0.6 and 0.8 make K = 5.
 """
@@ -14,18 +16,27 @@ from .vectors import cross, fixed
 A, B = 0.3, 0.4  # lengths of coupler and crank [m]
 COSINE, SINE = 0.6, 0.8  # of the crank's twist, beta
 K = 5.0
-TRACER = (0.2, 0.3, 0.1)  # from the crank's pin: along the coupler, across it, and along the hinge [m]
+# from the crank's pin: along the coupler, across it, and along the hinge [m]
+TRACER = (0.2, 0.3, 0.1)
 
 
 def motion(turn: Jet) -> Motion:
-    """Return both hinges of the coupler and a point it carries, the crank `turn` [rad] from the design, where q = 90 degrees."""
+    """Return both hinges of the coupler and a point it carries, the crank `turn` [rad] from the
+    design, where q = 90 degrees.
+    """
     c, s = -sin(turn), cos(turn)  # of q
     x, z = fixed((1.0, 0.0, 0.0), turn), fixed((0.0, 0.0, 1.0), turn)
     x = c * x + s * cross(z, x)
     z = COSINE * z + SINE * cross(x, z)
     crank_pin = B * x
-    near, far = 1.0 - c, (K * K) * (1.0 + c)  # the squares of sin(q / 2) and of K cos(q / 2), doubled
-    x = ((near - far) / (near + far)) * x - (2.0 * K) * (s / (near + far)) * cross(z, x)  # turned by -p
+    # the squares of sin(q / 2) and of K cos(q / 2), doubled
+    near, far = 1.0 - c, (K * K) * (1.0 + c)
+    # turned by -p
+    x = ((near - far) / (near + far)) * x - (2.0 * K) * (s / (near + far)) * cross(z, x)
     follower_pin = crank_pin + A * x
     along, across, up = TRACER
-    return {"crank_pin": crank_pin, "follower_pin": follower_pin, "tracer": crank_pin + along * x + across * cross(z, x) + up * z}
+    return {
+        "crank_pin": crank_pin,
+        "follower_pin": follower_pin,
+        "tracer": crank_pin + along * x + across * cross(z, x) + up * z,
+    }

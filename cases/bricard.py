@@ -1,10 +1,13 @@
-"""Closed form of the threefold symmetric Bricard linkage: six links of 1 m, six revolutes, neighbouring axes at right angles.
+"""Closed form of the threefold symmetric Bricard linkage: six links of 1 m, six revolutes,
+neighbouring axes at right angles.
 
 The angles between neighbouring links are p and q in turns, with  cos p + cos q + cos p cos q = 0  (Chen, You and Tarnai,
-Threefold-symmetric Bricard linkages for deployable structures, Int. J. Solids Structures 42, 2005). At the benchmark's start,
-six edges of a cube, p = q = 90 degrees; q comes to zero, the driver's dead centre, at p = 120 degrees.
+Threefold-symmetric Bricard linkages for deployable structures, Int. J. Solids Structures 42, 2005).
+At the benchmark's start, six edges of a cube, p = q = 90 degrees; q comes to zero, the driver's
+dead centre, at p = 120 degrees.
 
-From link to link the direction u turns about the axis z by the angle, and the axis about the new u by a right angle, to one
+From link to link the direction u turns about the axis z by the angle, and the axis about the new u
+by a right angle, to one
 side and the other: the next axis is  -u x z,  then  u x z.
 """
 
@@ -15,11 +18,17 @@ from .vectors import Vec, cross, fixed
 
 
 def motion(turn: Jet) -> Motion:
-    """The ends of the links that follow the grounded one, its neighbour turned from the design by `turn` [rad]."""
+    """The ends of the links that follow the grounded one, its neighbour turned from the design by
+    `turn` [rad].
+    """
     c, s = -sin(turn), cos(turn)  # of p = 90 degrees + turn
     d = -(c / (1.0 + c))  # cosine of q
     angles = (c, s), (d, sqrt(1.0 - d * d))
-    point, u, z = fixed((1.0, 0.0, 0.0), turn), fixed((1.0, 0.0, 0.0), turn), fixed((0.0, 0.0, -1.0), turn)
+    point, u, z = (
+        fixed((1.0, 0.0, 0.0), turn),
+        fixed((1.0, 0.0, 0.0), turn),
+        fixed((0.0, 0.0, -1.0), turn),
+    )
     points: dict[str, Vec] = {}
     for k in range(4):
         cosine, sine = angles[k % 2]

@@ -14,7 +14,12 @@ Z = (0.0, 0.0, 1.0)
 
 def motion(left: Jet, right: Jet) -> Motion:
     """The tool with the cranks turned from the design by those angles about z [rad]."""
-    a, b = Circle.about(LEFT, Z, LEFT_PIN).turned(left), Circle.about(RIGHT, Z, RIGHT_PIN).turned(right)
-    squares = (sum((t - p) ** 2 for t, p in zip(TOOL, pin, strict=True)) for pin in (LEFT_PIN, RIGHT_PIN))
+    a, b = (
+        Circle.about(LEFT, Z, LEFT_PIN).turned(left),
+        Circle.about(RIGHT, Z, RIGHT_PIN).turned(right),
+    )
+    squares = (
+        sum((t - p) ** 2 for t, p in zip(TOOL, pin, strict=True)) for pin in (LEFT_PIN, RIGHT_PIN)
+    )
     aa, bb = squares
     return {"tool": meet_in_plane(a, aa, b, bb, 1.0)}

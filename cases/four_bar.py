@@ -1,7 +1,8 @@
 """Closed form of the planar four-bar: the coupler pin is where two circles meet.
 
-In the plane of motion it has the coupler's length from the crank pin, and the rocker's from the rocker's pivot.
-As a crank-rocker (shortest + longest = 0.39 m < 0.446 m, Grashof) it never stretches out, so the side is that of the design.
+In the plane of motion it has the coupler's length from the crank pin, and the rocker's from the
+rocker's pivot. As a crank-rocker (shortest + longest = 0.39 m < 0.446 m, Grashof) it never
+stretches out, so the side is that of the design.
 """
 
 from __future__ import annotations
@@ -9,7 +10,8 @@ from __future__ import annotations
 from .jet import Jet, Motion, constant, cos, sin
 from .vectors import Vec, fixed, meet_in_plane
 
-# In-plane coordinates at design [m] along the axes E1, E2; the crank's pivot is the origin, at A in space.
+# In-plane coordinates at design [m] along the axes E1, E2; the crank's pivot is the origin, at A in
+# space.
 CRANK = 0.09  # B = (0, 0.09)
 D = (0.3, 0.0)
 C = (0.24, 0.18)
@@ -29,7 +31,9 @@ def motion(turn: Jet) -> Motion:
     """Points of the mechanism with the crank turned from the design by `turn` [rad]."""
     zero = constant(0.0, turn)
     crank_pin = Vec(-CRANK * sin(turn), CRANK * cos(turn), zero)
-    coupler_pin = meet_in_plane(crank_pin, COUPLER_SQUARED, fixed((*D, 0.0), turn), ROCKER_SQUARED, 1.0)
+    coupler_pin = meet_in_plane(
+        crank_pin, COUPLER_SQUARED, fixed((*D, 0.0), turn), ROCKER_SQUARED, 1.0
+    )
     d = coupler_pin - crank_pin
     tip = crank_pin + ALONG * d + ACROSS * Vec(-d.y, d.x, zero)
     return {"coupler_pin": in_space(coupler_pin), "coupler_tip": in_space(tip)}
@@ -37,4 +41,6 @@ def motion(turn: Jet) -> Motion:
 
 def in_space(point: Vec) -> Vec:
     """Return the global coordinates of in-plane ones."""
-    return fixed(A, point.x) + Vec(*(e1 * point.x + e2 * point.y for e1, e2 in zip(E1, E2, strict=True)))
+    return fixed(A, point.x) + Vec(
+        *(e1 * point.x + e2 * point.y for e1, e2 in zip(E1, E2, strict=True))
+    )

@@ -1,7 +1,9 @@
-"""Closed form of a Gough platform of the 3-2-1 kind, six legs that change independently: the platform's points one after the other.
+"""Closed form of a Gough platform of the 3-2-1 kind, six legs that change independently: the
+platform's points one after the other.
 
-Three legs lead to the first point, two to the second, one to the third. Each point is where three spheres meet, about feet of legs
-and about the points found before, from which it has constant distances.
+Three legs lead to the first point, two to the second, one to the third. Each point is where three
+spheres meet, about feet of legs and about the points found before, from which it has constant
+distances.
 """
 
 from __future__ import annotations
@@ -11,25 +13,42 @@ import math
 from .jet import Jet, Motion, constant
 from .vectors import Vec, carried, fixed, meet_in_space
 
-FEET = ((0.0, 0.0, 0.0), (1.0, 0.1, 0.0), (0.2, 0.9, 0.1), (1.2, -0.2, 0.0), (1.1, 0.9, 0.1), (0.4, 1.1, 0.0))  # at design [m]
+# at design [m]
+FEET = (
+    (0.0, 0.0, 0.0),
+    (1.0, 0.1, 0.0),
+    (0.2, 0.9, 0.1),
+    (1.2, -0.2, 0.0),
+    (1.1, 0.9, 0.1),
+    (0.4, 1.1, 0.0),
+)
 HEADS = ((0.4, 0.3, 0.9), (1.0, 0.4, 1.0), (0.5, 0.9, 0.8))
 TOOL = (0.6, 0.5, 1.3)
 
 
 def motion(a: Jet, b: Jet, c: Jet, d: Jet, e: Jet, f: Jet) -> Motion:
-    """The platform's three points and its tool with the legs lengthened from the design by those lengths [m]."""
+    """The platform's three points and its tool with the legs lengthened from the design by those
+    lengths [m].
+    """
     feet, heads = [fixed(foot, a) for foot in FEET], tuple(fixed(head, a) for head in HEADS)
     A, B, C, D, E, F = (
         _squared(change + math.dist(foot, HEADS[head]))
         for change, foot, head in zip((a, b, c, d, e, f), FEET, (0, 0, 0, 1, 1, 2), strict=True)
     )
-    one_two, one_three, two_three = (constant(math.dist(HEADS[i], HEADS[j]) ** 2, a) for i, j in ((0, 1), (0, 2), (1, 2)))
+    one_two, one_three, two_three = (
+        constant(math.dist(HEADS[i], HEADS[j]) ** 2, a) for i, j in ((0, 1), (0, 2), (1, 2))
+    )
     one = meet_in_space(feet[0], A, feet[1], B, feet[2], C, 1.0)
     two = meet_in_space(one, one_two, feet[3], D, feet[4], E, 1.0)
     three = meet_in_space(one, one_three, two, two_three, feet[5], F, 1.0)
     first, second, third = heads
     found: tuple[Vec, Vec, Vec] = one, two, three
-    return {"first": one, "second": two, "third": three, "tool": carried((first, second, third), found, fixed(TOOL, a))}
+    return {
+        "first": one,
+        "second": two,
+        "third": three,
+        "tool": carried((first, second, third), found, fixed(TOOL, a)),
+    }
 
 
 def _squared(a: Jet) -> Jet:

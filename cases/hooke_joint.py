@@ -9,19 +9,24 @@ from __future__ import annotations
 from .jet import Jet, Motion, cos, sin, sqrt
 from .vectors import Numbers, Vec, fixed
 
-BEND = 0.8, 0.6  # cos b, sin b: the driving shaft is along x, the driven one turned from it towards z
+# cos b, sin b: the driving shaft is along x, the driven one turned from it towards z
+BEND = 0.8, 0.6
 TIP = 0.3, 0.2  # of the driven shaft: this far along it, and off it, along y at design [m]
 
 
 def driven(turn: Jet, cosine: float) -> tuple[Jet, Jet]:
-    """Cosine and sine of the driven shaft's turn, the driving one's being `turn` [rad] and the cosine of b given."""
+    """Cosine and sine of the driven shaft's turn, the driving one's being `turn` [rad] and the
+    cosine of b given.
+    """
     c, s = cosine * cos(turn), sin(turn)
     n = sqrt(s * s + c * c)
     return c / n, s / n
 
 
 def on_shaft(start: Numbers, bend: tuple[float, float], c: Jet, s: Jet) -> Vec:
-    """The tip of a shaft that starts there, bent from x towards z (cosine and sine of the angle), turned as c and s say."""
+    """The tip of a shaft that starts there, bent from x towards z (cosine and sine of the angle),
+    turned as c and s say.
+    """
     direction, aside = (bend[0], 0.0, bend[1]), (-bend[1], 0.0, bend[0])  # aside = direction x y
     off = c * fixed((0.0, 1.0, 0.0), c) + s * fixed(aside, c)
     return fixed(start, c) + TIP[0] * fixed(direction, c) + TIP[1] * off

@@ -1,4 +1,6 @@
-"""Closed form of the IFToMM benchmark A02, N four-bars in a row: all cranks stay parallel, the bars between them level."""
+"""Closed form of the IFToMM benchmark A02, N four-bars in a row: all cranks stay parallel, the bars
+between them level.
+"""
 
 from __future__ import annotations
 
@@ -8,5 +10,7 @@ N = 3  # 40 in the benchmark
 
 
 def motion(turn: Jet) -> Motion:
-    """The first and the last crank's tip, all links 1 m long, with the cranks turned from upright by `turn` about z [rad]."""
+    """The first and the last crank's tip, all links 1 m long, with the cranks turned from upright
+    by `turn` about z [rad].
+    """
     return {f"B{k}": (float(k) - sin(turn), cos(turn), constant(0.0, turn)) for k in (0, N)}

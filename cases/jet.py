@@ -1,4 +1,5 @@
-"""Jets: a number with its first and second derivative by time, so that a closed form gives exact velocities and accelerations.
+"""Jets: a number with its first and second derivative by time, so that a closed form gives exact
+velocities and accelerations.
 
 The closed forms of the cases are written with these alone; they share no code with any engine.
 """
@@ -17,14 +18,20 @@ Lanes: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jet:
-    """Value, first and second derivative by time, each of shape (n,). Operators follow the rules of differentiation."""
+    """Value, first and second derivative by time, each of shape (n,). Operators follow the rules of
+    differentiation.
+    """
 
     x: Lanes
     v: Lanes
     a: Lanes
 
     def __add__(self, b: Jet | float) -> Jet:
-        return Jet(self.x + b.x, self.v + b.v, self.a + b.a) if isinstance(b, Jet) else Jet(self.x + b, self.v, self.a)
+        return (
+            Jet(self.x + b.x, self.v + b.v, self.a + b.a)
+            if isinstance(b, Jet)
+            else Jet(self.x + b, self.v, self.a)
+        )
 
     __radd__ = __add__
 
@@ -42,7 +49,11 @@ class Jet:
             return Jet(self.x * b, self.v * b, self.a * b)
         if not isinstance(b, Jet):  # pyright: ignore[reportUnnecessaryIsInstance]
             return NotImplemented  # a vector knows what to do
-        return Jet(self.x * b.x, self.v * b.x + self.x * b.v, self.a * b.x + 2.0 * self.v * b.v + self.x * b.a)
+        return Jet(
+            self.x * b.x,
+            self.v * b.x + self.x * b.v,
+            self.a * b.x + 2.0 * self.v * b.v + self.x * b.a,
+        )
 
     __rmul__ = __mul__
 

@@ -1,4 +1,6 @@
-"""Closed form of the McPherson strut of SAE 943745, joint points reconstructed as in mcpherson_strut, driven at arm and rack."""
+"""Closed form of the McPherson strut of SAE 943745, joint points reconstructed as in
+mcpherson_strut, driven at arm and rack.
+"""
 
 from __future__ import annotations
 
@@ -11,5 +13,7 @@ UPRIGHT = Upright((1.14, 0.355, 0.1455), (1.115, 0.665, 0.118), (0.975, 0.715, 0
 
 
 def motion(turn: Jet, rack: Jet) -> Motion:
-    """Points of the suspension with the arm turned by `turn` [rad] and the rack shifted along y by `rack` [m] from the design."""
+    """Points of the suspension with the arm turned by `turn` [rad] and the rack shifted along y by
+    `rack` [m] from the design.
+    """
     return macpherson(ARM, TOP, CLAMP, UPRIGHT, turn, rack)

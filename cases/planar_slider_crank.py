@@ -1,4 +1,6 @@
-"""Closed form of the planar slider-crank: the slider is at  x = r cos t + sqrt(l^2 - r^2 sin^2 t)  (any textbook)."""
+"""Closed form of the planar slider-crank: the slider is at  x = r cos t + sqrt(l^2 - r^2 sin^2 t)  (any
+textbook).
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ CRANK, ROD = 1.0, 3.0  # r, l [m]
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the mechanism with the crank turned from the design, stretched out, by `turn` [rad]."""
+    """Points of the mechanism with the crank turned from the design, stretched out, by `turn`
+    [rad].
+    """
     zero = constant(0.0, turn)
     px, py = CRANK * cos(turn), CRANK * sin(turn)
     x = px + sqrt(ROD**2 - py * py)

@@ -1,4 +1,5 @@
-"""Closed form of the spatial slider-crank, after the benchmark of the IFToMM library of multibody systems.
+"""Closed form of the spatial slider-crank, after the benchmark of the IFToMM library of multibody
+systems.
 
 The crank pin is  B = (0, Ay - r sin t, Az + r cos t), the slider at  x = sqrt(l^2 - By^2 - Bz^2)  on the x axis. The conrod turns
 with the unit vectors  u  from the slider to B,  a = X x u / |X x u|  and  u x a:  a is the universal joint's axis on the conrod,
@@ -11,8 +12,8 @@ from .jet import Jet, Motion, constant, cos, sin, sqrt
 
 CRANK, CONROD = 0.08, 0.3  # r, l [m]
 AY, AZ = 0.1, 0.12  # crank pivot [m]
-# The side point from the slider at design (-0.1, 0.09, 0.12), along u = (-2, 1, 2)/3, and along a = (0, -2, 1)/SQRT5 and
-# u x a = (5, 2, 4)/(3 SQRT5), both times SQRT5.
+# The side point from the slider at design (-0.1, 0.09, 0.12), along u = (-2, 1, 2)/3, and along a =
+# (0, -2, 1)/SQRT5 and u x a = (5, 2, 4)/(3 SQRT5), both times SQRT5.
 SIDE_U, SIDE_A, SIDE_W = 0.53 / 3, -0.06, 0.16 / 3
 SQRT5 = 5.0**0.5
 
@@ -30,5 +31,9 @@ def motion(turn: Jet) -> Motion:
     return {
         "slider": (x, zero, zero),
         "conrod_centre": (0.5 * x, 0.5 * by, 0.5 * bz),
-        "conrod_side": (x + su * ux + sw * wx, su * uy + sa * ay + sw * wy, su * uz + sa * az + sw * wz),
+        "conrod_side": (
+            x + su * ux + sw * wx,
+            su * uy + sa * ay + sw * wy,
+            su * uz + sa * az + sw * wz,
+        ),
     }

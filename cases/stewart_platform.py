@@ -1,7 +1,9 @@
-"""Closed form of a Stewart platform whose legs change in two groups of three: it lifts and turns, and stays level and centred.
+"""Closed form of a Stewart platform whose legs change in two groups of three: it lifts and turns,
+and stays level and centred.
 
-Legs k = 0, 1, 2 of either group lead from the base circle, at 120 k + 10 and 120 k - 10 degrees, to the platform's circle, turned
-by +A and -A from there. With the platform turned by t and lifted to h their squared lengths are
+Legs k = 0, 1, 2 of either group lead from the base circle, at 120 k + 10 and 120 k - 10 degrees, to
+the platform's circle, turned by +A and -A from there. With the platform turned by t and lifted to h
+their squared lengths are
 
     R^2 + r^2 - 2 R r cos(A + t) + h^2    and    R^2 + r^2 - 2 R r cos(A - t) + h^2,
 
@@ -21,13 +23,17 @@ LENGTH = math.sqrt(R * R + r * r - 2.0 * R * r * math.cos(A) + H * H)  # of all 
 
 
 def motion(a0: Jet, a1: Jet, a2: Jet, b0: Jet, b1: Jet, b2: Jet) -> Motion:
-    """The platform's centre and the first leg's head, the legs lengthened by a in the first group, by b in the second [m].
+    """The platform's centre and the first leg's head, the legs lengthened by a in the first group,
+    by b in the second [m].
 
     Raises:
         ValueError: the legs of a group differ, and then there is no closed form.
     """
     if any((one.x != other.x).any() for one, other in ((a0, a1), (a0, a2), (b0, b1), (b0, b2))):
-        raise ValueError("the legs of a group differ, expected them equal; the 3-2-1 platform has a closed form for unequal ones")
+        raise ValueError(
+            "the legs of a group differ, expected them equal; the 3-2-1 platform has a closed form"
+            " for unequal ones"
+        )
     a, b = a0 + LENGTH, b0 + LENGTH
     s = (a * a - b * b) / (4.0 * R * r * math.sin(A))
     c = sqrt(1.0 - s * s)

@@ -1,8 +1,10 @@
-"""Vectors of jets, and where circles and spheres meet: what the closed forms of linkages are made of.
+"""Vectors of jets, and where circles and spheres meet: what the closed forms of linkages are made
+of.
 
-A mechanism is put together point after point, each from its distances to points that are known already. Two such points exist
-in the plane, on a circle and in space; the side is told by the design position, from which a motion leads to the other side only
-through a position where both are one.
+A mechanism is put together point after point, each from its distances to points that are known
+already. Two such points exist in the plane, on a circle and in space; the side is told by the
+design position, from which a motion leads to the other side only through a position where both are
+one.
 """
 
 from __future__ import annotations
@@ -55,7 +57,9 @@ def cross(a: Vec, b: Vec) -> Vec:
 
 @dataclass(frozen=True)
 class Circle:
-    """The way of a point about an axis: centre + radius, seen at design along u and a right angle later along v [m]."""
+    """The way of a point about an axis: centre + radius, seen at design along u and a right angle
+    later along v [m].
+    """
 
     centre: Numbers
     u: Numbers
@@ -78,7 +82,8 @@ class Circle:
         return self.at(cos(angle), sin(angle))
 
     def meet(self, point: Vec, distance: float, side: float) -> Vec:
-        """The point of the circle at that distance from a point: |centre + u cos t + v sin t - point| = distance, solved for t.
+        """The point of the circle at that distance from a point: |centre + u cos t + v sin t -
+        point| = distance, solved for t.
 
         Squared it is  A cos t + B sin t + C = 0  (Hartenberg and Denavit, Kinematic Synthesis of Linkages, 1964, ch. 12).
 
@@ -87,7 +92,11 @@ class Circle:
         """
         like = point.x
         away, u, v = fixed(self.centre, like) - point, fixed(self.u, like), fixed(self.v, like)
-        A, B, C = 2.0 * (away @ u), 2.0 * (away @ v), away @ away + (float(np.dot(self.u, self.u)) - distance**2)
+        A, B, C = (
+            2.0 * (away @ u),
+            2.0 * (away @ v),
+            away @ away + (float(np.dot(self.u, self.u)) - distance**2),
+        )
         AABB = A * A + B * B
         S = side * sqrt(AABB - C * C)
         return self.at((B * S - A * C) / AABB, -(B * C + A * S) / AABB)
@@ -128,7 +137,8 @@ def meet_in_space(a: Vec, aa: Jet, b: Vec, bb: Jet, c: Vec, cc: Jet, side: float
 def carried(before: tuple[Vec, Vec, Vec], now: tuple[Vec, Vec, Vec], point: Vec) -> Vec:
     """Where a point of a body is now, from three other points of it, before and now.
 
-    Its components along the three points' triangle and normal are those before, taken with the dual basis.
+    Its components along the three points' triangle and normal are those before, taken with the dual
+    basis.
     """
     (a, b, c), (d, e, f) = before, now
     p, q, r = b - a, c - a, point - a

@@ -87,14 +87,22 @@ _ROOMS = (
     *(".errors", ".mechanism.mechanism", ".mechanism.drivers", ".mechanism.motions", ".joints"),
     *(
         f".kinematics.{name}"
-        for name in ("solve", "design_sweep", "assembly.assemble", "assembly.assembly_modes", "continuation.trace")
+        for name in (
+            "solve",
+            "design_sweep",
+            "assembly.assemble",
+            "assembly.assembly_modes",
+            "continuation.trace",
+        )
     ),
     ".studies.joint_check.check_joint",
 )
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name when it is asked for: pytest loads its plugins every time, and would wait for numpy and the solver else."""
+    """Import a name when it is asked for: pytest loads its plugins every time, and would wait for
+    numpy and the solver else.
+    """
     if name in __all__:
         for room in _ROOMS:  # what is quick to import first
             found = getattr(import_module(room, __name__), name, None)

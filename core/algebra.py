@@ -1,7 +1,8 @@
-"""Vectors, quaternions and rotations over any scalar: floats, arrays of lanes, traced scalars, balls.
+"""Vectors, quaternions and rotations over any scalar: floats, arrays of lanes, traced scalars,
+balls.
 
-The operators are all an equation needs, so a primitive is written once and run by every executor. Nothing here compares
-or branches on a value: a traced scalar has none.
+The operators are all an equation needs, so a primitive is written once and run by every executor.
+Nothing here compares or branches on a value: a traced scalar has none.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ def root(a: Scalar) -> Scalar:
 
 
 def is_literal_zero(a: Scalar) -> bool:
-    """Whether it is a zero of Python's, known before anything is computed: what it multiplies vanishes from every program."""
+    """Whether it is a zero of Python's, known before anything is computed: what it multiplies
+    vanishes from every program.
+    """
     return isinstance(a, int | float) and a == 0
 
 
@@ -123,7 +126,9 @@ class Quat:
 
     def __mul__(self, b: Quat) -> Quat:
         """Quaternion product: the rotation b followed, in the same axes, by this one."""
-        return Quat(self.e0 * b.e0 - self.e @ b.e, self.e0 * b.e + b.e0 * self.e + cross(self.e, b.e))
+        return Quat(
+            self.e0 * b.e0 - self.e @ b.e, self.e0 * b.e + b.e0 * self.e + cross(self.e, b.e)
+        )
 
     def conjugate(self) -> Quat:
         """The opposite rotation."""
@@ -140,7 +145,8 @@ def quat(values: Iterable[Scalar]) -> Quat:
 
 
 def angle_about(axis: Vec3, q: Quat) -> Any:
-    """Return the angle of a rotation that is about a unit axis, along it [rad], from less than a turn back to one on.
+    """Return the angle of a rotation that is about a unit axis, along it [rad], from less than a
+    turn back to one on.
 
     The rotations q and -q are one, and their angles a turn apart.
     """
@@ -150,8 +156,8 @@ def angle_about(axis: Vec3, q: Quat) -> Any:
 def turned_by(q: Quat, half: Vec3) -> Quat:
     """The unit quaternion (1, half) q / |(1, half) q|: q turned by about 2 half, global axes.
 
-    The rotation applied is 2 atan|half|, which agrees with the exponential to second order; renormalising each time keeps
-    the length at one to round-off, whatever the number of steps.
+    The rotation applied is 2 atan|half|, which agrees with the exponential to second order;
+    renormalising each time keeps the length at one to round-off, whatever the number of steps.
     """
     p = Quat(1.0, half) * q
     length = root(p.e0 * p.e0 + p.e @ p.e)
@@ -162,7 +168,8 @@ def turned_by(q: Quat, half: Vec3) -> Quat:
 def rotation_less_identity(q: Quat) -> Mat3:
     """A(q) - I, eq. (1) of the paper with the identity taken off before rounding.
 
-    Near the design pose A - I is small; forming A first would round it at 1e-16 of one rather than of itself.
+    Near the design pose A - I is small; forming A first would round it at 1e-16 of one rather than
+    of itself.
     """
     e0, (x, y, z) = q.e0, q.e
     xx, yy, zz = 2.0 * (x * x), 2.0 * (y * y), 2.0 * (z * z)

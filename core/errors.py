@@ -1,4 +1,6 @@
-"""The errors of kincheck, and how their messages name things: who, what was found, what was expected and what to do."""
+"""The errors of kincheck, and how their messages name things: who, what was found, what was
+expected and what to do.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ from itertools import islice
 
 LONGEST_NAME = 200
 """Characters of a name that a message repeats; what is longer hides the rest of it."""
-# A message that lists all names of a large file is not read. The search for a similar name is cubic in their lengths at worst.
+# A message that lists all names of a large file is not read. The search for a similar name is cubic
+# in their lengths at worst.
 MOST_NAMED, MOST_SEARCHED = 50, 10_000
 
 
@@ -17,7 +20,8 @@ class KincheckError(Exception):
 
 
 class Phrase:
-    """A text with lengths in it, which a reader of files can write in the unit of the file; as a text it has metres.
+    """A text with lengths in it, which a reader of files can write in the unit of the file; as a
+    text it has metres.
 
     Args:
         parts: texts, and lengths as numbers [m].
@@ -39,7 +43,8 @@ class MechanismError(KincheckError, ValueError):
 
     Attributes:
         phrase: the message.
-        key: of a case file, what is to blame there ("joints.pivot.bodies"); empty where that is not known.
+        key: of a case file, what is to blame there ("joints.pivot.bodies"); empty where that is not
+            known.
     """
 
     def __init__(self, message: str | Phrase, key: str = "") -> None:
@@ -53,7 +58,9 @@ class CaseError(KincheckError, ValueError):
 
 
 class SolveError(KincheckError, RuntimeError):
-    """The mechanism cannot be solved as described: freedom left, contradiction, or no assembly at the design."""
+    """The mechanism cannot be solved as described: freedom left, contradiction, or no assembly at
+    the design.
+    """
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
@@ -62,16 +69,26 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
 
 
 def remedy(name: str, known: Iterable[str]) -> str:
-    """Say what to write instead of a name that is not known: the most similar one, else all of them."""
+    """Say what to write instead of a name that is not known: the most similar one, else all of
+    them.
+    """
     names = sorted(known)
     close = similar(name, names)
-    return f"did you mean {close!r}?" if close else f"known: {shortened([*map(brief, names)], MOST_NAMED) or 'none'}"
+    return (
+        f"did you mean {close!r}?"
+        if close
+        else f"known: {shortened([*map(brief, names)], MOST_NAMED) or 'none'}"
+    )
 
 
 def similar(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
     """Return the known name that is most like another one; an empty text where none is."""
     short = islice((each for each in known if len(each) <= LONGEST_NAME), MOST_SEARCHED)
-    return next(iter(difflib.get_close_matches(name, short, 1, cutoff)), "") if len(name) <= LONGEST_NAME else ""
+    return (
+        next(iter(difflib.get_close_matches(name, short, 1, cutoff)), "")
+        if len(name) <= LONGEST_NAME
+        else ""
+    )
 
 
 def brief(text: str) -> str:

@@ -1,4 +1,6 @@
-"""Checks of input: numbers of a description are finite Python numbers, directions have a length, arguments are real."""
+"""Checks of input: numbers of a description are finite Python numbers, directions have a length,
+arguments are real.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +21,19 @@ SHORTEST = 1e-150
 def finite(number: Any) -> bool:
     """Whether it is a finite number, or an array that is one."""
     try:
-        # numpy's complex numbers would be taken by their real part; most are floats, of which large mechanisms have ten thousands
+        # numpy's complex numbers would be taken by their real part; most are floats, of which large
+        # mechanisms have ten thousands
         return (isinstance(number, float) or not np.iscomplexobj(number)) and math.isfinite(number)
     except (TypeError, ValueError):  # of no number, or several
         return False
 
 
 def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
-    """Three numbers as a tuple, whatever sequence or array they are given as: that may change, a mechanism does not.
+    """Three numbers as a tuple, whatever sequence or array they are given as: that may change, a
+    mechanism does not.
 
-    Of an array they are Python's own numbers: numpy's divide by zero without a word, and print their type.
+    Of an array they are Python's own numbers: numpy's divide by zero without a word, and print
+    their type.
 
     Raises:
         MechanismError: there are not three.
@@ -38,9 +43,13 @@ def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
 
 
 def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
-    """Raise MechanismError unless all are finite numbers, or of a kind that is computed with later (traced, balls)."""
+    """Raise MechanismError unless all are finite numbers, or of a kind that is computed with later
+    (traced, balls).
+    """
     if not all(finite(number) or _of_later(number) for number in numbers):
-        raise MechanismError(f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}")
+        raise MechanismError(
+            f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}"
+        )
 
 
 def _of_later(number: Any) -> bool:
@@ -48,21 +57,30 @@ def _of_later(number: Any) -> bool:
 
 
 def plain(number: Any) -> Any:
-    """A number as Python's own, where it is one of numpy's or an array that is one: arrays may change, and have no hash."""
+    """A number as Python's own, where it is one of numpy's or an array that is one: arrays may
+    change, and have no hash.
+    """
     return number.item() if type(number).__module__ == "numpy" and np.size(number) == 1 else number
 
 
 def require_direction(who: str, numbers: Sequence[float]) -> None:
-    """Raise MechanismError unless a vector has a direction: its length is not zero, nor so small or large that its square is."""
+    """Raise MechanismError unless a vector has a direction: its length is not zero, nor so small or
+    large that its square is.
+    """
     length = math.hypot(*numbers)
     if length == 0.0:
         raise MechanismError(f"{who} is zero; give a direction of any other length")
     if not SHORTEST <= length <= 1.0 / SHORTEST:
-        raise MechanismError(f"{who} has length {length:.3g}, whose square is no number; give a direction of another length")
+        raise MechanismError(
+            f"{who} has length {length:.3g}, whose square is no number; give a direction of another"
+            " length"
+        )
 
 
 def held(who: str, value: Any, count: int | None, expected: str) -> tuple[Any, ...]:
-    """A value as a tuple of so many items, or of any number, or an error that names what was expected."""
+    """A value as a tuple of so many items, or of any number, or an error that names what was
+    expected.
+    """
     try:
         found = tuple(value.tolist() if hasattr(value, "tolist") else value)
     except TypeError:  # a number, or nothing

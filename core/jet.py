@@ -1,6 +1,8 @@
-"""Jets: a number with its first and second derivative by time, so that any formula gives exact rates of what it computes.
+"""Jets: a number with its first and second derivative by time, so that any formula gives exact
+rates of what it computes.
 
-Vectors of jets are `algebra.Vec3`. A derivative that is not known is NaN, and whatever needs it becomes NaN by itself.
+Vectors of jets are `algebra.Vec3`. A derivative that is not known is NaN, and whatever needs it
+becomes NaN by itself.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ Lanes: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jet:
-    """Value, first and second derivative by time, each of shape (n,) or (). Operators follow the rules of differentiation."""
+    """Value, first and second derivative by time, each of shape (n,) or (). Operators follow the
+    rules of differentiation.
+    """
 
     __array_ufunc__: ClassVar[None] = None  # an array plus a jet is a jet, not an array of jets
     x: Lanes
@@ -28,11 +32,17 @@ class Jet:
 
     @property
     def dot(self) -> Jet:
-        """The derivative by time as a jet of its own; its second derivative would be a third one, which nobody knows."""
+        """The derivative by time as a jet of its own; its second derivative would be a third one,
+        which nobody knows.
+        """
         return Jet(self.v, self.a, np.full_like(self.a, np.nan))
 
     def __add__(self, b: Jet | float | Lanes) -> Jet:
-        return Jet(self.x + b.x, self.v + b.v, self.a + b.a) if isinstance(b, Jet) else Jet(self.x + b, self.v, self.a)
+        return (
+            Jet(self.x + b.x, self.v + b.v, self.a + b.a)
+            if isinstance(b, Jet)
+            else Jet(self.x + b, self.v, self.a)
+        )
 
     __radd__ = __add__
 
@@ -47,7 +57,11 @@ class Jet:
 
     def __mul__(self, b: Any) -> Jet:
         if isinstance(b, Jet):
-            return Jet(self.x * b.x, self.v * b.x + self.x * b.v, self.a * b.x + 2.0 * self.v * b.v + self.x * b.a)
+            return Jet(
+                self.x * b.x,
+                self.v * b.x + self.x * b.v,
+                self.a * b.x + 2.0 * self.v * b.v + self.x * b.a,
+            )
         if isinstance(b, Vec3):
             return NotImplemented
         return Jet(self.x * b, self.v * b, self.a * b)
@@ -72,7 +86,8 @@ def sqrt(a: Jet) -> Jet:
 def arctan2(y: Jet, x: Jet) -> Jet:
     """The angle of the direction (x, y) [rad], in -pi..pi; x and y must not both vanish.
 
-    Its rate is (x y' - y x') / (x x + y y): a jet of jets' values and rates, differentiated once more by the quotient rule.
+    Its rate is (x y' - y x') / (x x + y y): a jet of jets' values and rates, differentiated once
+    more by the quotient rule.
     """
     rate = (x * y.dot - y * x.dot) / (x * x + y * y)
     return Jet(np.arctan2(y.x, x.x), rate.x, rate.v)

@@ -35,13 +35,16 @@ class PointMotion:
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motion of one body over n samples, in the paper's variables; NaN at samples that were not reached.
+    """Motion of one body over n samples, in the paper's variables; NaN at samples that were not
+    reached.
 
     Attributes:
         r: origin, global [m], shape (n, 3).
         p: Euler parameters e0..e3, body -> global [-], shape (n, 4).
-        v: [rdot global [m/s], omega' body frame [rad/s]], shape (n, 6), or None where it was not asked for.
-        a: [rddot global [m/s^2], omega'dot body frame [rad/s^2]], shape (n, 6), or None where it was not asked for.
+        v: [rdot global [m/s], omega' body frame [rad/s]], shape (n, 6), or None where it was not
+            asked for.
+        a: [rddot global [m/s^2], omega'dot body frame [rad/s^2]], shape (n, 6), or None where it
+            was not asked for.
     """
 
     r: Array
@@ -54,7 +57,8 @@ _Motion = TypeVar("_Motion", PointMotion, BodyMotion)
 
 
 class Motions(Mapping[str, _Motion], Generic[_Motion]):
-    """Motions by name, as views of one table. Each is made when it is looked at: a sweep costs no more than what is wanted of it.
+    """Motions by name, as views of one table. Each is made when it is looked at: a sweep costs no
+    more than what is wanted of it.
 
     Args:
         kind: makes a motion of its arrays.
@@ -62,12 +66,19 @@ class Motions(Mapping[str, _Motion], Generic[_Motion]):
         columns: by name, those of each array; None where there is none.
     """
 
-    def __init__(self, kind: Callable[..., _Motion], table: Array, columns: Mapping[str, Sequence[slice | None]]) -> None:
+    def __init__(
+        self,
+        kind: Callable[..., _Motion],
+        table: Array,
+        columns: Mapping[str, Sequence[slice | None]],
+    ) -> None:
         self._kind, self._table, self._columns = kind, table, columns
 
     def __getitem__(self, name: str) -> _Motion:
         table = self._table
-        return self._kind(*(None if each is None else table[:, each] for each in self._columns[name]))
+        return self._kind(
+            *(None if each is None else table[:, each] for each in self._columns[name])
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._columns)
@@ -84,7 +95,8 @@ class Trajectory:
         points: motion by point name.
         solved: whether each sample was reached, shape (n,).
         iterations: Newton iterations of each sample, shape (n,).
-        residual: the engine's own largest constraint residual over the solved samples [m or -]; NaN where there are none.
+        residual: the engine's own largest constraint residual over the solved samples [m or -]; NaN
+            where there are none.
         message: empty, or why samples are missing: what was found, where, and what to do.
         details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
         bodies: motion by body name, for engines and requests that give it.
@@ -116,5 +128,7 @@ class Trajectory:
 
 
 def largest_found(values: Array) -> float:
-    """The largest of what was found at solved samples, or NaN where there are none: zero would be praise."""
+    """The largest of what was found at solved samples, or NaN where there are none: zero would be
+    praise.
+    """
     return float(values.max()) if values.size else math.nan

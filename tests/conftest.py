@@ -26,7 +26,8 @@ def no_recent_models():
 def cluster(monkeypatch):
     """A dask.distributed cluster of two workers, with a real scheduler, on loopback."""
     distributed = pytest.importorskip("distributed")
-    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent))  # for its workers too, which are spawned from here
+    # for its workers too, which are spawned from here
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent))
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
     ) as found:
@@ -59,7 +60,8 @@ def kincheck_main(monkeypatch):
         monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
         monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
         monkeypatch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
-        # in this process, to which fakes with answers of their own belong; isolation has a room of its own
+        # in this process, to which fakes with answers of their own belong; isolation has a room of
+        # its own
         return cli.main([*map(str, argv), *(["--jobs", jobs] if argv[0] == "run" and jobs else [])])
 
     return main

@@ -1,4 +1,5 @@
-"""Tests of the structure: which folder imports which, what is packaged, what loads when, file sizes.
+"""Tests of the structure: which folder imports which, what is packaged, what loads when, file
+sizes.
 
 Each rule is a function of a file's path and syntax tree; files are read, not run. Every rule finds
 an offender below.
@@ -45,21 +46,31 @@ IMPORTS = {
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
     "kinematics/structure": ". joints mechanism kinematics/formulation",
-    "kinematics/compiled": (". primitives program program/llvm mechanism kinematics/formulation kinematics/structure"),
-    "kinematics/assembly": (
-        ". primitives program joints mechanism kinematics/formulation kinematics/structure kinematics/compiled"
+    "kinematics/compiled": (
+        ". primitives program program/llvm mechanism kinematics/formulation kinematics/structure"
     ),
-    "kinematics/continuation": (". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"),
-    "kinematics/verified": (". primitives program mechanism kinematics/formulation kinematics/compiled kinematics/continuation"),
+    "kinematics/assembly": (
+        ". primitives program joints mechanism kinematics/formulation kinematics/structure"
+        " kinematics/compiled"
+    ),
+    "kinematics/continuation": (
+        ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"
+    ),
+    "kinematics/verified": (
+        ". primitives program mechanism kinematics/formulation kinematics/compiled"
+        " kinematics/continuation"
+    ),
     "kinematics/sparse": (
         ". primitives program program/llvm mechanism kinematics/formulation "
         "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
     "kinematics/by_components": (
-        ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled kinematics/continuation"
+        ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"
+        " kinematics/continuation"
     ),
     "kinematics/diagnosis": (
-        ". primitives joints mechanism kinematics/formulation kinematics/structure kinematics/compiled kinematics/continuation"
+        ". primitives joints mechanism kinematics/formulation kinematics/structure"
+        " kinematics/compiled kinematics/continuation"
     ),
     "kinematics": (
         ". program mechanism kinematics/formulation kinematics/structure "
@@ -80,10 +91,14 @@ IMPORTS = {
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
     "studies/stress/truth": (
-        ". program joints mechanism kinematics/formulation kinematics/structure kinematics/continuation kinematics/verified case"
+        ". program joints mechanism kinematics/formulation kinematics/structure"
+        " kinematics/continuation kinematics/verified case"
     ),
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
-    "studies": (". program joints kinematics/compiled kinematics/assembly kinematics/verified case case/io harness"),
+    "studies": (
+        ". program joints kinematics/compiled kinematics/assembly kinematics/verified case case/io"
+        " harness"
+    ),
     "studies/diagnosis": ". joints kinematics/formulation kinematics/diagnosis case report studies",
     "studies/tolerance": (
         ". program program/llvm mechanism kinematics/formulation "
@@ -95,8 +110,13 @@ IMPORTS = {
         "kinematics/continuation kinematics/verified case case/io harness "
         "harness/workers report studies/stress/truth studies/stress/families"
     ),
-    "studies/paper": (". primitives program joints mechanism kinematics/formulation kinematics case harness report"),
-    "studies/joint_check": (". program joints mechanism kinematics/formulation kinematics case harness report"),
+    "studies/paper": (
+        ". primitives program joints mechanism kinematics/formulation kinematics case harness"
+        " report"
+    ),
+    "studies/joint_check": (
+        ". program joints mechanism kinematics/formulation kinematics case harness report"
+    ),
     "studies/bench": (
         ". program/llvm joints mechanism kinematics/formulation "
         "kinematics/compiled kinematics/continuation kinematics/sparse "
@@ -110,7 +130,10 @@ IMPORTS = {
         "studies/diagnosis studies/tolerance studies/stress studies/paper "
         "studies/joint_check studies/bench"
     ),
-    "__init__": (". joints mechanism kinematics/assembly kinematics/continuation kinematics studies/joint_check"),
+    "__init__": (
+        ". joints mechanism kinematics/assembly kinematics/continuation kinematics"
+        " studies/joint_check"
+    ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 
@@ -118,7 +141,9 @@ MAY_IMPORT = {folder: set(others.split()) for folder, others in IMPORTS.items()}
 
 
 def files(*folders):
-    return sorted(path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py"))
+    return sorted(
+        path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py")
+    )
 
 
 SOURCES = files("core", "adapters", "cases")
@@ -142,7 +167,10 @@ def imported(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
             yield from ((*module, alias.name) for alias in node.names)
 
 
-MODULES = {path.parent.parts if path.name == "__init__.py" else path.with_suffix("").parts: path for path in SOURCES}
+MODULES = {
+    path.parent.parts if path.name == "__init__.py" else path.with_suffix("").parts: path
+    for path in SOURCES
+}
 
 
 def module_of(target: tuple[str, ...]) -> Path | None:
@@ -201,7 +229,9 @@ def simulators_at_import(path, syntax):
         elif isinstance(node, ast.Call) and "import" in ast.unparse(node.func):
             constants = [each.value for each in node.args if isinstance(each, ast.Constant)]
             names = [value for value in constants if isinstance(value, str)]
-        yield from (f"imports {name} at import" for name in names if name.split(".")[0] in SIMULATORS)
+        yield from (
+            f"imports {name} at import" for name in names if name.split(".")[0] in SIMULATORS
+        )
         waiting += ast.iter_child_nodes(node)
 
 
@@ -258,7 +288,11 @@ OFFENDERS = [
     (imports_against_the_table, "cases/rssr.py", "from ..adapters import engine"),
     (simulators_at_import, "adapters/new.py", "import mujoco"),
     (simulators_at_import, "adapters/new.py", "class A:\n    from mujoco.viewer import launch"),
-    (simulators_at_import, "adapters/new.py", "try:\n    import exudyn as exu\nexcept ImportError:\n    exu = None"),
+    (
+        simulators_at_import,
+        "adapters/new.py",
+        "try:\n    import exudyn as exu\nexcept ImportError:\n    exu = None",
+    ),
     (simulators_at_import, "adapters/new.py", "mj = importlib.import_module('mujoco')"),
     (undocumented, "core/new.py", "x = 1"),
     (undocumented, "core/new.py", '"""Doc."""\ndef f(): ...'),
@@ -279,7 +313,11 @@ ALLOWED = [
         "core/kinematics/compiled/new.py",
         "from ...program import Tape\nfrom . import request",
     ),
-    (imports_against_the_table, "core/cli/main.py", "def f():\n    from ... import adapters, cases"),
+    (
+        imports_against_the_table,
+        "core/cli/main.py",
+        "def f():\n    from ... import adapters, cases",
+    ),
     (
         imports_against_the_table,
         "adapters/mujoco/new.py",
@@ -307,13 +345,20 @@ def test_allowed_code_passes(rule, path, text):
 def test_the_table_is_exact():
     """Every folder has a row, and every arrow of the table is used."""
     arrows: dict[str, set[str]] = {
-        folder_of(path): set() for path in SOURCES if path.parts[0] == "core" and path.parent.name != "as_module"
+        folder_of(path): set()
+        for path in SOURCES
+        if path.parts[0] == "core" and path.parent.name != "as_module"
     }
     for path in SOURCES:
         if path.parts[0] == "core" and folder_of(path) in arrows:
             modules = {module_of(target) for target in imported(path, tree(path))}
-            arrows[folder_of(path)] |= {folder_of(module) for module in modules if module and module.parts[0] == "core"}
-    unused = {folder: MAY_IMPORT.get(folder, set()) - others - {folder} for folder, others in arrows.items()}
+            arrows[folder_of(path)] |= {
+                folder_of(module) for module in modules if module and module.parts[0] == "core"
+            }
+    unused = {
+        folder: MAY_IMPORT.get(folder, set()) - others - {folder}
+        for folder, others in arrows.items()
+    }
     assert {folder: others for folder, others in unused.items() if others} == {}
     assert set(MAY_IMPORT) == set(arrows)
 
@@ -325,7 +370,10 @@ def test_imports_run_down_the_layers_and_never_in_a_circle():
         for folder, others in MAY_IMPORT.items()
         for other in others
         if level[other.split("/")[0]] > level[folder.split("/")[0]]
-        or (level[other.split("/")[0]] == level[folder.split("/")[0]] and other.split("/")[0] != folder.split("/")[0])
+        or (
+            level[other.split("/")[0]] == level[folder.split("/")[0]]
+            and other.split("/")[0] != folder.split("/")[0]
+        )
     ]
     assert up == []
     TopologicalSorter(MAY_IMPORT).prepare()
@@ -365,8 +413,12 @@ def test_nothing_is_called_utils():
 
 
 def test_packages_are_the_folders():
-    """A folder that is not listed would be missing from a wheel, though an editable install finds it."""
-    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    """A folder that is not listed would be missing from a wheel, though an editable install finds
+    it.
+    """
+    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
+        "setuptools"
+    ]
     # kincheck itself has no __init__, which would hide the other parts
     own = Path(setuptools["package-dir"]["kincheck"])
     folders = {path.parent for path in SOURCES} - {own}

@@ -1,8 +1,9 @@
-"""Drivers and relations as coordinate constraints that Exudyn's own solvers see; private to its adapter.
+"""Drivers and relations as coordinate constraints that Exudyn's own solvers see; private to its
+adapter.
 
-A generic joint with a moving offset has no rate, so a driven coordinate is a constraint on Exudyn's relative coordinate of two
-bodies, and so are the relations of a screw, a gear, a rack and its pinion. Values of the drivers come from Python, by a table that
-is made before.
+A generic joint with a moving offset has no rate, so a driven coordinate is a constraint on Exudyn's
+relative coordinate of two bodies, and so are the relations of a screw, a gear, a rack and its
+pinion. Values of the drivers come from Python, by a table that is made before.
 """
 
 from __future__ import annotations
@@ -52,10 +53,14 @@ class Coordinates(Rows):
         if freedom == "translation":
             return self.shift(joint.i, joint.j, joint.point, joint.axis)
         (i, _), (j, _) = (self.bodies[body] for body in joint.bodies)
-        node = self.mbs.AddNode(self.items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1))
+        node = self.mbs.AddNode(
+            self.items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1)
+        )
         self.angles.append(value)
         axis = [*unit(joint.axis)]
-        marker = self.items.MarkerBodiesRelativeRotationCoordinate(bodyNumbers=[i, j], nodeNumber=node, axis0=axis)
+        marker = self.items.MarkerBodiesRelativeRotationCoordinate(
+            bodyNumbers=[i, j], nodeNumber=node, axis0=axis
+        )
         return self.mbs.AddMarker(marker)
 
     def shift(self, i: str, j: str, point: Sequence[float], axis: Sequence[float]) -> int:
@@ -63,7 +68,10 @@ class Coordinates(Rows):
         numbers, origins = zip(*(self.bodies[body] for body in (i, j)), strict=True)
         arms = [np.subtract(point, origin) for origin in origins]
         marker = self.items.MarkerBodiesRelativeTranslationCoordinate(
-            bodyNumbers=[*numbers], localPosition0=arms[0], localPosition1=arms[1], axis0=[*unit(axis)]
+            bodyNumbers=[*numbers],
+            localPosition0=arms[0],
+            localPosition1=arms[1],
+            axis0=[*unit(axis)],
         )
         return self.mbs.AddMarker(marker)
 
@@ -88,6 +96,12 @@ class Coordinates(Rows):
 
     def relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
         (one, large), (other, small) = sorted(
-            ((self.relative(joint, freedom), weight) for joint, freedom, weight in terms), key=lambda term: -abs(term[1])
+            ((self.relative(joint, freedom), weight) for joint, freedom, weight in terms),
+            key=lambda term: -abs(term[1]),
         )
-        self.connect(self.items.ObjectConnectorCoordinate(markerNumbers=[other, one], factor1=-large / small), range(1))
+        self.connect(
+            self.items.ObjectConnectorCoordinate(
+                markerNumbers=[other, one], factor1=-large / small
+            ),
+            range(1),
+        )

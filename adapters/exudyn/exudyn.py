@@ -1,7 +1,9 @@
-"""Exudyn in projection mode: its absolute rigid-body coordinates, its joints, its constraint residual and Jacobian.
+"""Exudyn in projection mode: its absolute rigid-body coordinates, its joints, its constraint
+residual and Jacobian.
 
-Every moving body has a node of its own with Euler parameters, so a closed loop is no different from a chain. What the joints
-and drivers become is in `exudyn_rows`; a row may follow a driver's value or an unknown besides Exudyn's coordinates.
+Every moving body has a node of its own with Euler parameters, so a closed loop is no different from
+a chain. What the joints and drivers become is in `exudyn_rows`; a row may follow a driver's value
+or an unknown besides Exudyn's coordinates.
 """
 
 from __future__ import annotations
@@ -22,8 +24,9 @@ from ..shared.length_scaling import in_own_frame
 from ..shared.projection_engine import ProjectionEngine
 from .rows import JOINTS, NO_ROTATION, Rows, turned
 
-# Largest change of a coordinate per step of the differences of the Jacobian [units of length or -]. Round-off, 1e-16 / 1e-3, and
-# truncation, (1e-3)^6 times the seventh derivative of the rows, are then both below 1e-12 of the speed squared.
+# Largest change of a coordinate per step of the differences of the Jacobian [units of length or -].
+# Round-off, 1e-16 / 1e-3, and truncation, (1e-3)^6 times the seventh derivative of the rows, are
+# then both below 1e-12 of the speed squared.
 DIFFERENCE = 1e-3
 # Central differences of sixth order: h f' = sum of weight * f(k h).
 WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
@@ -41,7 +44,10 @@ class Exudyn(ProjectionEngine):
             "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
             "residual": "ComputeAlgebraicEquations",
             "jacobian": "ComputeNewtonJacobian, constraint rows",
-            "acceleration": f"Jacobian differentiated along the velocity, sixth order, coordinates changed by {DIFFERENCE:g}",
+            "acceleration": (
+                "Jacobian differentiated along the velocity, sixth order, coordinates changed by"
+                f" {DIFFERENCE:g}"
+            ),
         }
 
     def build(self, case: Case) -> ExudynModel:
@@ -49,21 +55,31 @@ class Exudyn(ProjectionEngine):
         return ExudynModel(in_own_frame(case))
 
     def floor(self, case: Case) -> Floor:
-        """Bound it by the static solver's residual and Jacobian; rates take two more Jacobians, which a difference needs."""
+        """Bound it by the static solver's residual and Jacobian; rates take two more Jacobians,
+        which a difference needs.
+        """
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
         _container, mbs, settings, solver = _least()
-        residual = (lambda: model.solver.ComputeAlgebraicEquations(model.mbs), lambda: solver.ComputeAlgebraicEquations(mbs), 1)
+        residual = (
+            lambda: model.solver.ComputeAlgebraicEquations(model.mbs),
+            lambda: solver.ComputeAlgebraicEquations(mbs),
+            1,
+        )
         own, empty = (
             partial(s.ComputeNewtonJacobian, m, t)
             for s, m, t in ((model.solver, model.mbs, model.settings), (solver, mbs, settings))
         )
         pose = {"ComputeAlgebraicEquations": residual, "ComputeNewtonJacobian": (own, empty, 1)}
-        return floor_of(self, solved, model.unknowns, pose, {"ComputeNewtonJacobian (rates)": (own, empty, 2)})
+        return floor_of(
+            self, solved, model.unknowns, pose, {"ComputeNewtonJacobian (rates)": (own, empty, 2)}
+        )
 
 
 def _least() -> tuple[Any, Any, Any, Any]:
-    """Container, system, settings and solver of the least that Exudyn takes: one free coordinate."""
+    """Container, system, settings and solver of the least that Exudyn takes: one free
+    coordinate.
+    """
     exu: Any = importlib.import_module("exudyn")
     items: Any = importlib.import_module("exudyn.itemInterface")
     exu.config.printToConsole = False
@@ -78,12 +94,13 @@ def _least() -> tuple[Any, Any, Any, Any]:
 
 
 class ExudynModel:
-    """A `ProjectionModel`; the unknowns: Exudyn's displacements of the node coordinates (position, Euler parameters), then
-    those that rows share (see `exudyn_rows`)."""
+    """A `ProjectionModel`; the unknowns: Exudyn's displacements of the node coordinates (position,
+    Euler parameters), then those that rows share (see `exudyn_rows`)."""
 
     def __init__(self, case: Case) -> None:
         exu: Any = importlib.import_module("exudyn")
-        exu.config.printToConsole = False  # results are reported by the harness; Exudyn's own banners would mix with them
+        # results are reported by the harness; Exudyn's own banners would mix with them
+        exu.config.printToConsole = False
         self.container: Any = exu.SystemContainer()  # owns the system and must live as long
         self.mbs: Any = self.container.AddSystem()
         rows = Rows(self.mbs, importlib.import_module("exudyn.itemInterface"), case.mechanism)
@@ -93,24 +110,33 @@ class ExudynModel:
         self.settings.solution.file.write = False
         self.solver: Any = exu.MainSolverStatic()
         if not self.solver.InitializeSolver(self.mbs, self.settings):
-            raise SolveError(f"case {case.name!r}: Exudyn does not initialise its solver: {self.solver.GetErrorString()}")
+            raise SolveError(
+                f"case {case.name!r}: Exudyn does not initialise its solver:"
+                f" {self.solver.GetErrorString()}"
+            )
         self.state: Any = self.mbs.systemData
         self.coordinates = int(self.solver.GetODE2size())
         normalisation = [self.mbs.GetNodeAEIndex(node) for node in rows.nodes]
         constraints = [self.state.GetObjectLTGAE(row.item)[row.index] for row in rows.rows]
-        # in Exudyn's vector and matrix of the whole system the algebraic rows come after those of the coordinates
+        # in Exudyn's vector and matrix of the whole system the algebraic rows come after those of
+        # the coordinates
         self.kept = self.coordinates + np.array(constraints + normalisation)
         self.target = np.array([row.keeps for row in rows.rows] + [0.0] * len(normalisation))
 
-        self.followed = np.zeros((len(self.kept), rows.values))  # rows by values: those of the drivers, then the shared unknowns
+        # rows by values: those of the drivers, then the shared unknowns
+        self.followed = np.zeros((len(self.kept), rows.values))
         for each in rows.following:
             self.followed[each.row, each.value] = each.weight
         self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
         self.unknowns = self.coordinates + rows.values - len(case.mechanism.drivers)
         self.turning = [
-            (row, pair, np.array(self.mbs.GetMarkerParameter(pair[0], "localHT"))) for row, pair in rows.turning.items()
+            (row, pair, np.array(self.mbs.GetMarkerParameter(pair[0], "localHT")))
+            for row, pair in rows.turning.items()
         ]
-        points = [(rows.bodies[point.body], np.array(point.position)) for point in map(case.mechanism.point, case.points)]
+        points = [
+            (rows.bodies[point.body], np.array(point.position))
+            for point in map(case.mechanism.point, case.points)
+        ]
         self.wanted = [(number, position - origin) for (number, origin), position in points]
         self.ground = rows.ground
         kinds = exu.OutputVariableType
@@ -135,7 +161,8 @@ class ExudynModel:
         return self.x[: self.coordinates]
 
     def move(self, dx: Array) -> None:
-        # Exudyn's Jacobian is exact along the unit sphere of the Euler parameters only: off it, Newton is no longer quadratic.
+        # Exudyn's Jacobian is exact along the unit sphere of the Euler parameters only: off it,
+        # Newton is no longer quadratic.
         x = self.x + dx
         q = x[: self.coordinates].reshape(-1, 7)
         parameters = q[:, 3:] + NO_ROTATION
@@ -146,8 +173,9 @@ class ExudynModel:
         values = self.followed @ np.concatenate([c, self.x[self.coordinates :]])
         for row, (first, second), frame in self.turning:
             self.mbs.SetMarkerParameter(first, "localHT", frame @ turned(values[row]))
-            # The frame is there: the row is the sine of the angle still missing. From beyond a quarter turn Newton would go to the
-            # other zero of the sine; a residual that is not finite tells the walk to take a shorter step.
+            # The frame is there: the row is the sine of the angle still missing. From beyond a
+            # quarter turn Newton would go to the other zero of the sine; a residual that is not
+            # finite tells the walk to take a shorter step.
             values[row] = 0.0 if self._x_axis(first) @ self._x_axis(second) > 0.0 else np.nan
         self.solver.ComputeAlgebraicEquations(self.mbs)
         return self.solver.GetSystemResidual()[self.kept] - self.target - values
@@ -168,8 +196,9 @@ class ExudynModel:
         return self.driven
 
     def bias(self, v: Array) -> Array:
-        # The turned frames rest meanwhile: where the rows are met, the terms that their motion would add are all zero.
-        # The step follows the speed, so the accuracy does not depend on the rate of the sweep.
+        # The turned frames rest meanwhile: where the rows are met, the terms that their motion
+        # would add are all zero. The step follows the speed, so the accuracy does not depend on the
+        # rate of the sweep.
         v = v[: self.coordinates]
         h, total = DIFFERENCE / (np.abs(v).max() or 1.0), np.zeros(len(self.kept))
         for k, weight in WEIGHTS:
@@ -186,5 +215,7 @@ class ExudynModel:
     def _motion(self, body: int, arm: Array) -> tuple[Array, Array, Array]:
         if body == self.ground:  # Exudyn has no acceleration output there
             return arm, np.zeros(3), np.zeros(3)
-        position, velocity, acceleration = (self.mbs.GetObjectOutputBody(body, kind, arm) for kind in self.output_types)
+        position, velocity, acceleration = (
+            self.mbs.GetObjectOutputBody(body, kind, arm) for kind in self.output_types
+        )
         return position, velocity, acceleration

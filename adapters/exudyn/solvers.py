@@ -21,9 +21,11 @@ from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simula
 from .coordinates import Coordinates, DriverTable
 from .exudyn import Exudyn, ExudynModel
 
-# Where a row keeps a number other than zero, Exudyn's objects do not; this much is round-off, and below what a residual may be.
+# Where a row keeps a number other than zero, Exudyn's objects do not; this much is round-off, and
+# below what a residual may be.
 NOTHING = 1e-12
-# Times of equidistant samples differ in their spacing by no more than their round-off, as part of the spacing.
+# Times of equidistant samples differ in their spacing by no more than their round-off, as part of
+# the spacing.
 EQUIDISTANT = 1e-6
 # Of its Newton iteration, relative and absolute: what leaves the constraints at round-off.
 TIGHT = 1e-12
@@ -34,9 +36,11 @@ class Solver:
     """Exudyn's solver.
 
     Attributes:
-        kind: "static", a load step a sample, positions only; "trapezoidal", of index 2, so constraints hold for rates and drift for
-            positions; "generalized alpha", of index 3, so constraints hold for positions and rates drift.
-        modified: whether Newton keeps its Jacobian from step to step; a dynamic solver always does, which is its default.
+        kind: "static", a load step a sample, positions only; "trapezoidal", of index 2, so
+            constraints hold for rates and drift for positions; "generalized alpha", of index 3, so
+            constraints hold for positions and rates drift.
+        modified: whether Newton keeps its Jacobian from step to step; a dynamic solver always does,
+            which is its default.
         tolerance: of Newton, relative and absolute.
         steps: between samples.
     """
@@ -58,9 +62,15 @@ class Solver:
                 "trapezoidal": "SolveDynamic, TrapezoidalIndex2",
                 "generalized alpha": "SolveDynamic, GeneralizedAlpha, spectral radius 0.6, index 3",
             }[self.kind],
-            "newton": f"{'modified' if self.modified else 'full'}, relative and absolute tolerance {self.tolerance:g}",
+            "newton": (
+                f"{'modified' if self.modified else 'full'}, relative and absolute tolerance"
+                f" {self.tolerance:g}"
+            ),
             "steps per sample": self.steps,
-            "drivers": "coordinate constraints on relative coordinates, values from a table by a Python function",
+            "drivers": (
+                "coordinate constraints on relative coordinates, values from a table by a Python"
+                " function"
+            ),
             "linear solver": "EXUdense; where rows are redundant, EigenDense that ignores it",
         }
 
@@ -75,21 +85,36 @@ class Solver:
             return reason
         for joint in case.mechanism.joints:
             if isinstance(joint, joints.ConstantVelocity):
-                return f"{joint}: Exudyn's own solvers have no object that ties two products, which the joint needs"
+                return (
+                    f"{joint}: Exudyn's own solvers have no object that ties two products, which"
+                    " the joint needs"
+                )
             kept = _kept(joint)
             if abs(kept) > NOTHING:
-                return f"{joint} keeps a product at {kept:.3g}, at which Exudyn's own objects keep only zero; make its axes exact"
+                return (
+                    f"{joint} keeps a product at {kept:.3g}, at which Exudyn's own objects keep"
+                    " only zero; make its axes exact"
+                )
         times = case.sweep.path.times
         if len(times) > 1 and np.ptp(np.diff(times)) > EQUIDISTANT * np.abs(np.diff(times)).max():
-            return "samples are not equidistant in time, and Exudyn's steps are; give the sweep by start, stop and steps"
+            return (
+                "samples are not equidistant in time, and Exudyn's steps are; give the sweep by"
+                " start, stop and steps"
+            )
         if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
-            return "turns of coupled joints are counted from the design, where this motion does not begin"
+            return (
+                "turns of coupled joints are counted from the design, where this motion does not"
+                " begin"
+            )
         return None
 
     def efforts(self) -> Mapping[str, Solver]:
         """Return the efforts by the tolerance of Newton, or by the number of steps."""
         if self.kind == "static":
-            return {f"Newton to {tol:g}": replace(self, tolerance=tol) for tol in (1e-2, 1e-4, 1e-8, 1e-12, 1e-14)}
+            return {
+                f"Newton to {tol:g}": replace(self, tolerance=tol)
+                for tol in (1e-2, 1e-4, 1e-8, 1e-12, 1e-14)
+            }
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
     def floor(self, case: Case) -> None:
@@ -152,26 +177,47 @@ class _Solved:
             arm = np.array(point.position) - origin
             if number == rows.ground:  # Exudyn has no acceleration output there
                 self.still[k] = arm
-            wanted = (kinds.Position,) if how.kind == "static" else (kinds.Position, kinds.Velocity, kinds.Acceleration)
-            make = {"bodyNumber": number, "localPosition": arm, "storeInternal": True, "writeToFile": False}
+            wanted = (
+                (kinds.Position,)
+                if how.kind == "static"
+                else (kinds.Position, kinds.Velocity, kinds.Acceleration)
+            )
+            make = {
+                "bodyNumber": number,
+                "localPosition": arm,
+                "storeInternal": True,
+                "writeToFile": False,
+            }
             asked = () if k in self.still else wanted
-            self.sensors.append([mbs.AddSensor(items.SensorBody(**make, outputVariableType=kind)) for kind in asked])
+            self.sensors.append(
+                [mbs.AddSensor(items.SensorBody(**make, outputVariableType=kind)) for kind in asked]
+            )
         state = kinds.Coordinates
         self.nodes = [
-            mbs.AddSensor(items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=state))
+            mbs.AddSensor(
+                items.SensorNode(
+                    nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=state
+                )
+            )
             for node in rows.nodes
         ]
         mbs.Assemble()
         self.settings = self._settings()
-        self.own = ~self.of.shared.any(axis=1)  # rows that follow no unknown beyond Exudyn's coordinates
-        self.details: dict[str, Any] = {"rows": len(rows.rows), "independent_rows": self.start.independent}
+        # rows that follow no unknown beyond Exudyn's coordinates
+        self.own = ~self.of.shared.any(axis=1)
+        self.details: dict[str, Any] = {
+            "rows": len(rows.rows),
+            "independent_rows": self.start.independent,
+        }
 
     def _settings(self) -> Any:
         settings = self.exu.SimulationSettings()
         settings.solution.file.write = False
         settings.solution.sensors.writePeriod = 1e-9  # at every step
         types = self.exu.LinearSolverType
-        settings.linearSolver.solverType = types.EXUdense if self.start.independent else types.EigenDense
+        settings.linearSolver.solverType = (
+            types.EXUdense if self.start.independent else types.EigenDense
+        )
         settings.linearSolver.ignoreSingularJacobian = not self.start.independent
         for each in (settings.staticSolver, settings.timeIntegration):
             each.verboseMode, each.adaptiveStep = 0, False
@@ -179,7 +225,8 @@ class _Solved:
             each.newton.useModifiedNewton = self.how.modified
         alpha = settings.timeIntegration.generalizedAlpha
         alpha.spectralRadius, alpha.useNewmark, alpha.useIndex2Constraints = 0.6, False, False
-        alpha.computeInitialAccelerations = False  # it would take the drivers, which it knows by their values, for unaccelerated
+        # it would take the drivers, which it knows by their values, for unaccelerated
+        alpha.computeInitialAccelerations = False
         return settings
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
@@ -214,7 +261,9 @@ class _Solved:
         state.SetODE2Coordinates_t(leg.sign * self.start.v[:n], initial)
         state.SetODE2Coordinates_tt(self.start.a[:n], initial)
         if self.angles:
-            state.SetDataCoordinates([0.0 if value is None else driven[0, value, 0] for value in self.angles], initial)
+            state.SetDataCoordinates(
+                [0.0 if value is None else driven[0, value, 0] for value in self.angles], initial
+            )
 
     def advance(self, steps: int, duration: float) -> None:
         """Let Exudyn go on to the end of the leg."""
@@ -227,16 +276,24 @@ class _Solved:
             dynamic, solvers = self.settings.timeIntegration, self.exu.DynamicSolverType
             dynamic.numberOfSteps, dynamic.endTime = steps, duration
             self.table.per_second = steps / duration
-            solver = solvers.TrapezoidalIndex2 if self.how.kind == "trapezoidal" else solvers.GeneralizedAlpha
+            solver = (
+                solvers.TrapezoidalIndex2
+                if self.how.kind == "trapezoidal"
+                else solvers.GeneralizedAlpha
+            )
             self.mbs.SolveDynamic(self.settings, solverType=solver, showHints=False)
 
     def poses(self, driven: Array) -> Iterator[SimulatedPose]:
-        """What Exudyn has stored, sample by sample; the residual is that of the last one, where drift is largest."""
+        """What Exudyn has stored, sample by sample; the residual is that of the last one, where
+        drift is largest.
+        """
         steps = self.how.steps
         stored = [[self.stored(sensor)[::steps] for sensor in sensors] for sensors in self.sensors]
         state = np.hstack([self.stored(sensor) for sensor in self.nodes])[::steps]
         last = len(state) - 1
-        self.of.restore(np.concatenate([state[last], np.zeros(self.of.unknowns - self.of.coordinates)]))
+        self.of.restore(
+            np.concatenate([state[last], np.zeros(self.of.unknowns - self.of.coordinates)])
+        )
         residual = float(np.abs(self.of.residual(driven[0, :, last * steps])[self.own]).max())
         points = np.full((3, len(state), len(self.sensors), 3), np.nan)
         for k, quantities in enumerate(stored):

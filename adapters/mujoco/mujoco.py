@@ -1,9 +1,11 @@
-"""MuJoCo in projection mode: its tree kinematics and its equality constraints, solved by the Newton walk of `projection`.
+"""MuJoCo in projection mode: its tree kinematics and its equality constraints, solved by the Newton
+walk of `projection`.
 
 What joints and drivers become is in `mujoco_spec`.
 
-MuJoCo's time stepping treats equalities as soft, so it is not used: position is a root of `efc_pos`, velocity and acceleration
-follow from `efc_J` and its rate. MuJoCo puts that rate into `efc_aref` of connects and welds, not of tendons (measured: 4.0).
+MuJoCo's time stepping treats equalities as soft, so it is not used: position is a root of
+`efc_pos`, velocity and acceleration follow from `efc_J` and its rate. MuJoCo puts that rate into
+`efc_aref` of connects and welds, not of tendons (measured: 4.0).
 """
 
 from __future__ import annotations
@@ -39,10 +41,16 @@ class MuJoCo(ProjectionEngine):
     def described(self) -> Mapping[str, Any]:
         """What of MuJoCo's equalities is used, and how."""
         return {
-            "residual": "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers: units or rad",
+            "residual": (
+                "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers:"
+                " units or rad"
+            ),
             "jacobian": "efc_J, dense",
             "options": "no gravity, no contact, no autoreset; equalities without spring and damper",
-            "cut_joints": "tendon; or connect or weld, to an auxiliary body where the joint has slides or hinges",
+            "cut_joints": (
+                "tendon; or connect or weld, to an auxiliary body where the joint has slides or"
+                " hinges"
+            ),
             "relations": "joint equalities",
         }
 
@@ -61,10 +69,15 @@ class MuJoCo(ProjectionEngine):
         given, empty = (model.m, model.d), (nothing, mj.MjData(nothing))
 
         def calls(*names: str) -> Mapping[str, tuple[Any, Any, int]]:
-            return {name: (partial(getattr(mj, name), *given), partial(getattr(mj, name), *empty), 1) for name in names}
+            return {
+                name: (partial(getattr(mj, name), *given), partial(getattr(mj, name), *empty), 1)
+                for name in names
+            }
 
         pose = calls("mj_kinematics", "mj_comPos", "mj_tendon", "mj_makeConstraint")
-        return floor_of(self, trajectory, model.m.nv, pose, calls("mj_comVel", "mj_referenceConstraint"))
+        return floor_of(
+            self, trajectory, model.m.nv, pose, calls("mj_comVel", "mj_referenceConstraint")
+        )
 
 
 def mujoco() -> Any:
@@ -73,31 +86,52 @@ def mujoco() -> Any:
 
 
 class MuJoCoModel:
-    """A compiled mechanism as a `ProjectionModel`: the rows of its equalities, then one row for each driver."""
+    """A compiled mechanism as a `ProjectionModel`: the rows of its equalities, then one row for
+    each driver.
+    """
 
     def __init__(self, mj: Any, case: Case) -> None:
         mechanism, sketch = case.mechanism, Sketch(mj, case.mechanism)
-        sites = {point.name: sketch.site(sketch.bodies[point.body], point.position) for point in mechanism.points}
+        sites = {
+            point.name: sketch.site(sketch.bodies[point.body], point.position)
+            for point in mechanism.points
+        }
         self.mj, self.m = mj, sketch.spec.compile()
         self.d = mj.MjData(self.m)
         self.watched = [int(sites[name].id) for name in case.points]
-        self.closures = [replace(each, ends=tuple(int(end.id) for end in each.ends)) for each in sketch.closures]
-        self.owner = np.repeat(np.arange(len(self.closures)), [ROWS[each.kind] for each in self.closures])
+        self.closures = [
+            replace(each, ends=tuple(int(end.id) for end in each.ends)) for each in sketch.closures
+        ]
+        self.owner = np.repeat(
+            np.arange(len(self.closures)), [ROWS[each.kind] for each in self.closures]
+        )
         self.n = len(self.owner)
         owners = [self.closures[k] for k in self.owner]
-        self.tendons = [(row, *each.ends) for row, each in enumerate(owners) if each.kind == "tendon"]
+        self.tendons = [
+            (row, *each.ends) for row, each in enumerate(owners) if each.kind == "tendon"
+        ]
         self.present: slice | NDArray[np.intp] = slice(self.n)
         self.A = np.zeros((self.n + len(mechanism.drivers), self.m.nv))
         self.columns = np.eye(len(self.A))[:, self.n :]  # the rows of the drivers are the last
         self.coordinates: list[tuple[int, int, float]] = []  # row, address in qpos, sign
-        self.driven: list[tuple[int, int, float]] = []  # of joint drivers: address in qpos, in qvel, sign
-        self.pulled: list[tuple[int, int, Array, Array]] = []  # row, site, unit direction, design position
+        # of joint drivers: address in qpos, in qvel, sign
+        self.driven: list[tuple[int, int, float]] = []
+        # row, site, unit direction, design position
+        self.pulled: list[tuple[int, int, Array, Array]] = []
         for row, driver in enumerate(mechanism.drivers, start=self.n):
             if isinstance(driver, PointCoordinate):
-                direction, start = np.array(driver.direction), np.array(mechanism.point(driver.point).position)
-                self.pulled.append((row, int(sites[driver.point].id), direction / np.linalg.norm(direction), start))
+                direction, start = (
+                    np.array(driver.direction),
+                    np.array(mechanism.point(driver.point).position),
+                )
+                self.pulled.append(
+                    (row, int(sites[driver.point].id), direction / np.linalg.norm(direction), start)
+                )
             elif isinstance(driver, JointDriver):
-                joint, sign = self.m.joint(coordinate(driver.joint, driver.freedom)), sketch.signs[driver.joint]
+                joint, sign = (
+                    self.m.joint(coordinate(driver.joint, driver.freedom)),
+                    sketch.signs[driver.joint],
+                )
                 self.coordinates.append((row, int(joint.qposadr[0]), sign))
                 self.driven.append((int(joint.qposadr[0]), int(joint.dofadr[0]), sign))
                 self.A[row, int(joint.dofadr[0])] = sign
@@ -126,8 +160,11 @@ class MuJoCoModel:
         mj.mj_comPos(m, d)
         mj.mj_tendon(m, d)
         mj.mj_makeConstraint(m, d)
-        # MuJoCo leaves out an equality while its whole Jacobian is zero; the rest keeps its order, efc_J its full length
-        self.present = slice(self.n) if d.ne == self.n else np.flatnonzero(np.isin(self.owner, d.efc_id))
+        # MuJoCo leaves out an equality while its whole Jacobian is zero; the rest keeps its order,
+        # efc_J its full length
+        self.present = (
+            slice(self.n) if d.ne == self.n else np.flatnonzero(np.isin(self.owner, d.efc_id))
+        )
         r = -(self.columns @ c)
         r[self.present] = d.efc_pos
         if d.ne != self.n:
@@ -154,7 +191,8 @@ class MuJoCoModel:
         d.qvel[:] = v
         self.mj.mj_comVel(self.m, d)
         self.mj.mj_referenceConstraint(self.m, d)
-        # aref = -(B vel + K I pos) - Jdot v; an absent connect or weld is one that never opens, its Jdot v is zero
+        # aref = -(B vel + K I pos) - Jdot v; an absent connect or weld is one that never opens, its
+        # Jdot v is zero
         stiffness, damping, impedance, _ = d.efc_KBIP.reshape(-1, 4).T
         b[self.present] = -(d.efc_aref + damping * d.efc_vel + stiffness * impedance * d.efc_pos)
         for row, i, j in self.tendons:
@@ -175,10 +213,14 @@ class MuJoCoModel:
         ]
 
     def gap(self, closure: Equality) -> Array | float:
-        """Residual of an equality that MuJoCo leaves out: of a weld only between parts of one rigid body, so it is zero."""
+        """Residual of an equality that MuJoCo leaves out: of a weld only between parts of one rigid
+        body, so it is zero.
+        """
         i, j = closure.ends
         span = self.d.site_xpos[i] - self.d.site_xpos[j]
-        return {"connect": span, "tendon": math.sqrt(span @ span) - closure.length, "weld": 0.0}[closure.kind]
+        return {"connect": span, "tendon": math.sqrt(span @ span) - closure.length, "weld": 0.0}[
+            closure.kind
+        ]
 
     def slope(self, site: int) -> Array:
         """Return the Jacobian of a site's position, shape (3, unknowns)."""

@@ -1,10 +1,12 @@
 """A mechanism as a model specification of MuJoCo; private to its adapter.
 
-Every body frame lies on the global frame at design, so the geometry of a case enters as it stands. A joint is a chain of MuJoCo
-joints (see `chains`). In the spanning tree it carries one of its bodies on the other. A cut joint carries an auxiliary body on
-its first body and closes its loop by one equality constraint with its second: a connect where the chain ends in a ball, else a
-weld; a distance is a tendon over two sites. These rows have full rank where the joint's own rows have; two connects on the axis
-of a revolute would not. So a joint has its coordinates wherever it stands, and what ties them to one another is a joint equality.
+Every body frame lies on the global frame at design, so the geometry of a case enters as it stands.
+A joint is a chain of MuJoCo joints (see `chains`). In the spanning tree it carries one of its
+bodies on the other. A cut joint carries an auxiliary body on its first body and closes its loop by
+one equality constraint with its second: a connect where the chain ends in a ball, else a weld; a
+distance is a tendon over two sites. These rows have full rank where the joint's own rows have; two
+connects on the axis of a revolute would not. So a joint has its coordinates wherever it stands, and
+what ties them to one another is a joint equality.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, free, r
 from ..shared.poses import middle
 
 JOINTS = (*CHAINS, Distance)
-"""The joint types that have a counterpart here, exactly these: a subclass may mean something else."""
+"""The joint types that have a counterpart here, exactly these: a subclass may mean something
+else.
+"""
 
 
 def coordinate(joint: str, name: str) -> str:
@@ -30,7 +34,9 @@ def coordinate(joint: str, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """An equality constraint and the two sites it ties (their ids are known once the spec is compiled); length of a tendon [m]."""
+    """An equality constraint and the two sites it ties (their ids are known once the spec is
+    compiled); length of a tendon [m].
+    """
 
     kind: str
     ends: tuple[Any, ...] = ()
@@ -38,7 +44,9 @@ class Equality:
 
 
 class Sketch:
-    """A mechanism written into an MjSpec. The spec is compiled as it is: its XML text would keep six digits."""
+    """A mechanism written into an MjSpec. The spec is compiled as it is: its XML text would keep
+    six digits.
+    """
 
     def __init__(self, mj: Any, mechanism: Mechanism) -> None:
         self.mj, self.mechanism = mj, mechanism
@@ -46,14 +54,17 @@ class Sketch:
         self.spec.option.gravity = [0.0, 0.0, 0.0]
         self.spec.option.jacobian = mj.mjtJacobian.mjJAC_DENSE
         # autoreset would answer a diverged pose with the design pose
-        self.spec.option.disableflags |= mj.mjtDisableBit.mjDSBL_CONTACT | mj.mjtDisableBit.mjDSBL_AUTORESET
+        self.spec.option.disableflags |= (
+            mj.mjtDisableBit.mjDSBL_CONTACT | mj.mjtDisableBit.mjDSBL_AUTORESET
+        )
         fixed = [GROUND, *(body.name for body in mechanism.bodies if body.fixed)]
         self.bodies = dict[str, Any].fromkeys(fixed, self.spec.worldbody)
         self.closures: list[Equality] = []
         self.tree: dict[str, str] = {}  # what carries each body
         self.means: dict[str, str] = {}  # what closes each cut joint
         self.relations: list[str] = []  # what ties coordinates to one another
-        self.signs: dict[str, float] = {}  # of a joint's coordinate: minus where it moves the joint's first body
+        # of a joint's coordinate: minus where it moves the joint's first body
+        self.signs: dict[str, float] = {}
         tree = spanning_tree(mechanism)
         for branch in tree.branches:
             body = self.bodies[branch.child] = self.body(self.bodies[branch.parent])
@@ -69,10 +80,15 @@ class Sketch:
         for joint in tree.cut:
             self.close(joint, self.bodies[joint.i], self.bodies[joint.j])
         for coupler in mechanism.couplers:
-            self.relate((joint, freedom, self.signs[joint] * weight) for joint, freedom, weight in coupler.terms)
+            self.relate(
+                (joint, freedom, self.signs[joint] * weight)
+                for joint, freedom, weight in coupler.terms
+            )
 
     def body(self, parent: Any) -> Any:
-        """A body on its parent's frame. Mass and inertia do not enter kinematics, but MuJoCo wants them positive definite."""
+        """A body on its parent's frame. Mass and inertia do not enter kinematics, but MuJoCo wants
+        them positive definite.
+        """
         body = parent.add_body()
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
         return body
@@ -82,7 +98,9 @@ class Sketch:
         return body.add_site(name=str(len(self.spec.sites)), pos=list(position))
 
     def near(self, joint: Joint) -> Vector:
-        """The joint's point, or where it has none, the origin of a moving body, which serves as well."""
+        """The joint's point, or where it has none, the origin of a moving body, which serves as
+        well.
+        """
         moving = self.mechanism.body(joint.i if self.mechanism.is_fixed(joint.j) else joint.j)
         return getattr(joint, "point", None) or moving.origin
 
@@ -99,12 +117,21 @@ class Sketch:
         kinds = {"slide": types.mjJNT_SLIDE, "hinge": types.mjJNT_HINGE, "ball": types.mjJNT_BALL}
         for link in links:
             name = coordinate(joint, link.name) if link.name else ""
-            body.add_joint(name=name, type=kinds[link.move], pos=list(link.point), axis=list(link.axis), armature=1.0)
+            body.add_joint(
+                name=name,
+                type=kinds[link.move],
+                pos=list(link.point),
+                axis=list(link.axis),
+                armature=1.0,
+            )
 
     def carry(self, body: Any, joint: Joint, links: Sequence[Link], sign: float = 1.0) -> None:
-        """Let a body move by a joint's links; the sign is minus where that body is the joint's first."""
+        """Let a body move by a joint's links; the sign is minus where that body is the joint's
+        first.
+        """
         self.attach(body, links, joint.name)
-        self.signs[joint.name] = sign  # it is that of all the joint's coordinates, so their relations need none
+        # it is that of all the joint's coordinates, so their relations need none
+        self.signs[joint.name] = sign
         for relation in relations(joint):
             self.relate(relation)
 
@@ -120,7 +147,9 @@ class Sketch:
         if links:
             i = self.body(i)
             self.carry(i, joint, links)
-            self.means[joint.name] = f"{kind} to an auxiliary body that carries the joint's slides and hinges"
+            self.means[joint.name] = (
+                f"{kind} to an auxiliary body that carries the joint's slides and hinges"
+            )
         self.join(kind, i, j, point)
 
     def span(self, rod: Distance, i: Any, j: Any) -> None:
@@ -130,13 +159,16 @@ class Sketch:
         for end in ends:
             tendon.wrap_site(end.name)
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_TENDON, name1=rod.name)
-        # the length is that at design plus a polynomial of another tendon; there is none, which leaves its constant
+        # the length is that at design plus a polynomial of another tendon; there is none, which
+        # leaves its constant
         equality.data = [rod.rod_length - rod.design_distance, *[0.0] * (len(equality.data) - 1)]
         self.closures.append(Equality("tendon", ends, rod.rod_length))
 
     def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, factor = dependence((coordinate(joint, freedom), weight) for joint, freedom, weight in terms)
+        one, other, factor = dependence(
+            (coordinate(joint, freedom), weight) for joint, freedom, weight in terms
+        )
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_JOINT, name1=one, name2=other)
         equality.objtype = self.mj.mjtObj.mjOBJ_JOINT
         # one is a polynomial of the other, of which only the linear term is wanted
@@ -145,8 +177,12 @@ class Sketch:
         self.relations.append(f"joint equality: {one} = {factor:.9g} {other}")
 
     def join(self, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
-        """Tie two bodies at a position. The default data stays: it holds the scale of a weld's rotation rows."""
+        """Tie two bodies at a position. The default data stays: it holds the scale of a weld's
+        rotation rows.
+        """
         ends = self.site(i, position), self.site(j, position)
         equality = {"connect": self.mj.mjtEq.mjEQ_CONNECT, "weld": self.mj.mjtEq.mjEQ_WELD}[kind]
-        self.spec.add_equality(type=equality, name1=ends[0].name, name2=ends[1].name, objtype=self.mj.mjtObj.mjOBJ_SITE)
+        self.spec.add_equality(
+            type=equality, name1=ends[0].name, name2=ends[1].name, objtype=self.mj.mjtObj.mjOBJ_SITE
+        )
         self.closures.append(Equality(kind, ends))

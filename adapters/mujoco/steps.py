@@ -1,7 +1,8 @@
 """MuJoCo in simulate mode: `mj_step`, its constraints as soft as they are set.
 
-A driven coordinate has an armature beside which all that moves is nothing, and is set to its value, rate and force at every sample;
-a driver that is not steady, at every step. Velocities and accelerations are MuJoCo's own, of `mj_forward` at the sample.
+A driven coordinate has an armature beside which all that moves is nothing, and is set to its value,
+rate and force at every sample; a driver that is not steady, at every step. Velocities and
+accelerations are MuJoCo's own, of `mj_forward` at the sample.
 """
 
 from __future__ import annotations
@@ -22,15 +23,18 @@ from ..shared.joint_equivalents import jointed
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .mujoco import MuJoCo, MuJoCoModel, mujoco
 
-# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its motion by a billionth.
+# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its
+# motion by a billionth.
 ARMATURE = 1e9
 # The impedance range that leaves least softness; MuJoCo clips at it (mjMAXIMP).
 HARD = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-# Time constant of stiff constraints, in steps: the shortest that MuJoCo takes for stable (refsafe), with the smallest gaps.
+# Time constant of stiff constraints, in steps: the shortest that MuJoCo takes for stable (refsafe),
+# with the smallest gaps.
 TIME_CONSTANT = 2.0
 # Of the projecting variant: its correction is of the length of the gap, whatever the step is [s].
 UNIT_STEP = 1e-3
-# Of its solver, relative: the default, 1e-8, ends the corrections where a gap of a millimetre has come to 1e-10 m.
+# Of its solver, relative: the default, 1e-8, ends the corrections where a gap of a millimetre has
+# come to 1e-10 m.
 TOLERANCE = 1e-15
 
 
@@ -39,10 +43,12 @@ class Stepping:
     """MuJoCo's time stepping: equal steps between the samples.
 
     Attributes:
-        kind: "default" leaves every setting of MuJoCo as it is; "stiff" has the hardest constraints that are stable and its most
-            accurate integrator; "projecting" sets every velocity to zero before each step, and springs and dampers to close a gap
-            in one step: every step is then a Newton correction in the metric of the masses. It has no velocities.
-        effort: steps between samples; of the default variant, a factor on the number that its own step size asks for.
+        kind: "default" leaves every setting of MuJoCo as it is; "stiff" has the hardest constraints
+            that are stable and its most accurate integrator; "projecting" sets every velocity to
+            zero before each step, and springs and dampers to close a gap in one step: every step is
+            then a Newton correction in the metric of the masses. It has no velocities.
+        effort: steps between samples; of the default variant, a factor on the number that its own
+            step size asks for.
     """
 
     name: str
@@ -76,7 +82,10 @@ class Stepping:
                 "steps per sample": self.effort,
             },
         }
-        shared = {"driven coordinates": f"set at samples, armature {ARMATURE:g}", "rods": "bodies between a cross and a ball"}
+        shared = {
+            "driven coordinates": f"set at samples, armature {ARMATURE:g}",
+            "rods": "bodies between a cross and a ball",
+        }
         return {**own[self.kind], **shared, "options": "no gravity, no contact, no autoreset"}
 
     def version(self) -> str | None:
@@ -101,7 +110,9 @@ class Stepping:
         return _Steps(mujoco(), case, self)
 
     def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
-        """All samples that can be simulated, however far the constraints drift; see `Engine.solve`."""
+        """All samples that can be simulated, however far the constraints drift; see
+        `Engine.solve`.
+        """
         with model.warnings():
             return simulated(case, model.start, model.run, model.of.details)
 
@@ -135,7 +146,8 @@ class _Steps:
             m.opt.integrator = mj.mjtIntegrator.mjINT_RK4
         if how.kind != "default":
             m.eq_solimp[:] = HARD
-            m.opt.enableflags |= mj.mjtEnableBit.mjENBL_DIAGEXACT  # else softness follows a mean of the masses, not each row's
+            # else softness follows a mean of the masses, not each row's
+            m.opt.enableflags |= mj.mjtEnableBit.mjENBL_DIAGEXACT
         if how.kind == "projecting":
             m.opt.disableflags |= mj.mjtDisableBit.mjDSBL_REFSAFE
             m.opt.timestep, m.opt.tolerance = UNIT_STEP, TOLERANCE
@@ -146,7 +158,9 @@ class _Steps:
 
     def count(self, gap: float) -> int:
         """Steps over a gap between samples [s]."""
-        return self.how.effort * (math.ceil(gap / self.longest) if self.how.kind == "default" else 1)
+        return self.how.effort * (
+            math.ceil(gap / self.longest) if self.how.kind == "default" else 1
+        )
 
     @contextmanager
     def warnings(self) -> Generator[None]:
@@ -185,7 +199,9 @@ class _Steps:
             self.mj.mj_step(self.m, self.of.d, n)
             return
         # a force that changes: as it is amid the step
-        whole, half = (leg.drive(t + (until - t) * (np.arange(n) + part) / n) for part in (0.0, 0.5))
+        whole, half = (
+            leg.drive(t + (until - t) * (np.arange(n) + part) / n) for part in (0.0, 0.5)
+        )
         for k in range(n):
             self.set(whole[0, :, k], whole[1, :, k], half[2, :, k])
             self.mj.mj_step(self.m, self.of.d)

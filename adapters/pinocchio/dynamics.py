@@ -1,8 +1,10 @@
-"""Pinocchio in simulate mode: accelerations of its `constraintDynamics`, integrated by a Runge-Kutta method of fourth order.
+"""Pinocchio in simulate mode: accelerations of its `constraintDynamics`, integrated by a
+Runge-Kutta method of fourth order.
 
-Pinocchio has no time stepping of its own; the loop over the steps is ours. Every joint is a chain of slides, hinges and balls (see
-`chains`), every loop is closed by one rigid constraint, of a point or of a whole frame. What is driven has an armature beside which
-all that moves is nothing, and is set to its value, rate and force at every step.
+Pinocchio has no time stepping of its own; the loop over the steps is ours. Every joint is a chain
+of slides, hinges and balls (see `chains`), every loop is closed by one rigid constraint, of a point
+or of a whole frame. What is driven has an armature beside which all that moves is nothing, and is
+set to its value, rate and force at every step.
 """
 
 from __future__ import annotations
@@ -27,14 +29,17 @@ from ..shared.loop_closures import CLOSURES, ends_of
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .pinocchio import Pinocchio, PinocchioModel
 
-# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its motion by a billionth.
+# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its
+# motion by a billionth.
 ARMATURE = 1e9
-# Of the proximal iteration of redundant loops: with none it does not converge, with 1e-4 not always, with this in a few rounds.
+# Of the proximal iteration of redundant loops: with none it does not converge, with 1e-4 not
+# always, with this in a few rounds.
 MU = 1e-8
 ROUNDS = 50
 ACCURACY = 1e-14
-# Time in which a gap closes, in steps. Shorter ones pass the error of every step on to the accelerations (on an RSSR linkage 1e-2
-# m/s^2 at 4 steps, 6e-7 at 50); with none at all, gaps add up over the samples.
+# Time in which a gap closes, in steps. Shorter ones pass the error of every step on to the
+# accelerations (on an RSSR linkage 1e-2 m/s^2 at 4 steps, 6e-7 at 50); with none at all, gaps add
+# up over the samples.
 DECAY = 50.0
 
 
@@ -74,11 +79,20 @@ class Dynamics:
             return "Pinocchio 3 calls its constraintDynamics in another way; install Pinocchio 4"
         for joint in case.mechanism.joints:
             if relations(joint):
-                return f"{joint} ties coordinates to one another, which Pinocchio's constraintDynamics refuses"
+                return (
+                    f"{joint} ties coordinates to one another, which Pinocchio's constraintDynamics"
+                    " refuses"
+                )
             if isinstance(joint, Distance) and not fits(joint):
-                return f"{joint} has another length than at design; Pinocchio has no distance constraint, and no body has it there"
+                return (
+                    f"{joint} has another length than at design; Pinocchio has no distance"
+                    " constraint, and no body has it there"
+                )
         for coupler in case.mechanism.couplers:
-            return f"{coupler} ties coordinates to one another, which Pinocchio's constraintDynamics refuses"
+            return (
+                f"{coupler} ties coordinates to one another, which Pinocchio's constraintDynamics"
+                " refuses"
+            )
         return Pinocchio().unsupported(case)
 
     def efforts(self) -> Mapping[str, Dynamics]:
@@ -90,10 +104,16 @@ class Dynamics:
 
     def build(self, case: Case) -> _Model:
         """Tree and constraints, and where it sets off."""
-        return _Model(importlib.import_module("pinocchio"), replace(case, mechanism=jointed(case.mechanism)), self.steps)
+        return _Model(
+            importlib.import_module("pinocchio"),
+            replace(case, mechanism=jointed(case.mechanism)),
+            self.steps,
+        )
 
     def solve(self, model: _Model, case: Case, tol: float) -> Trajectory:
-        """All samples that can be simulated, however far the constraints drift; see `Engine.solve`."""
+        """All samples that can be simulated, however far the constraints drift; see
+        `Engine.solve`.
+        """
         return simulated(case, model.start, model.run, {"closures": model.closures})
 
 
@@ -116,18 +136,29 @@ class _Model(PinocchioModel):
         self.model.armature = armature
         self.model.gravity = pin.Motion.Zero()
         self.dynamics = self.model.createData()
-        self.proximal = pin.ProximalSettings(ACCURACY, ACCURACY, *((0.0, 1) if self.start.independent else (MU, ROUNDS)))
-        self.constraints, self.found = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+        self.proximal = pin.ProximalSettings(
+            ACCURACY, ACCURACY, *((0.0, 1) if self.start.independent else (MU, ROUNDS))
+        )
+        self.constraints, self.found = (
+            pin.StdVec_RigidConstraintModel(),
+            pin.StdVec_RigidConstraintData(),
+        )
         for kind, i, j, point in self.loops:
             ends = [(at, pin.SE3(np.eye(3), np.array(point) - self.origin[at])) for at in (i, j)]
-            self.constraints.append(pin.RigidConstraintModel(kind, self.model, *ends[0], *ends[1], pin.ReferenceFrame.LOCAL))
+            self.constraints.append(
+                pin.RigidConstraintModel(
+                    kind, self.model, *ends[0], *ends[1], pin.ReferenceFrame.LOCAL
+                )
+            )
         for constraint in self.constraints:
             self.found.append(constraint.createData())
         pin.initConstraintDynamics(self.model, self.dynamics, self.constraints, self.found)
 
     def _add_joint(self, parent: int, joint: Any, at: Vector) -> int:
         number = super()._add_joint(parent, joint, at)
-        self.model.appendBodyToJoint(number, self.pin.Inertia(1.0, np.zeros(3), np.eye(3)), self.pin.SE3.Identity())
+        self.model.appendBodyToJoint(
+            number, self.pin.Inertia(1.0, np.zeros(3), np.eye(3)), self.pin.SE3.Identity()
+        )
         return number
 
     def _add_chain(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
@@ -147,8 +178,9 @@ class _Model(PinocchioModel):
         return at
 
     def _branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterator[Branch]:
-        # Depth first, and what a closure adds right after the body that it hangs on: Pinocchio's algorithms of inertia take the
-        # joints of a subtree to be numbered without a gap. In any other order constraintDynamics is wrong, without a word.
+        # Depth first, and what a closure adds right after the body that it hangs on: Pinocchio's
+        # algorithms of inertia take the joints of a subtree to be numbered without a gap. In any
+        # other order constraintDynamics is wrong, without a word.
         waiting = [Branch("", GROUND, None)]
         while waiting:
             branch = waiting.pop()
@@ -161,16 +193,26 @@ class _Model(PinocchioModel):
             waiting += [each for each in reversed(tree.branches) if each.parent == body]
 
     def _hang(self, joint: Joint, i: int, P: Vector) -> None:
-        """The slides and hinges of a closure, on what joint i carries; a ball at their end is left to the constraint."""
+        """The slides and hinges of a closure, on what joint i carries; a ball at their end is left
+        to the constraint.
+        """
         links, point, turns = end_of_loop(CHAINS[type(joint)](joint, P), P)
-        self.hung[joint.name] = self._add_links(i, joint, links, 1), point, Spherical if turns else Fixed
+        self.hung[joint.name] = (
+            self._add_links(i, joint, links, 1),
+            point,
+            Spherical if turns else Fixed,
+        )
 
-    def _close(self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool) -> None:
+    def _close(
+        self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool
+    ) -> None:
         i, point, tied = self.hung[joint.name]
         kinds = self.pin.ContactType
         self.loops.append((kinds.CONTACT_6D if tied is Fixed else kinds.CONTACT_3D, i, j, point))
         self.closures[joint.name] = f"rigid constraint, {CLOSURES[tied].text}"
-        self.conditions += CLOSURES[tied].conditions(joint, self._add_frame(i, point), self._add_frame(j, point))
+        self.conditions += CLOSURES[tied].conditions(
+            joint, self._add_frame(i, point), self._add_frame(j, point)
+        )
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """The poses of a leg."""
@@ -184,7 +226,9 @@ class _Model(PinocchioModel):
             for k in range(0, 2 * self.steps, 2):
                 q, v = self.step(q, v, h, driven[..., k : k + 3])
                 if not np.isfinite(v).all():
-                    raise SimulationEndedError("constraintDynamics diverges to numbers that are not finite")
+                    raise SimulationEndedError(
+                        "constraintDynamics diverges to numbers that are not finite"
+                    )
             yield self.pose(*self.put(q, v, driven[..., -1]), self.steps)
 
     def stabilise(self, h: float) -> None:
@@ -195,29 +239,42 @@ class _Model(PinocchioModel):
             parameters.Kp, parameters.Kd = rate**2, 2.0 * rate
 
     def put(self, q: Array, v: Array, driven: Array) -> tuple[Array, Array, Array]:
-        """The state with the driven coordinates where they belong, and the force that keeps them going."""
+        """The state with the driven coordinates where they belong, and the force that keeps them
+        going.
+        """
         q, v, tau = q.copy(), v.copy(), np.zeros(self.model.nv)
-        q[self.driven_q], v[self.driven_v], tau[self.driven_v] = self.sign * driven * np.array([[1.0], [1.0], [ARMATURE]])
+        q[self.driven_q], v[self.driven_v], tau[self.driven_v] = (
+            self.sign * driven * np.array([[1.0], [1.0], [ARMATURE]])
+        )
         return q, v, tau
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Return the accelerations of the coordinates, shape (unknowns,)."""
         pin = self.pin
-        return pin.constraintDynamics(self.model, self.dynamics, q, v, tau, self.constraints, self.found, self.proximal)
+        return pin.constraintDynamics(
+            self.model, self.dynamics, q, v, tau, self.constraints, self.found, self.proximal
+        )
 
     def step(self, q: Array, v: Array, h: float, driven: Array) -> tuple[Array, Array]:
-        """One step of Runge and Kutta, the configuration moved along its rates from where the step begins."""
+        """One step of Runge and Kutta, the configuration moved along its rates from where the step
+        begins.
+        """
         q, v, _ = self.put(q, v, driven[..., 0])
         rates, accelerations = list[Array](), list[Array]()
         for part, moment in ((0.0, 0), (0.5, 1), (0.5, 1), (1.0, 2)):
             at, rate = q, v
             if part:
-                at, rate = self.pin.integrate(self.model, q, part * h * rates[-1]), v + part * h * accelerations[-1]
+                at, rate = (
+                    self.pin.integrate(self.model, q, part * h * rates[-1]),
+                    v + part * h * accelerations[-1],
+                )
             at, rate, tau = self.put(at, rate, driven[..., moment])
             rates.append(rate)
             accelerations.append(self.acceleration(at, rate, tau))
         weights = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
-        return self.pin.integrate(self.model, q, h * (weights @ np.array(rates))), v + h * (weights @ np.array(accelerations))
+        return self.pin.integrate(self.model, q, h * (weights @ np.array(rates))), v + h * (
+            weights @ np.array(accelerations)
+        )
 
     def pose(self, q: Array, v: Array, tau: Array, steps: int) -> SimulatedPose:
         """What Pinocchio says of this moment."""
@@ -229,4 +286,6 @@ class _Model(PinocchioModel):
             self.pin.log6(found.c1Mc2).vector[: model.residualSize()]
             for found, model in zip(self.found, self.constraints, strict=True)
         ]
-        return SimulatedPose(points, max((float(np.abs(gap).max()) for gap in gaps), default=0.0), steps)
+        return SimulatedPose(
+            points, max((float(np.abs(gap).max()) for gap in gaps), default=0.0), steps
+        )

@@ -1,8 +1,10 @@
-"""Pinocchio, projection mode: its joints as a spanning tree, its frames to close the loops; one code for Pinocchio 3.9 and 4.
+"""Pinocchio, projection mode: its joints as a spanning tree, its frames to close the loops; one
+code for Pinocchio 3.9 and 4.
 
-Pinocchio's own constraint models are left alone: their signatures and the moment their data is fresh changed between 3 and 4,
-the axes of their rows depend on the kind, and none is a distance. What is used means the same in both: placement, Jacobian,
-velocity and classical acceleration of a frame, of which `closures` makes the rows of any joint.
+Pinocchio's own constraint models are left alone: their signatures and the moment their data is
+fresh changed between 3 and 4, the axes of their rows depend on the kind, and none is a distance.
+What is used means the same in both: placement, Jacobian, velocity and classical acceleration of a
+frame, of which `closures` makes the rows of any joint.
 """
 
 from __future__ import annotations
@@ -52,12 +54,16 @@ class Pinocchio(ProjectionEngine):
     def described(self) -> Mapping[str, Any]:
         """What Pinocchio's tree is, and what closes the loops."""
         return {
-            "coordinates": "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer",
+            "coordinates": (
+                "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer"
+            ),
             "closures": "conditions on frame placements, Jacobians and classical accelerations",
         }
 
     def version_of(self, simulator: Any) -> str | None:
-        """PyPI's package "pinocchio" is something else and has no Model; the simulator's is "pin"."""
+        """PyPI's package "pinocchio" is something else and has no Model; the simulator's is
+        "pin".
+        """
         return super().version_of(simulator) if hasattr(simulator, "Model") else None
 
     def build(self, case: Case) -> PinocchioModel:
@@ -69,20 +75,31 @@ class Pinocchio(ProjectionEngine):
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
         pin, least = model.pin, model.pin.Model()
-        # Pinocchio ends the process where it is asked for the Jacobian of a frame that no joint carries
+        # Pinocchio ends the process where it is asked for the Jacobian of a frame that no joint
+        # carries
         joint = least.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "joint")
-        frame = least.addFrame(pin.Frame("frame", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+        frame = least.addFrame(
+            pin.Frame("frame", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
+        )
         own, empty = (model.model, model.data), (least, least.createData())
         zero = np.zeros(model.model.nv)
 
-        def calls(function: Any, *given: Any, none: tuple[Any, ...] | None = None, times: int = 1) -> tuple[Any, Any, int]:
-            return partial(function, *own, *given), partial(function, *empty, *(none or (np.zeros(1),) * len(given))), times
+        def calls(
+            function: Any, *given: Any, none: tuple[Any, ...] | None = None, times: int = 1
+        ) -> tuple[Any, Any, int]:
+            return (
+                partial(function, *own, *given),
+                partial(function, *empty, *(none or (np.zeros(1),) * len(given))),
+                times,
+            )
 
         frames = model.model.nframes - 1 - len(model.wanted)
         pose = {
             "computeJointJacobians": calls(pin.computeJointJacobians, model.q),
             "updateFramePlacements": calls(pin.updateFramePlacements),
-            "getFrameJacobian": calls(pin.getFrameJacobian, 1, model.axes, none=(frame, model.axes), times=frames),
+            "getFrameJacobian": calls(
+                pin.getFrameJacobian, 1, model.axes, none=(frame, model.axes), times=frames
+            ),
         }
         rates = {"forwardKinematics": calls(pin.forwardKinematics, model.q, zero, zero, times=2)}
         return floor_of(self, solved, model.model.nv, pose, rates)
@@ -112,16 +129,24 @@ _TREE: dict[type[Joint], Callable[[Any, Any], Sequence[Any]]] = {
     OrientationLock: lambda pin, joint: [pin.JointModelTranslation()],
     Fixed: lambda pin, joint: [],
 }
-"""Pinocchio's joints that make a joint, from first body to second, one a freedom of an axial joint; other types are always cut."""
+"""Pinocchio's joints that make a joint, from first body to second, one a freedom of an axial joint;
+other types are always cut.
+"""
 
 
 class PinocchioModel:
-    """The mechanism in Pinocchio; a `ProjectionModel`. Rows: those of joints, then of couplers, then one a driver."""
+    """The mechanism in Pinocchio; a `ProjectionModel`. Rows: those of joints, then of couplers,
+    then one a driver.
+    """
 
     def __init__(self, pin: Any, case: Case) -> None:
         mechanism, tree = case.mechanism, spanning_tree(case.mechanism)
         self.pin, self.model, self.axes = pin, pin.Model(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        self.carrier = {name: 0 for name in (GROUND, *(body.name for body in mechanism.bodies)) if mechanism.is_fixed(name)}
+        self.carrier = {
+            name: 0
+            for name in (GROUND, *(body.name for body in mechanism.bodies))
+            if mechanism.is_fixed(name)
+        }
         self.origin = [np.zeros(3)]
         self.coordinates: dict[tuple[str, str], tuple[int, int]] = {}
         self.conditions: list[Condition] = []
@@ -129,13 +154,19 @@ class PinocchioModel:
         for branch in self._branches(mechanism, tree):
             joint, at = branch.joint, self.carrier[branch.parent]
             if joint is None:
-                self.carrier[branch.child] = self._add_joint(at, pin.JointModelFreeFlyer(), mechanism.body(branch.child).origin)
+                self.carrier[branch.child] = self._add_joint(
+                    at, pin.JointModelFreeFlyer(), mechanism.body(branch.child).origin
+                )
                 continue
             P = ends_of(mechanism, joint)[0]
-            self.carrier[branch.child] = self._add_chain(at, joint, P, 1 if joint.j == branch.child else -1)
+            self.carrier[branch.child] = self._add_chain(
+                at, joint, P, 1 if joint.j == branch.child else -1
+            )
             if isinstance(joint, ConstantVelocity):
                 self.closures[joint.name] = "ball joint of the tree, shafts turn alike (1 row)"
-                self.conditions += twistless(joint, *(self._add_frame(self.carrier[body], P) for body in joint.bodies))
+                self.conditions += twistless(
+                    joint, *(self._add_frame(self.carrier[body], P) for body in joint.bodies)
+                )
 
         named = {name for coupler in mechanism.couplers for name in coupler.joints}
         named |= {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
@@ -148,40 +179,61 @@ class PinocchioModel:
             if isinstance(driver, PointCoordinate):
                 point = mechanism.point(driver.point)
                 frame = self._add_frame(self.carrier[point.body], point.position)
-                self.conditions.append(DrivenPoint(frame, _unit(driver.direction), np.array(point.position)))
+                self.conditions.append(
+                    DrivenPoint(frame, _unit(driver.direction), np.array(point.position))
+                )
             elif isinstance(driver, JointDriver):
                 self.conditions.append(self._linear((driver.joint, driver.freedom, 1.0)))
-        self.wanted = [self._add_frame(self.carrier[point.body], point.position) for point in map(mechanism.point, case.points)]
+        self.wanted = [
+            self._add_frame(self.carrier[point.body], point.position)
+            for point in map(mechanism.point, case.points)
+        ]
 
         ends = np.cumsum([each.n for each in self.conditions])
-        self.slices = [slice(end - each.n, end) for end, each in zip(ends, self.conditions, strict=True)]
+        self.slices = [
+            slice(end - each.n, end) for end, each in zip(ends, self.conditions, strict=True)
+        ]
         self.J = np.zeros((ends[-1], self.model.nv))
-        self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]  # the rows of the drivers are the last
+        # the rows of the drivers are the last
+        self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]
         self.data = self.model.createData()
         self.reset()
 
     def _branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterable[Branch]:
-        """The branches in an order where every parent comes before its children; kinematics needs no other."""
+        """The branches in an order where every parent comes before its children; kinematics needs
+        no other.
+        """
         return tree.branches
 
-    def _close(self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool) -> None:
+    def _close(
+        self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool
+    ) -> None:
         """Rows for a joint that the tree has not, between what joints i and j carry."""
         closure, copied = CLOSURES[type(joint)], ""
         if named:
-            # what is driven or coupled must be a coordinate, which counts the turns: it moves a copy of the second body
-            i, closure, copied = self._add_chain(i, joint, ends[0], 1), CLOSURES[Fixed], f"on a copy of {joint.j!r}: "
+            # what is driven or coupled must be a coordinate, which counts the turns: it moves a
+            # copy of the second body
+            i, closure, copied = (
+                self._add_chain(i, joint, ends[0], 1),
+                CLOSURES[Fixed],
+                f"on a copy of {joint.j!r}: ",
+            )
         self.closures[joint.name] = copied + closure.text
         self.conditions += closure.conditions(joint, *map(self._add_frame, (i, j), ends))
 
     def _add_chain(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
-        """The number of the last of the joints that make a joint, from its first body on or (sign -1) from its second."""
+        """The number of the last of the joints that make a joint, from its first body on or (sign
+        -1) from its second.
+        """
         chain = list(enumerate(_TREE[type(joint)](self.pin, joint)))
         for k, each in chain[::sign]:
             at = self._add_joint(at, each, P)
             if isinstance(joint, AxialJoint):
                 self.coordinates[joint.name, joint.freedoms[k]] = at, sign
         for relation in joint.relations if isinstance(joint, AxialJoint) else ():
-            self.conditions.append(self._linear(*((joint.name, *term) for term in relation.items())))
+            self.conditions.append(
+                self._linear(*((joint.name, *term) for term in relation.items()))
+            )
         return at
 
     def _linear(self, *terms: tuple[str, str, float]) -> Linear:
@@ -189,7 +241,9 @@ class PinocchioModel:
         moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
         joints = [self.model.joints[at] for at, _, _ in moved]
         weights = np.array([sign * weight for _, sign, weight in moved])
-        return Linear(self, [each.idx_q for each in joints], [each.idx_v for each in joints], weights)
+        return Linear(
+            self, [each.idx_q for each in joints], [each.idx_v for each in joints], weights
+        )
 
     def _add_joint(self, parent: int, joint: Any, at: Vector) -> int:
         """The number of a new joint at that point, global at design."""
@@ -202,7 +256,12 @@ class PinocchioModel:
         placement = self.pin.SE3(np.eye(3), np.array(at) - self.origin[joint])
         # numbered, because a second frame of one name would silently be the first one
         name = f"frame {self.model.nframes}"
-        return Frame(self, self.model.addFrame(self.pin.Frame(name, joint, 0, placement, self.pin.FrameType.OP_FRAME)))
+        return Frame(
+            self,
+            self.model.addFrame(
+                self.pin.Frame(name, joint, 0, placement, self.pin.FrameType.OP_FRAME)
+            ),
+        )
 
     @property
     def details(self) -> Mapping[str, Any]:
@@ -245,7 +304,9 @@ class PinocchioModel:
 
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.pin.forwardKinematics(self.model, self.data, self.q, v, a)
-        return [(frame.position, frame.velocity[:3], frame.acceleration[:3]) for frame in self.wanted]
+        return [
+            (frame.position, frame.velocity[:3], frame.acceleration[:3]) for frame in self.wanted
+        ]
 
 
 def _unit(a: Iterable[float]) -> Array:

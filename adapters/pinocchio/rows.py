@@ -11,7 +11,9 @@ from ...core.trajectory import Array
 
 
 class Moved(Protocol):
-    """A model of Pinocchio and its data in the current configuration q; axes: those in which frames are told."""
+    """A model of Pinocchio and its data in the current configuration q; axes: those in which frames
+    are told.
+    """
 
     pin: Any
     model: Any
@@ -38,15 +40,21 @@ class Frame:
     @property
     def jacobian(self) -> Array:
         # a matrix of one column is given as a vector
-        return self.of.pin.getFrameJacobian(self.of.model, self.of.data, self.index, self.of.axes).reshape(6, -1)
+        return self.of.pin.getFrameJacobian(
+            self.of.model, self.of.data, self.index, self.of.axes
+        ).reshape(6, -1)
 
     @property
     def velocity(self) -> Array:
-        return self.of.pin.getFrameVelocity(self.of.model, self.of.data, self.index, self.of.axes).vector
+        return self.of.pin.getFrameVelocity(
+            self.of.model, self.of.data, self.index, self.of.axes
+        ).vector
 
     @property
     def acceleration(self) -> Array:
-        return self.of.pin.getFrameClassicalAcceleration(self.of.model, self.of.data, self.index, self.of.axes).vector
+        return self.of.pin.getFrameClassicalAcceleration(
+            self.of.model, self.of.data, self.index, self.of.axes
+        ).vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +75,9 @@ class DrivenPoint:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A weighted sum of coordinates [m or rad]: a driver's, or zero by a coupler or a joint's own relation."""
+    """A weighted sum of coordinates [m or rad]: a driver's, or zero by a coupler or a joint's own
+    relation.
+    """
 
     of: Moved
     q: list[int]

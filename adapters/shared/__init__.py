@@ -1,1 +1,3 @@
-"""Parts that several engines share: chains of joints, loop closures, frame constraints, the projection walk."""
+"""Parts that several engines share: chains of joints, loop closures, frame constraints, the
+projection walk.
+"""

@@ -1,9 +1,10 @@
 """A simulator's floor: what its own compiled code needs for a sample, without the Python around it.
 
-Each call that the projection mode makes into the simulator is timed on the case's model and on the smallest model there is; the
-difference is the compiled work, the rest is Python and its binding. A linear system is timed as LAPACK's LU of as many rows as
-there are unknowns, less that of one row, also where the adapter needs least squares. Nothing else counts: no residual test, no
-predictor, no copying. So a floor is below what any loop around these calls can reach, in whatever language.
+Each call that the projection mode makes into the simulator is timed on the case's model and on the
+smallest model there is; the difference is the compiled work, the rest is Python and its binding. A
+linear system is timed as LAPACK's LU of as many rows as there are unknowns, less that of one row,
+also where the adapter needs least squares. Nothing else counts: no residual test, no predictor, no
+copying. So a floor is below what any loop around these calls can reach, in whatever language.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ import numpy as np
 from ...core.harness.engine import Engine, Floor
 from ...core.trajectory import Trajectory
 
-# Rounds of calls; the fastest one counts, so that interruptions do not. A round is long against the clock's resolution.
+# Rounds of calls; the fastest one counts, so that interruptions do not. A round is long against the
+# clock's resolution.
 ROUNDS = 15
 CALLS = 200
 
@@ -35,21 +37,31 @@ def floor_of(
     """The floor of Newton's method with as many iterations as it took.
 
     Args:
-        pose: calls for the residual and Jacobian of a pose: by name, on the case's model, on the smallest, and how many.
+        pose: calls for the residual and Jacobian of a pose: by name, on the case's model, on the
+            smallest, and how many.
         rates: further calls once a sample, for velocities and accelerations.
     """
     large, small = (np.eye(n) + 0.1 * np.ones((n, n)) for n in (unknowns, 1))
     lapack: Any = importlib.import_module("scipy.linalg.lapack")
-    solve = {f"LU of {unknowns} rows": (lambda: lapack.dgesv(large, large[0]), lambda: lapack.dgesv(small, small[0]), 1)}
-    # the adapter's last step only confirms; the pose before it stands for the one that gives the Jacobian of the rates
+    solve = {
+        f"LU of {unknowns} rows": (
+            lambda: lapack.dgesv(large, large[0]),
+            lambda: lapack.dgesv(small, small[0]),
+            1,
+        )
+    }
+    # the adapter's last step only confirms; the pose before it stands for the one that gives the
+    # Jacobian of the rates
     poses = float(solved.iterations[solved.solved].mean())
     counts = {**dict.fromkeys([*pose, *solve], poses), **dict.fromkeys(rates, 1.0)}
     parts = {
-        name: counts[name] * each * microseconds(call, least) for name, (call, least, each) in {**pose, **solve, **rates}.items()
+        name: counts[name] * each * microseconds(call, least)
+        for name, (call, least, each) in {**pose, **solve, **rates}.items()
     }
     counted = (
-        f"{engine.name}: {poses:.3g} poses ({', '.join([*pose, *solve])}) and once {', '.join(rates)}; "
-        f"the fastest of {ROUNDS} rounds, less the same calls on the smallest model"
+        f"{engine.name}: {poses:.3g} poses ({', '.join([*pose, *solve])}) and once"
+        f" {', '.join(rates)}; the fastest of {ROUNDS} rounds, less the same calls on the smallest"
+        " model"
     )
     return Floor(sum(parts.values()), counted, parts)
 

@@ -1,7 +1,9 @@
-"""Conditions between the bodies of a simulator: equations with their Jacobian and its rate, from what it says of two frames.
+"""Conditions between the bodies of a simulator: equations with their Jacobian and its rate, from
+what it says of two frames.
 
-The frames sit at points of two bodies, with axes that are global at design. From what a simulator says of them come two kinds of
-moving vectors (w, alpha: angular velocity and acceleration of the body; J_w: its angular Jacobian)
+The frames sit at points of two bodies, with axes that are global at design. From what a simulator
+says of them come two kinds of moving vectors (w, alpha: angular velocity and acceleration of the
+body; J_w: its angular Jacobian)
 
                          vector x      Jacobian J_x     rate x'        bias b_x = x'' - J_x (coordinates)''
     direction of a body  A a0          -skew(x) J_w     w × x          alpha × x + w × (w × x)
@@ -28,7 +30,9 @@ from ...core.trajectory import Array
 
 
 class Frame(Protocol):
-    """A point of a body and axes that are global at design, in the simulator's current configuration; global axes."""
+    """A point of a body and axes that are global at design, in the simulator's current
+    configuration; global axes.
+    """
 
     @property
     def position(self) -> Array:
@@ -52,7 +56,9 @@ class Frame(Protocol):
 
     @property
     def acceleration(self) -> Array:
-        """The acceleration of the point [m/s^2] and the angular one [rad/s^2], shape (6,); Jdot v where coordinates have none."""
+        """The acceleration of the point [m/s^2] and the angular one [rad/s^2], shape (6,); Jdot v
+        where coordinates have none.
+        """
         ...
 
 
@@ -95,7 +101,11 @@ class Direction:
         return x, -_skew(x) @ self.frame.jacobian[3:]
 
     def moving(self) -> tuple[Array, Array, Array]:
-        x, w, alpha = self.frame.rotation @ self.a0, _skew(self.frame.velocity[3:]), _skew(self.frame.acceleration[3:])
+        x, w, alpha = (
+            self.frame.rotation @ self.a0,
+            _skew(self.frame.velocity[3:]),
+            _skew(self.frame.acceleration[3:]),
+        )
         return x, w @ x, alpha @ x + w @ (w @ x)
 
 
@@ -182,10 +192,11 @@ class EqualDots:
 
 @dataclass(frozen=True, eq=False)
 class Thread:
-    """h . x = p turn: the displacement along h of frame i is p [m/rad] times the turn about it of j; other rows align the axes.
+    """h . x = p turn: the displacement along h of frame i is p [m/rad] times the turn about it of
+    j; other rows align the axes.
 
-    The angle is known up to whole turns, and the displacement tells which: any number of turns, without a counter. Its row is
-    exact where the axes are parallel.
+    The angle is known up to whole turns, and the displacement tells which: any number of turns,
+    without a counter. Its row is exact where the axes are parallel.
     """
 
     i: Frame
@@ -206,7 +217,9 @@ class Thread:
         phi = float(phi) - self.p * math.atan2(h @ np.cross(f_i, f_j), f_i @ f_j)
         lead = 2.0 * math.pi * self.p
         # a thread without lead is a hinge
-        return math.remainder(phi, lead) if lead else phi, row - self.p * (h @ (self.j.jacobian - self.i.jacobian)[3:])
+        return math.remainder(phi, lead) if lead else phi, row - self.p * (
+            h @ (self.j.jacobian - self.i.jacobian)[3:]
+        )
 
     def bias(self) -> Any:
         h = self.i.rotation @ self.h

@@ -1,13 +1,15 @@
 """Joints as chains of links, for simulators whose bodies hang on slides, hinges and balls.
 
-A chain leads from a joint's first body to its second; each link is carried by those before it, and points and axes are global at
-design. What the links leave free together is what the joint leaves free, so a chain makes a joint of a tree; with its last
-body tied to the joint's second body it closes a loop. A joint whose point alone is bound ends in a ball.
+A chain leads from a joint's first body to its second; each link is carried by those before it, and
+points and axes are global at design. What the links leave free together is what the joint leaves
+free, so a chain makes a joint of a tree; with its last body tied to the joint's second body it
+closes a loop. A joint whose point alone is bound ends in a ball.
 
-Two relations are beyond single links. A screw ties its slide to its hinge. A constant-velocity joint is two Hooke's joints in one
-point that bend alike: hinges n, m, m, n across the bisector b of the shafts, the outer angles equal and the inner ones too. Seen
-half a turn about b the rotation R = N(x) M(2y) N(x) is its inverse, so its axis is across b, and that is the joint's condition:
-R carries the second shaft, which is the first one seen half a turn about b, without twist.
+Two relations are beyond single links. A screw ties its slide to its hinge. A constant-velocity
+joint is two Hooke's joints in one point that bend alike: hinges n, m, m, n across the bisector b of
+the shafts, the outer angles equal and the inner ones too. Seen half a turn about b the rotation R =
+N(x) M(2y) N(x) is its inverse, so its axis is across b, and that is the joint's condition: R
+carries the second shaft, which is the first one seen half a turn about b, without twist.
 """
 
 from __future__ import annotations
@@ -46,7 +48,8 @@ class Link:
     Attributes:
         axis: unit vector, global at design [-]; without meaning for a ball.
         point: on the axis, or the ball's centre, global at design [m]; without meaning for a slide.
-        name: of its coordinate; that of the joint's freedom where a driver or a coupler may name it.
+        name: of its coordinate; that of the joint's freedom where a driver or a coupler may name
+            it.
     """
 
     move: Literal["slide", "hinge", "ball"]
@@ -83,7 +86,12 @@ def _turn_and_slide(joint: AxialJoint, P: Vector) -> list[Link]:
 def _bends(joint: ConstantVelocity, P: Vector) -> list[Link]:
     h, k = map(unit, joint.axes)
     n, m, _ = ([*a] for a in triad([*(h + k)]))
-    return [_hinge(n, P, "first"), _hinge(m, P, "second"), _hinge(m, P, "third"), _hinge(n, P, "fourth")]
+    return [
+        _hinge(n, P, "first"),
+        _hinge(m, P, "second"),
+        _hinge(m, P, "third"),
+        _hinge(n, P, "fourth"),
+    ]
 
 
 def free(P: Vector) -> list[Link]:
@@ -99,21 +107,28 @@ CHAINS: dict[type[Joint], Callable[[Any, Vector], list[Link]]] = {
     Inline: lambda joint, P: [_slide(joint.axis, P), _ball(P)],
     OrientationLock: lambda joint, P: _shift(P),
     ParallelAxes: lambda joint, P: [*_shift(P), _hinge(joint.axis, P)],
-    # like a universal joint's, these hinges keep the design angle of the axes where a table has rounded the right angle
+    # like a universal joint's, these hinges keep the design angle of the axes where a table has
+    # rounded the right angle
     PerpendicularAxes: lambda joint, P: [*_shift(P), *(_hinge(axis, P) for axis in joint.axes)],
     Planar: lambda joint, P: [*_across(joint.axis, P), _hinge(joint.axis, P, "rotation")],
     Revolute: lambda joint, P: [_hinge(joint.axis, P, "rotation")],
-    RevoluteSpherical: lambda joint, P: [_hinge(joint.axis, joint.points[0]), _ball(joint.points[1])],
+    RevoluteSpherical: lambda joint, P: [
+        _hinge(joint.axis, joint.points[0]),
+        _ball(joint.points[1]),
+    ],
     Screw: _turn_and_slide,
     Spherical: lambda joint, P: [_ball(P)],
     Translational: lambda joint, P: [_slide(joint.axis, P, "translation")],
     Universal: lambda joint, P: [_hinge(axis, P) for axis in joint.axes],
 }
-"""By exact joint type: the joint and its point (where it has none, any point near) -> links. A distance is no chain."""
+"""By exact joint type: the joint and its point (where it has none, any point near) -> links. A
+distance is no chain.
+"""
 
 
 def relations(joint: Joint) -> list[list[tuple[str, str, float]]]:
-    """The linear relations between the coordinates of a joint's links, each as joint, freedom and weight of its terms.
+    """The linear relations between the coordinates of a joint's links, each as joint, freedom and
+    weight of its terms.
 
     The weighted sum of the terms stays zero, as that of `Coupler.terms` does.
     """
@@ -122,14 +137,18 @@ def relations(joint: Joint) -> list[list[tuple[str, str, float]]]:
         found = {"first": 1.0, "fourth": -1.0}, {"second": 1.0, "third": -1.0}
     elif isinstance(joint, AxialJoint):
         found = joint.relations
-    return [[(joint.name, freedom, weight) for freedom, weight in relation.items()] for relation in found]
+    return [
+        [(joint.name, freedom, weight) for freedom, weight in relation.items()]
+        for relation in found
+    ]
 
 
 Coordinate = TypeVar("Coordinate")
 
 
 def dependence(terms: Iterable[tuple[Coordinate, float]]) -> tuple[Coordinate, Coordinate, float]:
-    """Solve a relation of two coordinates for one: `one`, `other` and the factor of one = factor * other.
+    """Solve a relation of two coordinates for one: `one`, `other` and the factor of one = factor *
+    other.
 
     The one is that of the larger weight, so the factor is at most one in size.
     """
@@ -138,11 +157,12 @@ def dependence(terms: Iterable[tuple[Coordinate, float]]) -> tuple[Coordinate, C
 
 
 def end_of_loop(links: Sequence[Link], P: Vector) -> tuple[Sequence[Link], Vector, bool]:
-    """What closes a loop by a joint's chain: the links that remain, and the point where the last of their bodies is tied.
+    """What closes a loop by a joint's chain: the links that remain, and the point where the last of
+    their bodies is tied.
 
     Returns:
-        The links, the point (P, or the centre of a ball), and whether the bodies may turn about it: a ball at the end of a chain
-        is no link, because a tie of points alone leaves the same free.
+        The links, the point (P, or the centre of a ball), and whether the bodies may turn about it:
+        a ball at the end of a chain is no link, because a tie of points alone leaves the same free.
     """
     if links and links[-1].move == "ball":
         return links[:-1], links[-1].point, True

@@ -1,8 +1,8 @@
 """The same mechanism for simulators that drive and close by joints only.
 
-A driven coordinate of a point becomes that of a slide: three slides in line carry a ball at the point, the first one is driven. A
-rod between two points becomes a body between a universal joint and a ball. What each adds it takes away again, and the motion of
-every other body stays as it is.
+A driven coordinate of a point becomes that of a slide: three slides in line carry a ball at the
+point, the first one is driven. A rod between two points becomes a body between a universal joint
+and a ball. What each adds it takes away again, and the motion of every other body stays as it is.
 """
 
 from __future__ import annotations
@@ -17,14 +17,18 @@ from ...core.joints.base import triad, unit
 from ...core.mechanism.drivers import Driver, JointDisplacement, PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 
-# A rod whose given length differs from the distance at design by more does not fit at design, and no body has its length there [m].
+# A rod whose given length differs from the distance at design by more does not fit at design, and
+# no body has its length there [m].
 SAME_LENGTH = 1e-12
-# Sine of the angle between a rod and the axis of its body's hinge below which that axis is no first axis of a cross: 17 degrees.
+# Sine of the angle between a rod and the axis of its body's hinge below which that axis is no first
+# axis of a cross: 17 degrees.
 ALONG = 0.3
 
 
 def jointed(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with joint drivers only and without rods; rods of another length than at design stay."""
+    """The mechanism with joint drivers only and without rods; rods of another length than at design
+    stay.
+    """
     bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
     for joint in mechanism.joints:
         if isinstance(joint, Distance) and fits(joint):
@@ -40,8 +44,12 @@ def jointed(mechanism: Mechanism) -> Mechanism:
             names = [f"{driver.name}: {way}" for way in ("along", "across", "beyond")]
             bodies += [Body(name, point.position) for name in names]
             for below, name, axis in zip((GROUND, *names), names, (h, f, g), strict=False):
-                joints.append(Translational(name, below, name, point=point.position, axis=_vector(axis)))
-            joints.append(Spherical(f"{driver.name}: ball", names[-1], point.body, point=point.position))
+                joints.append(
+                    Translational(name, below, name, point=point.position, axis=_vector(axis))
+                )
+            joints.append(
+                Spherical(f"{driver.name}: ball", names[-1], point.body, point=point.position)
+            )
             drivers.append(JointDisplacement(driver.name, names[0], driver.relative))
         else:
             drivers.append(driver)
@@ -58,13 +66,27 @@ def _rod(mechanism: Mechanism, joint: Distance, rod: str) -> list[Joint]:
     if mechanism.is_fixed(j):  # the cross stands on what turns least
         (i, j), (P_i, P_j) = (j, i), (P_j, P_i)
     d = np.array([*unit([b - a for a, b in zip(P_i, P_j, strict=True)])])
-    # The cross locks where the rod comes to lie along its first axis. A crank turns its rod about the crank's own hinge.
-    hinges = [each for each in mechanism.joints if isinstance(each, AxialJoint) and i in each.bodies and not mechanism.is_fixed(i)]
+    # The cross locks where the rod comes to lie along its first axis. A crank turns its rod about
+    # the crank's own hinge.
+    hinges = [
+        each
+        for each in mechanism.joints
+        if isinstance(each, AxialJoint) and i in each.bodies and not mechanism.is_fixed(i)
+    ]
     axes = [np.array([*unit(each.axis)]) for each in hinges]
-    first = next((axis for axis in axes if math.hypot(*np.cross(axis, d)) > ALONG), np.array([*triad((*d.tolist(),))[0]]))
+    first = next(
+        (axis for axis in axes if math.hypot(*np.cross(axis, d)) > ALONG),
+        np.array([*triad((*d.tolist(),))[0]]),
+    )
     second = np.cross(d, first)
     return [
-        Universal(f"{joint.name}: cross", i, rod, point=P_i, axes=(_vector(first), _vector(second / np.linalg.norm(second)))),
+        Universal(
+            f"{joint.name}: cross",
+            i,
+            rod,
+            point=P_i,
+            axes=(_vector(first), _vector(second / np.linalg.norm(second))),
+        ),
         Spherical(f"{joint.name}: ball", rod, j, point=P_j),
     ]
 

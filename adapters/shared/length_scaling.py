@@ -1,7 +1,9 @@
-"""The frame that projection gives a simulator its mechanism in: a unit of length near the mechanism's size, an origin beside it.
+"""The frame that projection gives a simulator its mechanism in: a unit of length near the
+mechanism's size, an origin beside it.
 
-Simulators know metres and their origin only. A residual of 1e-12 m is a millionth of a mechanism of a micrometre, and ten thousand
-kilometres from the origin no residual is that small: they stopped there, or went on in another assembly without a word.
+Simulators know metres and their origin only. A residual of 1e-12 m is a millionth of a mechanism of
+a micrometre, and ten thousand kilometres from the origin no residual is that small: they stopped
+there, or went on in another assembly without a word.
 """
 
 from __future__ import annotations
@@ -49,11 +51,17 @@ GLOBAL = OwnFrame(1.0, (0.0, 0.0, 0.0))
 
 
 def own_frame(case: Case) -> OwnFrame:
-    """The frame of a case; about the global origin where the mechanism's middle is within half a unit of it along every axis."""
+    """The frame of a case; about the global origin where the mechanism's middle is within half a
+    unit of it along every axis.
+    """
     mechanism, unit = case.mechanism, unit_near(size(case))
-    positions = [at for joint in mechanism.joints for at in joint.points_on()] + [point.position for point in mechanism.points]
+    positions = [at for joint in mechanism.joints for at in joint.points_on()] + [
+        point.position for point in mechanism.points
+    ]
     # a multiple of the unit: what is on such a grid is moved without being rounded
-    x, y, z = (unit * round(0.5 * (min(axis) + max(axis)) / unit) for axis in zip(*positions, strict=True))
+    x, y, z = (
+        unit * round(0.5 * (min(axis) + max(axis)) / unit) for axis in zip(*positions, strict=True)
+    )
     return OwnFrame(unit, (x, y, z))
 
 
@@ -67,7 +75,9 @@ def in_own_frame(case: Case) -> Case:
             mechanism,
             bodies=[replace(body, origin=frame.there(body.origin)) for body in mechanism.bodies],
             joints=[joint.changed(**joint.mapped(ways)) for joint in mechanism.joints],
-            points=[replace(point, position=frame.there(point.position)) for point in mechanism.points],
+            points=[
+                replace(point, position=frame.there(point.position)) for point in mechanism.points
+            ],
             couplers=[coupler.scaled(1.0 / frame.unit) for coupler in mechanism.couplers],
         ),
     )

@@ -1,6 +1,8 @@
-"""Loop closures for simulators that have a tree of joints: a cut joint as conditions on two frames, one on each body.
+"""Loop closures for simulators that have a tree of joints: a cut joint as conditions on two frames,
+one on each body.
 
-No joint's own rows are redundant, so a loop has dependent rows only where its geometry makes them so (planar loops).
+No joint's own rows are redundant, so a loop has dependent rows only where its geometry makes them
+so (planar loops).
 """
 
 from __future__ import annotations
@@ -35,7 +37,17 @@ from ...core.joints import (
 from ...core.joints.base import triad, unit
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .frame_constraints import Coincident, Condition, Difference, Direction, Dot, EqualDots, Frame, Length, Thread
+from .frame_constraints import (
+    Coincident,
+    Condition,
+    Difference,
+    Direction,
+    Dot,
+    EqualDots,
+    Frame,
+    Length,
+    Thread,
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,8 @@ def _parallel(joint: Any, i: Frame, j: Frame) -> list[Condition]:
 
 
 def _alike(i: Frame, j: Frame) -> list[Condition]:
-    # cyclic pairs of the axes: the gradients a × b are the three axes themselves, so the rows are independent
+    # cyclic pairs of the axes: the gradients a × b are the three axes themselves, so the rows are
+    # independent
     x, y, z = np.eye(3)
     return [Dot(Direction(i, a), Direction(j, b)) for a, b in ((x, y), (y, z), (z, x))]
 
@@ -81,13 +94,19 @@ def _crossed(joint: Any, i: Frame, j: Frame) -> list[Condition]:
 
 def _link(joint: Any, i: Frame, j: Frame) -> list[Condition]:
     h, d = _array(unit(joint.axis)), np.subtract(*joint.points[::-1])
-    return [Length(Difference(i, j), math.hypot(*d)), Dot(Direction(i, h), Difference(i, j), float(h @ d))]
+    return [
+        Length(Difference(i, j), math.hypot(*d)),
+        Dot(Direction(i, h), Difference(i, j), float(h @ d)),
+    ]
 
 
 def twistless(joint: Any, i: Frame, j: Frame) -> list[Condition]:
-    """The row of a constant-velocity joint about its shafts: with f × g along each of them, f_i . g_j = g_i . f_j."""
+    """The row of a constant-velocity joint about its shafts: with f × g along each of them, f_i .
+    g_j = g_i . f_j.
+    """
     f, g, h = triad(joint.axes[0])
-    # the shortest rotation from h to the other shaft acts on what is normal to h as the reflection that takes h to its opposite
+    # the shortest rotation from h to the other shaft acts on what is normal to h as the reflection
+    # that takes h to its opposite
     m = unit(tuple(h + unit(joint.axes[1])))
     f_j, g_j = (_array(a - (2.0 * (m @ a)) * m) for a in (f, g))
     left, right = ((f, g_j), (g, f_j))
@@ -101,40 +120,61 @@ def _threaded(joint: Screw, i: Frame, j: Frame) -> list[Condition]:
 
 CLOSURES: dict[type[Joint], Closure] = {
     Spherical: Closure("points coincide (3 rows)", lambda joint, i, j: _at_point(i, j)),
-    Revolute: Closure("points coincide (3 rows), axes parallel (2)", lambda joint, i, j: _at_point(i, j) + _parallel(joint, i, j)),
-    Translational: Closure("axes aligned (3 rows), point on line (2)", lambda joint, i, j: _alike(i, j) + _on_line(joint, i, j)),
-    Universal: Closure(
-        "points coincide (3 rows), axes at right angle (1)", lambda joint, i, j: _at_point(i, j) + _crossed(joint, i, j)
+    Revolute: Closure(
+        "points coincide (3 rows), axes parallel (2)",
+        lambda joint, i, j: _at_point(i, j) + _parallel(joint, i, j),
     ),
-    Fixed: Closure("points coincide (3 rows), axes aligned (3)", lambda joint, i, j: _at_point(i, j) + _alike(i, j)),
-    Distance: Closure("points at constant distance (1 row)", lambda joint, i, j: [Length(Difference(i, j), joint.rod_length)]),
+    Translational: Closure(
+        "axes aligned (3 rows), point on line (2)",
+        lambda joint, i, j: _alike(i, j) + _on_line(joint, i, j),
+    ),
+    Universal: Closure(
+        "points coincide (3 rows), axes at right angle (1)",
+        lambda joint, i, j: _at_point(i, j) + _crossed(joint, i, j),
+    ),
+    Fixed: Closure(
+        "points coincide (3 rows), axes aligned (3)",
+        lambda joint, i, j: _at_point(i, j) + _alike(i, j),
+    ),
+    Distance: Closure(
+        "points at constant distance (1 row)",
+        lambda joint, i, j: [Length(Difference(i, j), joint.rod_length)],
+    ),
     Cylindrical: Closure(
-        "axes parallel (2 rows), point on line (2)", lambda joint, i, j: _parallel(joint, i, j) + _on_line(joint, i, j)
+        "axes parallel (2 rows), point on line (2)",
+        lambda joint, i, j: _parallel(joint, i, j) + _on_line(joint, i, j),
     ),
     Screw: Closure(
         "axes parallel (2 rows), point on line (2), displacement by turn (1)",
         lambda joint, i, j: _parallel(joint, i, j) + _on_line(joint, i, j) + _threaded(joint, i, j),
     ),
     Planar: Closure(
-        "axes parallel (2 rows), point on plane (1)", lambda joint, i, j: _parallel(joint, i, j) + _on_plane(joint, i, j)
+        "axes parallel (2 rows), point on plane (1)",
+        lambda joint, i, j: _parallel(joint, i, j) + _on_plane(joint, i, j),
     ),
     ConstantVelocity: Closure(
-        "points coincide (3 rows), shafts turn alike (1)", lambda joint, i, j: _at_point(i, j) + twistless(joint, i, j)
+        "points coincide (3 rows), shafts turn alike (1)",
+        lambda joint, i, j: _at_point(i, j) + twistless(joint, i, j),
     ),
     OrientationLock: Closure("axes aligned (3 rows)", lambda joint, i, j: _alike(i, j)),
     ParallelAxes: Closure("axes parallel (2 rows)", _parallel),
     PerpendicularAxes: Closure("axes at right angle (1 row)", _crossed),
     Inline: Closure("point on line (2 rows)", _on_line),
     InPlane: Closure("point on plane (1 row)", _on_plane),
-    RevoluteSpherical: Closure("points at constant distance (1 row), link across the hinge (1)", _link),
+    RevoluteSpherical: Closure(
+        "points at constant distance (1 row), link across the hinge (1)", _link
+    ),
 }
 """By exact joint type."""
 
 
 def ends_of(mechanism: Mechanism, joint: Joint) -> tuple[Vector, Vector]:
     """Where the frames of a joint are on its first and second body, global at design [m]."""
-    # a fixed joint may come without a point and some types have none: any serves, the origin of a moving body is near
-    P = vars(joint).get("point") or next(body.origin for body in mechanism.moving if body.name in joint.bodies)
+    # a fixed joint may come without a point and some types have none: any serves, the origin of a
+    # moving body is near
+    P = vars(joint).get("point") or next(
+        body.origin for body in mechanism.moving if body.name in joint.bodies
+    )
     return vars(joint).get("points", (P, P))
 
 

@@ -1,8 +1,10 @@
-"""Poses of bodies as displacements from design, and the coordinates that a chain of links has in them.
+"""Poses of bodies as displacements from design, and the coordinates that a chain of links has in
+them.
 
-A displacement takes every point of a body from where it is at design to where it is now, x -> q x + s, in global axes. So a chain
-of links (see `chains`) displaces its second body against its first by the product of its links' displacements, and backwards its
-coordinates are those of the forward chain with other signs.
+A displacement takes every point of a body from where it is at design to where it is now, x -> q x +
+s, in global axes. So a chain of links (see `chains`) displaces its second body against its first by
+the product of its links' displacements, and backwards its coordinates are those of the forward
+chain with other signs.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ def rotated(q: Quat, a: Vec3) -> Vec3:
 
 @dataclass(frozen=True)
 class Displacement:
-    """What has become of a body since design: x -> turn x + shift, global [m]; scalars are of shape (n,), or the same for all."""
+    """What has become of a body since design: x -> turn x + shift, global [m]; scalars are of shape
+    (n,), or the same for all.
+    """
 
     turn: Quat = IDENTITY
     shift: Vec3 = ZERO
@@ -37,12 +41,16 @@ class Displacement:
         return rotated(self.turn, P) + self.shift
 
     def relative_to(self, other: Displacement) -> Displacement:
-        """This displacement as a body with the other one sees it: what follows the other to make this one's."""
+        """This displacement as a body with the other one sees it: what follows the other to make
+        this one's.
+        """
         back = other.turn.conjugate()
         return Displacement(back * self.turn, rotated(back, self.shift - other.shift))
 
     def then_about(self, axis: Vec3, P: Vec3, angle: Scalar) -> Displacement:
-        """What a hinge adds that this displacement carries along; its unit axis and a point on it are those at design."""
+        """What a hinge adds that this displacement carries along; its unit axis and a point on it
+        are those at design.
+        """
         turn = self.turn * about(axis, angle)
         return Displacement(turn, self.of(P) - rotated(turn, P))
 
@@ -53,8 +61,15 @@ def frame_along(axis: Sequence[float], column: int) -> Array:
 
 
 def middle(mechanism: Mechanism, body: Body) -> Array:
-    """The mean of a body's joint points, or its origin where it has none; global at design [m], shape (3,)."""
-    points = [at for joint in mechanism.joints if body.name in joint.bodies for at in joint.points_on(body.name)]
+    """The mean of a body's joint points, or its origin where it has none; global at design [m],
+    shape (3,).
+    """
+    points = [
+        at
+        for joint in mechanism.joints
+        if body.name in joint.bodies
+        for at in joint.points_on(body.name)
+    ]
     return np.mean(points, axis=0) if points else np.array(body.origin)
 
 
@@ -64,26 +79,34 @@ def attitude(body: Body) -> Quat:
 
 
 def displacements(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> dict[str, Displacement]:
-    """Return the displacement of every body, fixed ones and the ground included, from the motion of the moving ones."""
+    """Return the displacement of every body, fixed ones and the ground included, from the motion of
+    the moving ones.
+    """
     found = {body.name: Displacement() for body in mechanism.bodies} | {GROUND: Displacement()}
     for body in mechanism.moving:
         turn = quat(way[body.name].p.T) * attitude(body).conjugate()
-        found[body.name] = Displacement(turn, vec([*way[body.name].r.T]) - rotated(turn, vec(body.origin)))
+        found[body.name] = Displacement(
+            turn, vec([*way[body.name].r.T]) - rotated(turn, vec(body.origin))
+        )
     return found
 
 
-def link_motions(joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]) -> list[tuple[Array, ...]]:
-    """The coordinates of a joint's links: a number each [m or rad], or of a ball, which is the last, Euler parameters; shape (n,).
+def link_motions(
+    joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]
+) -> list[tuple[Array, ...]]:
+    """The coordinates of a joint's links: a number each [m or rad], or of a ball, which is the
+    last, Euler parameters; shape (n,).
 
-    Angles are followed from the first sample, which is the design, and so count the turns; between samples they must change by
-    less than half a turn.
+    Angles are followed from the first sample, which is the design, and so count the turns; between
+    samples they must change by less than half a turn.
     """
     if not links:
         return []
     moved = placed[joint.j].relative_to(placed[joint.i])
     point, ball = vec(links[-1].point), links[-1].move == "ball"
     hinges = [(vec(link.axis), vec(link.point)) for link in links if link.move == "hinge"]
-    if ball:  # of the joints that end in a ball only that on a link has a hinge, which swings the ball
+    # of the joints that end in a ball only that on a link has a hinge, which swings the ball
+    if ball:
         angles = [_angle(axis, point - P, moved.of(point) - P) for axis, P in hinges]
     else:
         angles = _turns([axis for axis, _ in hinges], moved.turn)
@@ -106,9 +129,14 @@ def link_motions(joint: Joint, links: Sequence[Link], placed: Mapping[str, Displ
     return found
 
 
-def link_coordinates(joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]) -> list[tuple[float, ...]]:
+def link_coordinates(
+    joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]
+) -> list[tuple[float, ...]]:
     """The same at the end of the way."""
-    return [tuple(float(each[-1]) for each in coordinate) for coordinate in link_motions(joint, links, placed)]
+    return [
+        tuple(float(each[-1]) for each in coordinate)
+        for coordinate in link_motions(joint, links, placed)
+    ]
 
 
 def backwards(link: Link, value: tuple[float, ...]) -> tuple[float, ...]:
@@ -131,11 +159,14 @@ def _turns(axes: Sequence[Vec3], q: Quat) -> list[Array]:
             return []
         case [a]:
             return [angle_about(a, q)]
-        case [a, b]:  # the second turns nothing that is along it, so the first alone takes b where q does
+        # the second turns nothing that is along it, so the first alone takes b where q does
+        case [a, b]:
             first = _angle(a, b, rotated(q, b))
             rest = about(a, -first) * q
             return [first, angle_about(b, rest)]
-        case [n, m, _, _]:  # bends alike, N(x) M(2y) N(x): its Euler parameters are cos x cos y, along n sin x cos y, along m sin y
+        # bends alike, N(x) M(2y) N(x): its Euler parameters are cos x cos y, along n sin x cos y,
+        # along m sin y
+        case [n, m, _, _]:
             x, y = np.arctan2(n @ q.e, q.e0), np.arcsin(np.clip(m @ q.e, -1.0, 1.0))
             return [x, y, y, x]
         case _:

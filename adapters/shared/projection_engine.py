@@ -1,4 +1,6 @@
-"""What the engines in projection mode have in common: all but what they are called, what they know, and the model they make."""
+"""What the engines in projection mode have in common: all but what they are called, what they know,
+and the model they make.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ class ProjectionEngine(ABC):
     """An engine (see `Engine`) that makes a `ProjectionModel`, and the Newton walk solves it.
 
     Attributes:
-        corrections: Newton steps after the predictor, whatever residual they leave; None: as many as it takes.
+        corrections: Newton steps after the predictor, whatever residual they leave; None: as many
+            as it takes.
         name: as on the command line, and of the simulator's Python package.
         title: as in a sentence.
         joints: types that have a counterpart.
@@ -54,11 +57,16 @@ class ProjectionEngine(ABC):
         """The simulator's version, or None where it cannot be imported."""
         try:
             return self.version_of(importlib.import_module(self.name))
-        except (Exception, SystemExit):  # a broken binary raises what its loader likes; to the harness it all means "not here"
+        except (
+            Exception,
+            SystemExit,
+        ):  # a broken binary raises what its loader likes; to the harness it all means "not here"
             return None
 
     def version_of(self, simulator: Any) -> str | None:
-        """Return the version of the imported package; None where it is another package of that name."""
+        """Return the version of the imported package; None where it is another package of that
+        name.
+        """
         return str(simulator.__version__)
 
     def unsupported(self, case: Case) -> str | None:
@@ -71,7 +79,9 @@ class ProjectionEngine(ABC):
 
     def solve(self, model: ProjectionModel, case: Case, tol: float) -> Trajectory:
         """All samples; see `Engine.solve`."""
-        return solve_by_projection(model, case, tol, model.details, self.corrections, own_frame(case))
+        return solve_by_projection(
+            model, case, tol, model.details, self.corrections, own_frame(case)
+        )
 
     def efforts(self) -> Mapping[str, Self]:
         """Return the efforts by the number of Newton steps."""

@@ -9,10 +9,11 @@ from ...core.trajectory import Array
 
 
 class ProjectionModel(Protocol):
-    """A simulator's kinematics: unknowns x (its tree or body coordinates), rows for closures and drivers.
+    """A simulator's kinematics: unknowns x (its tree or body coordinates), rows for closures and
+    drivers.
 
-    Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of the current configuration.
-    `residual` updates whatever the other methods read.
+    Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of
+    the current configuration. `residual` updates whatever the other methods read.
 
     Attributes:
         details: what a record says of it.
@@ -38,11 +39,15 @@ class ProjectionModel(Protocol):
         ...
 
     def residual(self, c: Array) -> Array:
-        """All rows with the drivers at c, in the mechanism's order, from their design values, shape (rows,)."""
+        """All rows with the drivers at c, in the mechanism's order, from their design values, shape
+        (rows,).
+        """
         ...
 
     def jacobian(self) -> Array:
-        """Derivative of the rows by dx, shape (rows, unknowns); a copy, or valid until the next call."""
+        """Derivative of the rows by dx, shape (rows, unknowns); a copy, or valid until the next
+        call.
+        """
         ...
 
     def driver_columns(self) -> Array:

@@ -1,9 +1,11 @@
-"""Simulate mode, shared by the simulators: where they set off, which way, and what counts as having arrived.
+"""Simulate mode, shared by the simulators: where they set off, which way, and what counts as having
+arrived.
 
-A simulator starts at the sample nearest to the design that can be reached, in a pose and at rates that its projection model gives,
-because none of them checks its initial values, and goes from there in two legs. Backwards is the same motion seen in reverse: its
-own time still grows, rates change their sign and accelerations do not. What a simulator then reports is its own, soft constraints
-and drift included.
+A simulator starts at the sample nearest to the design that can be reached, in a pose and at rates
+that its projection model gives, because none of them checks its initial values, and goes from there
+in two legs. Backwards is the same motion seen in reverse: its own time still grows, rates change
+their sign and accelerations do not. What a simulator then reports is its own, soft constraints and
+drift included.
 """
 
 from __future__ import annotations
@@ -24,8 +26,9 @@ from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .projection import Walk
 from .projection_model import ProjectionModel
 
-# A loop that is open by more than this part of the mechanism's size is torn: the pose is no longer one of the mechanism. The
-# softest simulator, MuJoCo as it comes, stays below on most built-in cases.
+# A loop that is open by more than this part of the mechanism's size is torn: the pose is no longer
+# one of the mechanism. The softest simulator, MuJoCo as it comes, stays below on most built-in
+# cases.
 TORN = 1e-2
 # Residual of the pose to set off from: what projection reaches.
 START = 1e-12
@@ -43,7 +46,8 @@ class Start:
         sample: its index.
         configuration: what the model's `save` gave there.
         v, a: rates of the unknowns there, and theirs.
-        points: position, velocity and acceleration of each of case.points there, shape (3, points, 3).
+        points: position, velocity and acceleration of each of case.points there, shape (3, points,
+            3).
         residual: of the projection model there [m or -].
         size: of the mechanism [m].
         independent: whether the rows of the model are.
@@ -63,7 +67,8 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """The samples on one side of the start, the start first, in the order in which they are reached.
+    """The samples on one side of the start, the start first, in the order in which they are
+    reached.
 
     Attributes:
         sign: -1 where the motion is seen in reverse.
@@ -79,8 +84,12 @@ class Leg:
         return self.case.sweep.path.times[self.samples]
 
     def drive(self, times: Array) -> Array:
-        """Values, rates and accelerations of the drivers at times of the case, as the leg sees them, shape (3, drivers, times)."""
-        moved = self.case.sweep.path.drive([driver.name for driver in self.case.mechanism.drivers], times)
+        """Values, rates and accelerations of the drivers at times of the case, as the leg sees
+        them, shape (3, drivers, times).
+        """
+        moved = self.case.sweep.path.drive(
+            [driver.name for driver in self.case.mechanism.drivers], times
+        )
         moved[1] *= self.sign
         return moved
 
@@ -90,7 +99,8 @@ class SimulatedPose:
     """What a simulator gives at a sample, as its leg sees it.
 
     Attributes:
-        points: position, velocity and acceleration of each of case.points, shape (3, points, 3); NaN where it has none.
+        points: position, velocity and acceleration of each of case.points, shape (3, points, 3);
+            NaN where it has none.
         residual: the largest violation of its constraints [m or -].
         steps: from the sample before, of whatever kind its solver makes.
     """
@@ -101,14 +111,17 @@ class SimulatedPose:
 
 
 Simulator = Callable[[Leg], Iterator[SimulatedPose]]
-"""Gives the poses of a leg, that of the start first; raises SimulationEndedError where it cannot go on."""
+"""Gives the poses of a leg, that of the start first; raises SimulationEndedError where it cannot go
+on.
+"""
 
 
 def start_of(model: ProjectionModel, case: Case) -> Start:
     """Where to set off.
 
     Raises:
-        SolveError: the design does not close, or the samples next to it, on either side, cannot be reached.
+        SolveError: the design does not close, or the samples next to it, on either side, cannot be
+            reached.
     """
     walk, path = Walk(model, case, START), case.sweep.path
     begin = where_from(case.mechanism, path)
@@ -127,11 +140,26 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
         aim = float(path.times[k])
         at, reached = walk.advance(path, origin, aim, abs(aim - origin.t))
         if reached:
-            return Start(k, at.saved, at.v, at.a, np.array(at.rows), at.residual, walk.size, walk.rows == walk.rank, facts)
-    raise SolveError(f"case {case.name!r}: no sample next to the design can be reached; let the sweep come nearer to it")
+            return Start(
+                k,
+                at.saved,
+                at.v,
+                at.a,
+                np.array(at.rows),
+                at.residual,
+                walk.size,
+                walk.rows == walk.rank,
+                facts,
+            )
+    raise SolveError(
+        f"case {case.name!r}: no sample next to the design can be reached; let the sweep come"
+        " nearer to it"
+    )
 
 
-def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[str, Any]) -> Trajectory:
+def simulated(
+    case: Case, start: Start, simulator: Simulator, details: Mapping[str, Any]
+) -> Trajectory:
     """Simulate both legs; see `Engine.solve`."""
     n = len(case.sweep.path.times)
     motion = np.full((3, n, len(case.points), 3), np.nan)
@@ -143,7 +171,8 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
             for k, pose in zip(leg.samples, simulator(leg), strict=False):
                 if not (np.isfinite(pose.points[0]).all() and pose.residual <= TORN * start.size):
                     raise SimulationEndedError(
-                        f"its constraints are violated by {pose.residual:.3g}, more than {TORN:g} of its size"
+                        f"its constraints are violated by {pose.residual:.3g}, more than {TORN:g}"
+                        " of its size"
                     )
                 motion[:, k], solved[k], reached = pose.points, True, reached + 1
                 motion[1, k] *= leg.sign
@@ -151,22 +180,44 @@ def simulated(case: Case, start: Start, simulator: Simulator, details: Mapping[s
                 residuals.append(pose.residual)
         except SimulationEndedError as why:
             where = case.sweep.path.where
-            last = f"last sample reached at {where(leg.times[reached - 1])}" if reached else "no sample reached on this side"
-            messages.append(f"cannot be followed to {where(leg.times[min(reached, len(leg.times) - 1)])}: {why}; {last}")
+            last = (
+                f"last sample reached at {where(leg.times[reached - 1])}"
+                if reached
+                else "no sample reached on this side"
+            )
+            messages.append(
+                f"cannot be followed to {where(leg.times[min(reached, len(leg.times) - 1)])}:"
+                f" {why}; {last}"
+            )
     known = [not np.isnan(motion[order][solved]).any() for order in range(3)]
     points = {
-        name: PointMotion(motion[0, :, k], motion[1, :, k] if known[1] else None, motion[2, :, k] if known[2] else None)
+        name: PointMotion(
+            motion[0, :, k],
+            motion[1, :, k] if known[1] else None,
+            motion[2, :, k] if known[2] else None,
+        )
         for k, name in enumerate(case.points)
     }
-    return Trajectory(points, solved, steps, largest_found(np.array(residuals)), "; ".join(messages), {**details, **start.facts})
+    return Trajectory(
+        points,
+        solved,
+        steps,
+        largest_found(np.array(residuals)),
+        "; ".join(messages),
+        {**details, **start.facts},
+    )
 
 
 def legs(case: Case, start: int) -> list[Leg]:
-    """The ways from a sample to both ends of the sweep; samples at the same time as the start come in the first.
+    """The ways from a sample to both ends of the sweep; samples at the same time as the start come
+    in the first.
 
     Where there is none but the start, it is a leg of its own.
     """
     times = case.sweep.path.times
-    sides = [np.concatenate([[start], side[side != start]]) for side in outwards(times, float(times[start]))]
+    sides = [
+        np.concatenate([[start], side[side != start]])
+        for side in outwards(times, float(times[start]))
+    ]
     ways = [Leg(case, side, sign) for side, sign in zip(sides, (1.0, -1.0), strict=True)]
     return [leg for leg in ways if len(leg.samples) > 1] or ways[:1]

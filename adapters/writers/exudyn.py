@@ -1,11 +1,14 @@
-"""A mechanism as a Python script that builds it in Exudyn, of Exudyn's own objects only. Exudyn is not needed to write it.
+"""A mechanism as a Python script that builds it in Exudyn, of Exudyn's own objects only. Exudyn is
+not needed to write it.
 
-A moving body is a rigid-body node with Euler parameters, at the origin that the case gives it and parallel to the global axes at
-design, because Exudyn measures the angle of a joint from where its bodies are parallel. Joints are Exudyn's, mostly generic ones.
-What Exudyn has none for is spelled out with further bodies: a constant-velocity joint is four hinges of which two by two turn
-alike, and a cross whose axes a table has rounded off the right angle is a body on two hinges, because a generic joint would set
-them upright. Coordinates tied to one another are measured by relative markers. (Rows that follow further unknowns of a Newton
-loop, as in the adapter of Exudyn, are no objects of Exudyn.)
+A moving body is a rigid-body node with Euler parameters, at the origin that the case gives it and
+parallel to the global axes at design, because Exudyn measures the angle of a joint from where its
+bodies are parallel. Joints are Exudyn's, mostly generic ones. What Exudyn has none for is spelled
+out with further bodies: a constant-velocity joint is four hinges of which two by two turn alike,
+and a cross whose axes a table has rounded off the right angle is a body on two hinges, because a
+generic joint would set them upright. Coordinates tied to one another are measured by relative
+markers. (Rows that follow further unknowns of a Newton loop, as in the adapter of Exudyn, are no
+objects of Exudyn.)
 """
 
 from __future__ import annotations
@@ -97,10 +100,14 @@ GENERIC: Mapping[type[j.Joint], tuple[int, Sequence[int]]] = {
     j.ParallelAxes: (2, (0, 0, 0, 1, 1, 0)),
     j.Planar: (2, (0, 0, 1, 1, 1, 0)),
 }
-"""Joints about one axis as generic joints: which axis of the frame is the joint's, and what is constrained: x, y, z, about them."""
+"""Joints about one axis as generic joints: which axis of the frame is the joint's, and what is
+constrained: x, y, z, about them.
+"""
 
 
-def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]) -> Mapping[str, str]:
+def write(
+    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+) -> Mapping[str, str]:
     """A .py file; see `Writer`. Initial coordinates are the end of the way.
 
     Raises:
@@ -108,7 +115,10 @@ def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[st
     """
     for joint in mechanism.joints:
         if type(joint) not in CHAINS and type(joint) is not j.Distance:
-            raise KincheckError(f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints instead")
+            raise KincheckError(
+                f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints"
+                " instead"
+            )
     return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
 
 
@@ -136,32 +146,60 @@ class _Script:
         for coupler in self.mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
         for point in self.mechanism.points:
-            self.lines.append(f"points[{point.name!r}] = bodies[{point.body!r}], {self.arm(point.body, point.position)}")
+            self.lines.append(
+                f"points[{point.name!r}] = bodies[{point.body!r}],"
+                f" {self.arm(point.body, point.position)}"
+            )
         return BEGINNING + "\n".join(self.lines) + "\n" + END
 
     def call(self, function: str, *values: Any, **options: Any) -> None:
         """A call, as a line."""
-        texts = [*map(_text, values), *(f"{name}={_text(value)}" for name, value in options.items())]
+        texts = [
+            *map(_text, values),
+            *(f"{name}={_text(value)}" for name, value in options.items()),
+        ]
         self.lines.append(f"{function}({', '.join(texts)})")
 
     def arm(self, body: str, P: Sequence[float]) -> _Code:
-        """A point of a body, global at design, as Exudyn wants it; fixed bodies are Exudyn's ground."""
-        origin = (0.0, 0.0, 0.0) if self.mechanism.is_fixed(body) else self.mechanism.body(body).origin
+        """A point of a body, global at design, as Exudyn wants it; fixed bodies are Exudyn's
+        ground.
+        """
+        origin = (
+            (0.0, 0.0, 0.0) if self.mechanism.is_fixed(body) else self.mechanism.body(body).origin
+        )
         return _Code(_text([*(vec(P) - vec(origin))]))
 
     def marker(self, body: str, P: Sequence[float], axes: Array | None = None) -> _Code:
-        """A frame on a body, global at design; the columns are its axes, the global ones if none are given."""
-        return _Code(f"({', '.join([repr(body), self.arm(body, P), *([] if axes is None else [_text(axes)])])})")
+        """A frame on a body, global at design; the columns are its axes, the global ones if none
+        are given.
+        """
+        return _Code(
+            f"({', '.join([repr(body), self.arm(body, P), *([] if axes is None else [_text(axes)])])})"
+        )
 
     def add(
-        self, joint: j.Joint, kind: str, axes: Array | None = None, *, ends: Any = None, second: Array | None = None, **options: Any
+        self,
+        joint: j.Joint,
+        kind: str,
+        axes: Array | None = None,
+        *,
+        ends: Any = None,
+        second: Array | None = None,
+        **options: Any,
     ) -> None:
-        """An object of Exudyn between the two bodies of a joint, its frames alike unless another is given for the second."""
+        """An object of Exudyn between the two bodies of a joint, its frames alike unless another is
+        given for the second.
+        """
         P_i, P_j = ends or ends_of(self.mechanism, joint)
-        markers = self.marker(joint.i, P_i, axes), self.marker(joint.j, P_j, axes if second is None else second)
+        markers = (
+            self.marker(joint.i, P_i, axes),
+            self.marker(joint.j, P_j, axes if second is None else second),
+        )
         self.call("joint", joint.name, _Code(kind), *markers, **options)
 
-    def generic(self, joint: j.Joint, constrained: Sequence[int], axes: Array | None = None, **options: Any) -> None:
+    def generic(
+        self, joint: j.Joint, constrained: Sequence[int], axes: Array | None = None, **options: Any
+    ) -> None:
         """A generic joint that constrains these of x, y, z and the turns about them."""
         self.add(joint, "ObjectJointGeneric", axes, constrainedAxes=[*constrained], **options)
 
@@ -185,7 +223,8 @@ class _Script:
             case j.Distance():
                 self.add(joint, "ObjectConnectorDistance", distance=joint.rod_length)
             case j.RevoluteSpherical(points=(hinge, ball), axis=axis):
-                # the link keeps its place along the hinge: where its foot is there, the generic joint has nothing to keep apart
+                # the link keeps its place along the hinge: where its foot is there, the generic
+                # joint has nothing to keep apart
                 link = vec(ball) - vec(hinge)
                 self.add(joint, "ObjectConnectorDistance", distance=float(np.hypot.reduce([*link])))
                 foot = [*(vec(hinge) + (unit(axis) @ link) * unit(axis))]
@@ -197,7 +236,9 @@ class _Script:
 
     def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, factor = dependence(((joint, freedom), weight) for joint, freedom, weight in terms)
+        one, other, factor = dependence(
+            ((joint, freedom), weight) for joint, freedom, weight in terms
+        )
         self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
 
     def coordinate(self, name: str, freedom: str) -> str:
@@ -208,7 +249,13 @@ class _Script:
             self.measured.add(known)
             ends = (self.marker(body, joint.point) for body in joint.bodies)
             links = CHAINS[type(joint)](joint, joint.point)
-            values = dict(zip((link.name for link in links), link_coordinates(joint, links, self.placed), strict=True))
+            values = dict(
+                zip(
+                    (link.name for link in links),
+                    link_coordinates(joint, links, self.placed),
+                    strict=True,
+                )
+            )
             initial = values[freedom] if freedom == "rotation" else ()
             self.call(freedom, known, *ends, [*unit(joint.axis)], *initial)
         return known
@@ -227,7 +274,9 @@ def _text(value: Any) -> str:
     return repr(value) if isinstance(value, str | int) else repr(float(value) + 0.0)
 
 
-def _spelled_out(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> tuple[Mechanism, Mapping[str, BodyMotion]]:
+def _spelled_out(
+    mechanism: Mechanism, way: Mapping[str, BodyMotion]
+) -> tuple[Mechanism, Mapping[str, BodyMotion]]:
     """The mechanism and its way with joints that Exudyn lacks as hinges between further bodies."""
     placed, way = displacements(mechanism, way), dict(way)
     bodies, joints, couplers = [*mechanism.bodies], list[j.Joint](), [*mechanism.couplers]
@@ -238,8 +287,16 @@ def _spelled_out(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> tuple[M
         P = ends_of(mechanism, joint)[0]
         links = CHAINS[type(joint)](joint, P)
         motions = link_motions(joint, links, placed)
-        hinges = [(link, motion[0]) for link, motion in zip(links, motions, strict=True) if link.move == "hinge"]
-        names, before, swing = [f"{joint.name}.{k}" for k in range(1, len(hinges) + 1)], joint.i, placed[joint.i]
+        hinges = [
+            (link, motion[0])
+            for link, motion in zip(links, motions, strict=True)
+            if link.move == "hinge"
+        ]
+        names, before, swing = (
+            [f"{joint.name}.{k}" for k in range(1, len(hinges) + 1)],
+            joint.i,
+            placed[joint.i],
+        )
         for name, (link, angle) in zip(names[:-1], hinges, strict=False):
             swing = swing.then_about(vec(link.axis), vec(P), angle)
             bodies.append(Body(name, P))
@@ -249,12 +306,16 @@ def _spelled_out(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> tuple[M
         last = hinges[-1][0].axis
         crossed = isinstance(joint, j.PerpendicularAxes)
         joints.append(
-            j.ParallelAxes(names[-1], before, joint.j, last) if crossed else j.Revolute(names[-1], before, joint.j, P, last)
+            j.ParallelAxes(names[-1], before, joint.j, last)
+            if crossed
+            else j.Revolute(names[-1], before, joint.j, P, last)
         )
         by_name = dict(zip((link.name for link, _ in hinges), names, strict=True))
         for relation in relations(joint):
             (_, one, weight), (_, other, opposite) = relation
-            couplers.append(j.Gear(f"{by_name[one]} alike", (by_name[one], by_name[other]), -opposite / weight))
+            couplers.append(
+                j.Gear(f"{by_name[one]} alike", (by_name[one], by_name[other]), -opposite / weight)
+            )
     return replace(mechanism, bodies=bodies, joints=joints, couplers=couplers, drivers=()), way
 
 
@@ -266,5 +327,8 @@ def _to_be_spelled_out(joint: j.Joint) -> bool:
 
 def _motion(displacement: Displacement, P: Iterable[float]) -> BodyMotion:
     """Of a body that is aligned at design with its origin at P."""
-    r, p = (np.column_stack(np.broadcast_arrays(*values)) for values in (displacement.of(vec([*P])), displacement.turn))
+    r, p = (
+        np.column_stack(np.broadcast_arrays(*values))
+        for values in (displacement.of(vec([*P])), displacement.turn)
+    )
     return BodyMotion(r, p, None, None)

@@ -1,8 +1,10 @@
-"""A mechanism as MJCF, the XML of MuJoCo. MuJoCo is not needed to write it, and its own writer would keep six digits.
+"""A mechanism as MJCF, the XML of MuJoCo. MuJoCo is not needed to write it, and its own writer
+would keep six digits.
 
-A body is a <body> with the frame that the case gives it. A joint is a chain of MuJoCo joints (see `chains`), in the tree or, where
-it closes a loop, on an auxiliary body that an equality ties to the second body; a distance is a tendon of constant length. What
-ties coordinates to one another is a joint equality. Bodies have a unit mass and inertia, for want of any.
+A body is a <body> with the frame that the case gives it. A joint is a chain of MuJoCo joints (see
+`chains`), in the tree or, where it closes a loop, on an auxiliary body that an equality ties to the
+second body; a distance is a tendon of constant length. What ties coordinates to one another is a
+joint equality. Bodies have a unit mass and inertia, for want of any.
 """
 
 from __future__ import annotations
@@ -19,16 +21,27 @@ from ...core.mechanism.topology import spanning_tree
 from ...core.trajectory import BodyMotion
 from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relations
 from ..shared.loop_closures import ends_of
-from ..shared.poses import attitude, backwards, direction, displacements, link_coordinates, local, rotated
+from ..shared.poses import (
+    attitude,
+    backwards,
+    direction,
+    displacements,
+    link_coordinates,
+    local,
+    rotated,
+)
 from .xml_text import document, link_names, numbers
 
 NOTE = (
-    " Written by kincheck. Lengths are in m, angles in rad. Masses, inertias and armatures stand in for missing ones. Drivers are "
-    "not part of the model: the keyframe is consistent with the driver values under custom. "
+    " Written by kincheck. Lengths are in m, angles in rad. Masses, inertias and armatures stand in"
+    " for missing ones. Drivers are not part of the model: the keyframe is consistent with the"
+    " driver values under custom. "
 )
 
 
-def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]) -> Mapping[str, str]:
+def write(
+    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+) -> Mapping[str, str]:
     """An .xml file; see `Writer`. The keyframe "start" is the end of the way.
 
     Raises:
@@ -36,7 +49,10 @@ def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[st
     """
     for joint in mechanism.joints:
         if type(joint) not in CHAINS and type(joint) is not Distance:
-            raise KincheckError(f"{joint} has no counterpart in MJCF here; write an equivalent of known joints instead")
+            raise KincheckError(
+                f"{joint} has no counterpart in MJCF here; write an equivalent of known joints"
+                " instead"
+            )
     return {".xml": _Model(mechanism, way).text(start)}
 
 
@@ -49,15 +65,20 @@ class _Model:
         self.root.append(ET.Comment(NOTE))
         ET.SubElement(self.root, "compiler", angle="radian")
         ET.SubElement(self.root, "option", gravity="0 0 0")
-        # an inertia of each coordinate alone: hinges in line would leave the mass matrix near to singular
+        # an inertia of each coordinate alone: hinges in line would leave the mass matrix near to
+        # singular
         ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature="1")
         self.custom = ET.SubElement(self.root, "custom")
         self.elements = {GROUND: ET.SubElement(self.root, "worldbody")}
-        self.tendons, self.equalities = ET.SubElement(self.root, "tendon"), ET.SubElement(self.root, "equality")
+        self.tendons, self.equalities = (
+            ET.SubElement(self.root, "tendon"),
+            ET.SubElement(self.root, "equality"),
+        )
         self.frames = {GROUND: Body(GROUND)}  # at design, of all that has an element
         self.qpos: dict[str, Sequence[float]] = {}
         self.coordinates: dict[tuple[str, str], str] = {}  # their names, by joint and freedom
-        self.signs: dict[str, float] = {}  # of a joint's coordinates: minus where they move the joint's first body
+        # of a joint's coordinates: minus where they move the joint's first body
+        self.signs: dict[str, float] = {}
         for body in mechanism.bodies:
             if body.fixed:
                 self.add_body(body, GROUND)
@@ -73,7 +94,10 @@ class _Model:
         for joint in tree.cut:
             self.close(joint)
         for coupler in mechanism.couplers:
-            self.relate((joint, freedom, self.signs[joint] * weight) for joint, freedom, weight in coupler.terms)
+            self.relate(
+                (joint, freedom, self.signs[joint] * weight)
+                for joint, freedom, weight in coupler.terms
+            )
         for point in mechanism.points:
             self.add_site(point.name, point.body, point.position)
 
@@ -81,11 +105,18 @@ class _Model:
         """The document, with a consistent start."""
         for driver, value in start.items():
             ET.SubElement(self.custom, "numeric", name=driver, data=numbers([value]))
-        # MuJoCo numbers its coordinates in the order of the document; the joint among the defaults has no name
-        names = [each.get("name", "") for each in self.root.iter() if each.tag in ("joint", "freejoint")]
+        # MuJoCo numbers its coordinates in the order of the document; the joint among the defaults
+        # has no name
+        names = [
+            each.get("name", "") for each in self.root.iter() if each.tag in ("joint", "freejoint")
+        ]
         qpos = numbers(x for name in names for x in self.qpos.get(name, ()))
         ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="start", qpos=qpos)
-        return document(self.root, (["body"], ["joint", "freejoint"], ["site"], ["spatial"], ["numeric"]), reserved=["world"])
+        return document(
+            self.root,
+            (["body"], ["joint", "freejoint"], ["site"], ["spatial"], ["numeric"]),
+            reserved=["world"],
+        )
 
     def add_body(self, frame: Body, parent: str) -> None:
         """A body on its parent, with that name and frame at design."""
@@ -93,14 +124,24 @@ class _Model:
         turn = attitude(carrier).conjugate() * attitude(frame)
         at = {"pos": numbers(local(carrier, frame.origin)), "quat": numbers(turn)}
         self.frames[frame.name] = frame
-        self.elements[frame.name] = ET.SubElement(self.elements[parent], "body", {"name": frame.name, **at})
-        ET.SubElement(self.elements[frame.name], "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+        self.elements[frame.name] = ET.SubElement(
+            self.elements[parent], "body", {"name": frame.name, **at}
+        )
+        ET.SubElement(
+            self.elements[frame.name], "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1"
+        )
 
-    def add_site(self, name: str, body: str, position: Sequence[float], aligned: bool = False) -> str:
+    def add_site(
+        self, name: str, body: str, position: Sequence[float], aligned: bool = False
+    ) -> str:
         """A site of a body, parallel to it, or to the global axes at design."""
         frame = self.frames[body]
         turned = {"quat": numbers(attitude(frame).conjugate())} if aligned else {}
-        ET.SubElement(self.elements[body], "site", {"name": name, "pos": numbers(local(frame, position)), **turned})
+        ET.SubElement(
+            self.elements[body],
+            "site",
+            {"name": name, "pos": numbers(local(frame, position)), **turned},
+        )
         return name
 
     def add_free(self, body: Body) -> None:
@@ -115,10 +156,14 @@ class _Model:
         return CHAINS[type(joint)](joint, ends_of(self.mechanism, joint)[0])
 
     def carry(self, body: str, joint: Joint, links: Sequence[Link], sign: int = 1) -> None:
-        """Let a body move by a joint's links, from the joint's first body on or (sign -1) from its second."""
+        """Let a body move by a joint's links, from the joint's first body on or (sign -1) from its
+        second.
+        """
         frame, element = self.frames[body], self.elements[body]
         values = link_coordinates(joint, self.links(joint), self.placed)
-        for name, link, value in [*zip(link_names(joint.name, links), links, values, strict=False)][::sign]:
+        for name, link, value in [*zip(link_names(joint.name, links), links, values, strict=False)][
+            ::sign
+        ]:
             along = {} if link.move == "ball" else {"axis": numbers(direction(frame, link.axis))}
             at = {"pos": numbers(local(frame, link.point)), **along}
             ET.SubElement(element, "joint", {"name": name, "type": link.move, **at})
@@ -126,7 +171,8 @@ class _Model:
             if link.move == "ball":  # in the axes of the body that it carries
                 self.qpos[name] = value[0], *rotated(attitude(frame).conjugate(), vec(value[1:]))
             self.coordinates[joint.name, link.name] = name
-        self.signs[joint.name] = sign  # it is that of all the joint's coordinates, so their relations need none
+        # it is that of all the joint's coordinates, so their relations need none
+        self.signs[joint.name] = sign
         for relation in relations(joint):
             self.relate(relation)
 
@@ -148,15 +194,24 @@ class _Model:
             self.add_body(replace(self.frames[joint.i], name=carrier), joint.i)
             self.carry(carrier, joint, links)
         one, two = self.add_ends(joint.name, (carrier, joint.j), (point, point))
-        ET.SubElement(self.equalities, "connect" if turns else "weld", name=joint.name, site1=one, site2=two)
+        ET.SubElement(
+            self.equalities, "connect" if turns else "weld", name=joint.name, site1=one, site2=two
+        )
 
-    def add_ends(self, joint: str, bodies: Sequence[str], points: Sequence[Sequence[float]]) -> list[str]:
+    def add_ends(
+        self, joint: str, bodies: Sequence[str], points: Sequence[Sequence[float]]
+    ) -> list[str]:
         """A site at either end of what closes a loop."""
         ends = zip(("first", "second"), bodies, points, strict=True)
-        return [self.add_site(f"{joint}.{which}", body, point, aligned=True) for which, body, point in ends]
+        return [
+            self.add_site(f"{joint}.{which}", body, point, aligned=True)
+            for which, body, point in ends
+        ]
 
     def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, factor = dependence((self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms)
+        one, other, factor = dependence(
+            (self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms
+        )
         polynomial = numbers([0, factor, 0, 0, 0])
         ET.SubElement(self.equalities, "joint", joint1=one, joint2=other, polycoef=polynomial)

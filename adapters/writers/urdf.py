@@ -1,9 +1,12 @@
-"""A mechanism as URDF, which knows trees only, and beside it a JSON file of the conditions that close its loops.
+"""A mechanism as URDF, which knows trees only, and beside it a JSON file of the conditions that
+close its loops.
 
-Every link is parallel to the global axes at design, so axes and arms are the case's numbers, and has its origin in its joint's
-point. A joint is a chain of URDF's revolute and prismatic joints (see `chains`). URDF has no ball joint; three hinges would lock
-at a quarter turn, so a body that no chain without a ball carries floats, and its joints are conditions (see `closures`). Hinges
-are "revolute", not "continuous", with limits beyond all reach: their coordinate is then the angle itself, which counts turns.
+Every link is parallel to the global axes at design, so axes and arms are the case's numbers, and
+has its origin in its joint's point. A joint is a chain of URDF's revolute and prismatic joints (see
+`chains`). URDF has no ball joint; three hinges would lock at a quarter turn, so a body that no
+chain without a ball carries floats, and its joints are conditions (see `closures`). Hinges are
+"revolute", not "continuous", with limits beyond all reach: their coordinate is then the angle
+itself, which counts turns.
 """
 
 from __future__ import annotations
@@ -20,7 +23,15 @@ from ...core.joints import Fixed, Joint
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.mechanism.topology import spanning_tree
 from ...core.trajectory import BodyMotion
-from ..shared.frame_constraints import Coincident, Condition, Difference, Direction, Dot, Frame, Length
+from ..shared.frame_constraints import (
+    Coincident,
+    Condition,
+    Difference,
+    Direction,
+    Dot,
+    Frame,
+    Length,
+)
 from ..shared.joint_chains import CHAINS, Link, relations
 from ..shared.loop_closures import CLOSURES, ends_of
 from ..shared.poses import backwards, displacements, link_coordinates
@@ -28,8 +39,8 @@ from .xml_text import document, link_names, numbers
 
 SCHEMA = "kincheck-constraints/1"
 NOTE = (
-    " Written by kincheck. Lengths are in m, angles in rad; nothing has a mass. The tree alone is not the mechanism: the "
-    "constraints in the file beside it close its loops. "
+    " Written by kincheck. Lengths are in m, angles in rad; nothing has a mass. The tree alone is"
+    " not the mechanism: the constraints in the file beside it close its loops. "
 )
 MEANING = {
     "coincident": "the points i and j are one (3 equations)",
@@ -38,23 +49,33 @@ MEANING = {
     "offset": "x . (point j - point i) = value [m], x a unit vector",
     "linear": "the sum of weight * coordinate of the joint is zero [m or rad]",
     "bodies": "the frame of the body in its link at design",
-    "start": "coordinates of joints: m or rad; floating: displacement x, y, z [m] and quaternion x, y, z, w",
+    "start": (
+        "coordinates of joints: m or rad; floating: displacement x, y, z [m] and quaternion x, y,"
+        " z, w"
+    ),
 }
 KINDS = {"hinge": "revolute", "slide": "prismatic"}
 FAR = {"lower": "-1e9", "upper": "1e9", "effort": "1e9", "velocity": "1e9"}
 
 
-def write(mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]) -> Mapping[str, str]:
-    """A .urdf file and a .constraints.json beside it, with a consistent start at the end of the way; see `Writer`.
+def write(
+    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+) -> Mapping[str, str]:
+    """A .urdf file and a .constraints.json beside it, with a consistent start at the end of the
+    way; see `Writer`.
 
-    Points of links are in the link's axes, as in URDF. Coordinates of the start go by the name of the joint, neutral at design.
+    Points of links are in the link's axes, as in URDF. Coordinates of the start go by the name of
+    the joint, neutral at design.
 
     Raises:
         KincheckError: a joint has no counterpart here, or a name cannot be used.
     """
     for joint in mechanism.joints:
         if type(joint) not in CLOSURES:
-            raise KincheckError(f"{joint} has no counterpart in URDF here; write an equivalent of known joints instead")
+            raise KincheckError(
+                f"{joint} has no counterpart in URDF here; write an equivalent of known joints"
+                " instead"
+            )
     model = _Model(mechanism, way)
     beside = {
         "schema": SCHEMA,
@@ -75,19 +96,32 @@ def _json(table: Mapping[str, Any]) -> str:
     def lines(value: Any) -> str:
         if isinstance(value, dict):
             entries = (
-                f"{json.dumps(key)}: {json.dumps(each, allow_nan=False)}" for key, each in cast(dict[str, Any], value).items()
+                f"{json.dumps(key)}: {json.dumps(each, allow_nan=False)}"
+                for key, each in cast(dict[str, Any], value).items()
             )
             return "{\n    " + ",\n    ".join(entries) + "\n  }"
         if isinstance(value, list):
-            return "[\n    " + ",\n    ".join(json.dumps(each, allow_nan=False) for each in cast(list[Any], value)) + "\n  ]"
+            return (
+                "[\n    "
+                + ",\n    ".join(
+                    json.dumps(each, allow_nan=False) for each in cast(list[Any], value)
+                )
+                + "\n  ]"
+            )
         return json.dumps(value)
 
-    return "{\n  " + ",\n  ".join(f"{json.dumps(key)}: {lines(value)}" for key, value in table.items()) + "\n}\n"
+    return (
+        "{\n  "
+        + ",\n  ".join(f"{json.dumps(key)}: {lines(value)}" for key, value in table.items())
+        + "\n}\n"
+    )
 
 
 @dataclass(frozen=True)
 class _End:
-    """A point of a link, in the link's axes [m]; stands in for a frame, of which a condition keeps what it needs."""
+    """A point of a link, in the link's axes [m]; stands in for a frame, of which a condition keeps
+    what it needs.
+    """
 
     link: str
     point: list[float]
@@ -102,7 +136,8 @@ class _Model:
         self.root.append(ET.Comment(NOTE))
         self.origin: dict[str, Vector] = {}  # of links, global at design
         self.q: dict[str, list[float]] = {}
-        self.coordinates: dict[tuple[str, str], tuple[str, float]] = {}  # name and sign, by joint and freedom
+        # name and sign, by joint and freedom
+        self.coordinates: dict[tuple[str, str], tuple[str, float]] = {}
         self.constraints: list[dict[str, Any]] = []
         self.add_link(GROUND, (0.0, 0.0, 0.0))
         for body in mechanism.bodies:
@@ -123,10 +158,14 @@ class _Model:
         for coupler in mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
         for point in mechanism.points:
-            self.attach(f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed")
+            self.attach(
+                f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed"
+            )
 
     def links(self, joint: Joint) -> list[Link] | None:
-        """A joint's chain, from its first body to its second; None where it has a ball or is none."""
+        """A joint's chain, from its first body to its second; None where it has a ball or is
+        none.
+        """
         chain = CHAINS.get(type(joint))
         links = chain and chain(joint, ends_of(self.mechanism, joint)[0])
         return None if links is None or any(link.move == "ball" for link in links) else links
@@ -136,7 +175,9 @@ class _Model:
         self.origin[name] = origin
         return ET.SubElement(self.root, "link", name=name)
 
-    def attach(self, link: str, parent: str, origin: Vector, joint: str, kind: str = "fixed") -> ET.Element:
+    def attach(
+        self, link: str, parent: str, origin: Vector, joint: str, kind: str = "fixed"
+    ) -> ET.Element:
         """A new link on another one, by one of URDF's joints."""
         self.add_link(link, origin)
         element = ET.SubElement(self.root, "joint", name=joint, type=kind)
@@ -175,25 +216,41 @@ class _Model:
             self.relate(joint.name, relation)
 
     def close(self, joint: Joint, on_copy: bool) -> None:
-        """The conditions of a joint that is not in the tree; where its coordinates must count turns, it moves a copy."""
+        """The conditions of a joint that is not in the tree; where its coordinates must count
+        turns, it moves a copy.
+        """
         (i, j), ends, closing = joint.bodies, ends_of(self.mechanism, joint), CLOSURES[type(joint)]
         if on_copy:
             links = self.links(joint)
             assert links is not None  # joints that have relations or can be coupled have no ball
             i, closing = f"{joint.name}.copy", CLOSURES[Fixed]
             self.carry(i, joint, links)
-        frames = [cast(Frame, _End(link, self.arm(link, P))) for link, P in zip((i, j), ends, strict=True)]
+        frames = [
+            cast(Frame, _End(link, self.arm(link, P))) for link, P in zip((i, j), ends, strict=True)
+        ]
         for condition in closing.conditions(joint, *frames):
-            self.constraints += ({"joint": joint.name, **written} for written in _written(condition))
+            self.constraints += (
+                {"joint": joint.name, **written} for written in _written(condition)
+            )
 
     def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of coordinates (joint, freedom, weight) at zero."""
         found = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
-        self.constraints.append({"joint": name, "kind": "linear", "weights": {one: sign * weight for one, sign, weight in found}})
+        self.constraints.append(
+            {
+                "joint": name,
+                "kind": "linear",
+                "weights": {one: sign * weight for one, sign, weight in found},
+            }
+        )
 
     def pose(self, body: Body) -> dict[str, Any]:
         """A body's frame in its link."""
-        return {"link": body.name, "origin": self.arm(body.name, body.origin), "euler_parameters": [*body.euler_parameters]}
+        return {
+            "link": body.name,
+            "origin": self.arm(body.name, body.origin),
+            "euler_parameters": [*body.euler_parameters],
+        }
 
 
 def _written(condition: Condition) -> Iterator[dict[str, Any]]:

@@ -12,11 +12,14 @@ from ..shared.joint_chains import Link
 
 def numbers(values: Iterable[Any]) -> str:
     """The shortest text that is read back as the same doubles, 17 digits where they are needed."""
-    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)  # minus zero reads like a mistake
+    # minus zero reads like a mistake
+    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
 
 
 def link_names(joint: str, links: Sequence[Link]) -> list[str]:
-    """The names of a joint's coordinates: its own where it has one only, else JOINT.rotation, JOINT.slide2, ..."""
+    """The names of a joint's coordinates: its own where it has one only, else JOINT.rotation,
+    JOINT.slide2, ...
+    """
     if len(links) == 1:
         return [joint]
     return [f"{joint}.{link.name or f'{link.move}{k}'}" for k, link in enumerate(links, 1)]
@@ -26,16 +29,27 @@ def document(root: ET.Element, kinds: Sequence[Sequence[str]], reserved: Sequenc
     """The text of a document.
 
     Args:
-        kinds: tags of elements whose names are known by them, those that share their names together.
+        kinds: tags of elements whose names are known by them, those that share their names
+            together.
         reserved: names that the format keeps to itself.
 
     Raises:
-        KincheckError: a name is used twice, or reserved, so that a reader would refuse or confuse it.
+        KincheckError: a name is used twice, or reserved, so that a reader would refuse or confuse
+            it.
     """
     for tags in kinds:
-        names = [name for element in root.iter() if element.tag in tags and (name := element.get("name")) is not None]
-        taken = {name for name in names if names.count(name) > 1} | set(reserved).intersection(names)
+        names = [
+            name
+            for element in root.iter()
+            if element.tag in tags and (name := element.get("name")) is not None
+        ]
+        taken = {name for name in names if names.count(name) > 1} | set(reserved).intersection(
+            names
+        )
         if taken:
-            raise KincheckError(f"<{root.tag}>: the name {min(taken)!r} is taken in the file; rename what has it in the case")
+            raise KincheckError(
+                f"<{root.tag}>: the name {min(taken)!r} is taken in the file; rename what has it in"
+                " the case"
+            )
     ET.indent(root)
     return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"

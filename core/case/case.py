@@ -22,10 +22,14 @@ TIME = "time"
 """The name a sweep has instead of a driver's where time itself is swept."""
 
 MARKER = "~"
-"""Begins the names of points that the reading of a case adds to a body, to see how it turns; they are no hardpoints."""
+"""Begins the names of points that the reading of a case adds to a body, to see how it turns; they
+are no hardpoints.
+"""
 
 PER_TRAVEL = ".per_travel"
-"""Ends the names of derivatives by wheel travel, which the reading of a case adds to its outputs."""
+"""Ends the names of derivatives by wheel travel, which the reading of a case adds to its
+outputs.
+"""
 
 
 NO_SIZE = 1e-3
@@ -49,15 +53,18 @@ class Truth(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """One driver moved over a grid of values at a constant rate, or time; other drivers follow motions of their own, or hold.
+    """One driver moved over a grid of values at a constant rate, or time; other drivers follow
+    motions of their own, or hold.
 
     Attributes:
         driver: name of the swept driver, or "time" where drivers follow their motions only.
         values: driver values in the order start..stop [m or rad], or times [s], shape (n,).
-        rate: driver units per second; velocities and accelerations are per second at this constant rate.
-        design: the driver's value at the design position: zero unless its values are absolute [m or rad].
-        motions: of the drivers other than the swept one, from their design values, over the time in which the swept one goes
-            from its design value at the rate.
+        rate: driver units per second; velocities and accelerations are per second at this constant
+            rate.
+        design: the driver's value at the design position: zero unless its values are absolute [m or
+            rad].
+        motions: of the drivers other than the swept one, from their design values, over the time in
+            which the swept one goes from its design value at the rate.
     """
 
     driver: str
@@ -74,7 +81,11 @@ class Sweep:
     @property
     def path(self) -> Path:
         """How all moving drivers go with time, and the times of the samples."""
-        design = {name: motion.design for name, motion in self.motions.items() if isinstance(motion, Absolute)}
+        design = {
+            name: motion.design
+            for name, motion in self.motions.items()
+            if isinstance(motion, Absolute)
+        }
         if self.driver == TIME:
             return Path(self.motions, self.values, design)
         moved = {self.driver: Ramp(self.rate), **self.motions}
@@ -82,9 +93,14 @@ class Sweep:
 
     @property
     def moved(self) -> dict[str, Array]:
-        """What is swept [m, rad or s], then every further moving driver [m or rad], at the samples, shape (n,) each."""
+        """What is swept [m, rad or s], then every further moving driver [m or rad], at the samples,
+        shape (n,) each.
+        """
         path = self.path
-        further = {name: path.design.get(name, 0.0) + motion.at(path.times)[0] for name, motion in self.motions.items()}
+        further = {
+            name: path.design.get(name, 0.0) + motion.at(path.times)[0]
+            for name, motion in self.motions.items()
+        }
         return {self.driver: self.values, **further}
 
 
@@ -98,8 +114,10 @@ class Quantity(Protocol):
     Attributes:
         points: names of the points it reads.
         unit: of its value, SI: m, rad, 1, or one of these by m.
-        orders: how many of value, first and second derivative by time follow from what engines give.
-        atol, rtol: an error is accepted up to atol [unit, unit/s, unit/s^2] + rtol * range of the reference.
+        orders: how many of value, first and second derivative by time follow from what engines
+            give.
+        atol, rtol: an error is accepted up to atol [unit, unit/s, unit/s^2] + rtol * range of the
+            reference.
         why: the reason for the tolerance.
         sense: what a positive value means; empty where unit and name say it.
         signs: the convention of signs and axes; empty where the case's own axes are all there is.
@@ -181,7 +199,9 @@ class Output:
         return asdict(self)
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The coordinate [m]; of components that do not count nothing is computed, for there may be very many samples."""
+        """The coordinate [m]; of components that do not count nothing is computed, for there may be
+        very many samples.
+        """
         each = zip(self.direction, at[self.point], design[self.point], strict=True)
         moved = [(along, x - start if self.relative else x) for along, x, start in each if along]
         return reduce(add, [x if along == 1.0 else along * x for along, x in moved])
@@ -189,10 +209,12 @@ class Output:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One output over the samples: value [unit], and derivatives by time where they are known, each of shape (n,).
+    """One output over the samples: value [unit], and derivatives by time where they are known, each
+    of shape (n,).
 
     Attributes:
-        possible: whether the engine gives what the value is made of; that of a derivative takes velocities.
+        possible: whether the engine gives what the value is made of; that of a derivative takes
+            velocities.
     """
 
     position: Array
@@ -226,7 +248,8 @@ class Case:
         truth: the kind of the reference; consensus_only where there is none.
         reference: true values by output name, on the grid of the sweep.
         origin: of the reference; without, it comes from where the case does.
-        length_unit, angle_unit: of the numbers in the file that it was read from, by their names in `units`.
+        length_unit, angle_unit: of the numbers in the file that it was read from, by their names in
+            `units`.
     """
 
     name: str
@@ -247,19 +270,24 @@ class Case:
 
     @property
     def signs(self) -> str:
-        """The convention of signs of the outputs that have one, in words; what heads every table of them. Empty without."""
+        """The convention of signs of the outputs that have one, in words; what heads every table of
+        them. Empty without.
+        """
         return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))
 
 
 def size(case: Case) -> float:
-    """Return the largest extent along a global axis of the joints and the compared points at design, or of the drivers' shifts [m].
+    """Return the largest extent along a global axis of the joints and the compared points at
+    design, or of the drivers' shifts [m].
 
     Where nothing is compared yet, all points count.
     """
     path = case.sweep.path
     values, _, _ = path.drive(list(path.motions), path.times)
     compared = case.points or [point.name for point in case.mechanism.points]
-    points = [case.mechanism.point(name).position for name in compared if not name.startswith(MARKER)]
+    points = [
+        case.mechanism.point(name).position for name in compared if not name.startswith(MARKER)
+    ]
     points += [position for joint in case.mechanism.joints for position in joint.points_on()]
     shift = float(np.ptp(values[~turning(case)], axis=1).max(initial=0.0))
     extent = max(float(np.ptp(np.array(points), axis=0).max()), shift)
@@ -268,4 +296,6 @@ def size(case: Case) -> float:
 
 def turning(case: Case) -> NDArray[np.bool_]:
     """Which of the moving drivers turn, shape (drivers,)."""
-    return np.array([case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_)
+    return np.array(
+        [case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_
+    )

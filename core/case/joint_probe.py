@@ -1,8 +1,9 @@
 """Probes: one small closed-loop case for any type of joint or coupler, built from the class alone.
 
-Body a turns about a hinge on the ground and is driven; the joint under test carries body b on it, and as many rods as the joint
-has freedoms tie b to the ground, so that every freedom moves and nothing but the joint can move it. A coupler sits between two
-joints of a: a rod to the ground moves the first, the coupler the second.
+Body a turns about a hinge on the ground and is driven; the joint under test carries body b on it,
+and as many rods as the joint has freedoms tie b to the ground, so that every freedom moves and
+nothing but the joint can move it. A coupler sits between two joints of a: a rod to the ground moves
+the first, the coupler the second.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from ..mechanism.drivers import JointAngle
 from ..mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from .case import Case, Output, Sweep, Truth
 
-# The design position: skew axes and uneven numbers, so that no row vanishes by symmetry. All in metres, global.
+# The design position: skew axes and uneven numbers, so that no row vanishes by symmetry. All in
+# metres, global.
 HINGE = Revolute("hinge", GROUND, "a", (0.1, -0.2, 0.3), (1.0, 2.0, 2.0))
 POINT: Vector = (0.2, -0.1, 0.2)
 LINK: Vector = (0.33, -0.18, 0.34)
@@ -29,14 +31,21 @@ AXIS: Vector = (2.0, -1.0, 2.0)
 LENGTH = 0.05
 NUMBER = 1.5
 
-# A perpendicular pair, and one 40 degrees apart, for joints that need shafts pointing the same way on.
+# A perpendicular pair, and one 40 degrees apart, for joints that need shafts pointing the same way
+# on.
 _H, _F = np.array(AXIS) / 3.0, np.array([1.0, 4.0, 1.0]) / math.sqrt(18.0)
 PAIRS = tuple(
-    (AXIS, tuple((math.cos(math.radians(degrees)) * _H + math.sin(math.radians(degrees)) * _F).tolist())) for degrees in (90, 40)
+    (
+        AXIS,
+        tuple(
+            (math.cos(math.radians(degrees)) * _H + math.sin(math.radians(degrees)) * _F).tolist()
+        ),
+    )
+    for degrees in (90, 40)
 )
 
-# Ends on b and on the ground. Drawn at random and chosen so that, whatever number of them a built-in joint takes, the mechanism
-# stays far from lock-up over the sweep and every freedom moves.
+# Ends on b and on the ground. Drawn at random and chosen so that, whatever number of them a
+# built-in joint takes, the mechanism stays far from lock-up over the sweep and every freedom moves.
 RODS: Sequence[tuple[Vector, Vector]] = (
     ((0.49, 0.09, 0.28), (0.8, -0.47, 0.26)),
     ((0.06, -0.32, 0.56), (1.02, -0.46, 0.73)),
@@ -49,9 +58,13 @@ TIPS: Sequence[Vector] = ((0.35, -0.05, 0.4), (0.1, 0.15, 0.15))
 TURN = np.linspace(-0.4, 0.4, 41)
 """Of the hinge [rad], at 1 rad/s."""
 
-# Residuals of 1e-12 of a metre-sized mechanism, times the condition of its rows (a hundred at most, by sigma), times ten.
+# Residuals of 1e-12 of a metre-sized mechanism, times the condition of its rows (a hundred at most,
+# by sigma), times ten.
 ATOL = 1e-9
-WHY = "residual tolerance 1e-12 over the smallest singular value of a built-in joint's probe (0.01), x10"
+WHY = (
+    "residual tolerance 1e-12 over the smallest singular value of a built-in joint's probe"
+    " (0.01), x10"
+)
 
 _Tested = TypeVar("_Tested", bound=Joint | Coupler)
 
@@ -69,26 +82,34 @@ def probe(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Case:
 
 
 def alternatives(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Iterator[Case]:
-    """The same with others of the rods, which may not lock the joint where the first do; those that are chosen first are first."""
+    """The same with others of the rods, which may not lock the joint where the first do; those that
+    are chosen first are first.
+    """
     one = specimen(tested) if isinstance(tested, type) else tested
     return _of_joint(one) if isinstance(one, Joint) else iter([_of_coupler(one)])
 
 
 def probes() -> list[Case]:
-    """A probe of every registered type, joints first, then couplers, each in the order of their names."""
+    """A probe of every registered type, joints first, then couplers, each in the order of their
+    names.
+    """
     registries: Sequence[Mapping[str, type[Joint | Coupler]]] = (Joint.registry, Coupler.registry)
     return [probe(registry[name]) for registry in registries for name in sorted(registry)]
 
 
 def specimen(of: type[_Tested]) -> _Tested:
-    """An instance between bodies a and b (a coupler: between joints first and second), its geometry made from the fields' kinds.
+    """An instance between bodies a and b (a coupler: between joints first and second), its geometry
+    made from the fields' kinds.
 
     Fields with a default keep it; numbers without a kind are ratios.
 
     Raises:
-        MechanismError: the class accepts neither of the pairs of directions, or has a field of unknown kind.
+        MechanismError: the class accepts neither of the pairs of directions, or has a field of
+            unknown kind.
     """
-    between: dict[str, Any] = {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}
+    between: dict[str, Any] = (
+        {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}
+    )
     refused: MechanismError | None = None
     for pair in PAIRS:
         try:
@@ -96,7 +117,8 @@ def specimen(of: type[_Tested]) -> _Tested:
         except MechanismError as error:
             refused = error
     raise MechanismError(
-        f"{of.__name__}: no specimen can be made, it refuses axes at right angles and at 40 degrees; the last refusal: {refused}"
+        f"{of.__name__}: no specimen can be made, it refuses axes at right angles and at 40"
+        f" degrees; the last refusal: {refused}"
     )
 
 
@@ -118,7 +140,9 @@ def _geometry(of: type[Joint] | type[Coupler], pair: Any) -> Iterator[tuple[str,
 def _of_joint(joint: Joint) -> Iterator[Case]:
     freedoms = 6 - joint.rows
     if freedoms > len(RODS):
-        raise MechanismError(f"{joint}: has {joint.rows} rows, expected one or more; return its primitives")
+        raise MechanismError(
+            f"{joint}: has {joint.rows} rows, expected one or more; return its primitives"
+        )
     for rods in combinations(range(len(RODS)), freedoms):
         yield _case(joint.type, [replace(joint, i="a", j="b")], _rods("b", rods))
 
@@ -127,14 +151,18 @@ def _of_coupler(coupler: Coupler) -> Case:
     kinds: dict[str, type[AxialJoint]] = {"rotation": Revolute, "translation": Translational}
     first, second = (kinds[freedom] for freedom in coupler.freedoms)
     joints = [first("first", "a", "b", POINT, AXIS), second("second", "a", "c", LINK, PAIRS[0][1])]
-    return _case(coupler.type, joints, _rods("b", [0]), [replace(coupler, joints=("first", "second"))])
+    return _case(
+        coupler.type, joints, _rods("b", [0]), [replace(coupler, joints=("first", "second"))]
+    )
 
 
 def _rods(body: str, chosen: Sequence[int]) -> list[Joint]:
     return [Distance(f"rod_{k + 1}", body, GROUND, RODS[k]) for k in chosen]
 
 
-def _case(type_: str, tested: Sequence[Joint], rods: Sequence[Joint], couplers: Sequence[Coupler] = ()) -> Case:
+def _case(
+    type_: str, tested: Sequence[Joint], rods: Sequence[Joint], couplers: Sequence[Coupler] = ()
+) -> Case:
     last = tested[-1].j
     mechanism = Mechanism(
         type_,
@@ -145,9 +173,22 @@ def _case(type_: str, tested: Sequence[Joint], rods: Sequence[Joint], couplers: 
         couplers=couplers,
     )
     outputs = tuple(
-        Output(f"{point.name}_{axis}", point.name, direction, relative=False, atol=ATOL, rtol=0.0, why=WHY)
+        Output(
+            f"{point.name}_{axis}",
+            point.name,
+            direction,
+            relative=False,
+            atol=ATOL,
+            rtol=0.0,
+            why=WHY,
+        )
         for point in mechanism.points
-        for axis, direction in zip("xyz", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), strict=True)
+        for axis, direction in zip(
+            "xyz", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), strict=True
+        )
     )
-    source = f"probe of the {type_.replace('_', ' ')} joint: its geometry, a driven hinge, and rods at fixed positions"
+    source = (
+        f"probe of the {type_.replace('_', ' ')} joint: its geometry, a driven hinge, and rods at"
+        " fixed positions"
+    )
     return Case(type_, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", TURN), outputs)

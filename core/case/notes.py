@@ -1,4 +1,6 @@
-"""Notes on a case: what a reader of its results should know, where a file can be meant, and yet be a mistake."""
+"""Notes on a case: what a reader of its results should know, where a file can be meant, and yet be
+a mistake.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,9 @@ from .units import LENGTHS
 
 
 def notes(case: Case) -> list[str]:
-    """Return the notes on a case: on lengths of rods, on sizes, and on the source of its reference; in the units of its file."""
+    """Return the notes on a case: on lengths of rods, on sizes, and on the source of its reference;
+    in the units of its file.
+    """
     written = LENGTHS[case.length_unit].written
     joints = [note for joint in case.mechanism.joints for note in joint.notes]
     said = [note.within(written) if isinstance(note, Phrase) else note for note in joints]
@@ -20,10 +24,14 @@ def _reference_notes(case: Case) -> list[str]:
     if not (case.reference and case.truth.validates and case.origin):
         return []
     if case.origin.own:
-        return [f"judged against a reference that kincheck has made, which is no {case.truth}: no pass is called validated"]
+        return [
+            f"judged against a reference that kincheck has made, which is no {case.truth}: no pass"
+            " is called validated"
+        ]
     if not case.origin.citation:
         return [
-            f"judged against an uncited reference: truth is {case.truth}, and [reference] does not say where it comes from, "
-            'so that no pass is called validated; add citation = "author, title, page or address" to [reference]'
+            f"judged against an uncited reference: truth is {case.truth}, and [reference] does not"
+            " say where it comes from, so that no pass is called validated; add citation ="
+            ' "author, title, page or address" to [reference]'
         ]
     return []

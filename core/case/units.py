@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-# Digits of a decimal that a double holds whatever they are; what needs more was computed, and is rounded.
+# Digits of a decimal that a double holds whatever they are; what needs more was computed, and is
+# rounded.
 DIGITS, ROUNDED = 15, 10
 
 
@@ -30,8 +31,8 @@ class Unit:
         """Return a value in SI as the file has it, with the unit.
 
         Args:
-            among: numbers of the file; the first of this value is quoted. Else it is the shortest decimal of this value, or if
-                that is long, a rounded one.
+            among: numbers of the file; the first of this value is quoted. Else it is the shortest
+                decimal of this value, or if that is long, a rounded one.
         """
         for number in among:
             if self.convert(number) == value:
@@ -39,7 +40,9 @@ class Unit:
         number = value / self.size
         decimals = (float(f"{number:.{digits}g}") for digits in range(1, DIGITS + 1))
         exact = next((each for each in decimals if self.convert(each) == value), None)
-        return f"{number:.{ROUNDED}g} {self.name}" if exact is None else f"{plain(exact)} {self.name}"
+        return (
+            f"{number:.{ROUNDED}g} {self.name}" if exact is None else f"{plain(exact)} {self.name}"
+        )
 
 
 def plain(number: float) -> str:

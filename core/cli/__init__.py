@@ -1,6 +1,8 @@
-"""Commands: a file each, with `add` (its options, on the parser) and what it does, from the options to an exit status.
+"""Commands: a file each, with `add` (its options, on the parser) and what it does, from the options
+to an exit status.
 
-A new command is one such file and its name in `COMMANDS`. What is slow to import is imported when the command is carried out.
+A new command is one such file and its name in `COMMANDS`. What is slow to import is imported when
+the command is carried out.
 """
 
 COMMANDS = (

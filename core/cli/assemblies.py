@@ -1,4 +1,6 @@
-"""kincheck assemblies: list the ways a mechanism can be put together, and start a simulator in one of them."""
+"""kincheck assemblies: list the ways a mechanism can be put together, and start a simulator in one
+of them.
+"""
 
 from __future__ import annotations
 
@@ -21,21 +23,52 @@ MEETING = 1e-6
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     listing: argparse.ArgumentParser
-    listing = commands.add_parser("assemblies", help="list all assemblies of a mechanism", description=_assemblies.__doc__)
+    listing = commands.add_parser(
+        "assemblies", help="list all assemblies of a mechanism", description=_assemblies.__doc__
+    )
     listing.set_defaults(do=_assemblies)
-    listing.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    listing.add_argument(
+        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+    )
     listing.add_argument(
         "--at",
         type=float,
         metavar="VALUE",
         help="of the swept driver as the sweep has it, in SI units; default: the design position",
     )
-    listing.add_argument("--samples", type=whole(1), default=200, metavar="N", help="random starts; default %(default)s")
-    listing.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random starts; default %(default)s")
-    listing.add_argument("--json", metavar="FILE", help="write the assemblies with all poses as JSON; - for standard output")
-    listing.add_argument("--export", metavar="FORMAT", help=f"write the mechanism, started in one of them: {formats()}")
-    listing.add_argument("--number", type=whole(1), metavar="K", help="which one to export; default 1, the first of the list")
-    listing.add_argument("--out", type=Path, metavar="FILE", help="of the export; default: CASE.K in this folder")
+    listing.add_argument(
+        "--samples",
+        type=whole(1),
+        default=200,
+        metavar="N",
+        help="random starts; default %(default)s",
+    )
+    listing.add_argument(
+        "--seed",
+        type=whole(0),
+        default=0,
+        metavar="N",
+        help="of the random starts; default %(default)s",
+    )
+    listing.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write the assemblies with all poses as JSON; - for standard output",
+    )
+    listing.add_argument(
+        "--export",
+        metavar="FORMAT",
+        help=f"write the mechanism, started in one of them: {formats()}",
+    )
+    listing.add_argument(
+        "--number",
+        type=whole(1),
+        metavar="K",
+        help="which one to export; default 1, the first of the list",
+    )
+    listing.add_argument(
+        "--out", type=Path, metavar="FILE", help="of the export; default: CASE.K in this folder"
+    )
     import_options.add_options(listing)
 
 
@@ -50,7 +83,8 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
 
     if options.export is None and (found := given(options, ("number", "out"))):
         raise KincheckError(
-            f"{found}: found without --export, expected with it, to say what it writes; add --export FORMAT, or leave out"
+            f"{found}: found without --export, expected with it, to say what it writes; add"
+            " --export FORMAT, or leave out"
         )
     if problems := unwritable([("--json", options.json), ("--out", options.out)]):
         raise KincheckError("\n".join(problems))
@@ -75,25 +109,42 @@ def _print(found: Survey, json: str | None) -> None:
     values = ", ".join(f"{name} = {value:.9g}" for name, value in found.drivers.items())
     count, starts = len(all_of_them.found), all_of_them.starts
     console.print(
-        f"{found.case.name} at {values}: {count} assembl{'y' if count == 1 else 'ies'} from {starts} starts (seed {found.seed})",
+        f"{found.case.name} at {values}: {count} assembl{'y' if count == 1 else 'ies'} from"
+        f" {starts} starts (seed {found.seed})",
         soft_wrap=True,
     )
     telling = [
-        name for name in (all_of_them.found[0].signs if count else ()) if len({a.signs[name] for a in all_of_them.found}) > 1
+        name
+        for name in (all_of_them.found[0].signs if count else ())
+        if len({a.signs[name] for a in all_of_them.found}) > 1
     ]
-    table = columns(">#", "which", ">distance", ">starts", ">residual", ">smallest sv", "det", *telling)
+    table = columns(
+        ">#", "which", ">distance", ">starts", ">residual", ">smallest sv", "det", *telling
+    )
     for number, each in enumerate(all_of_them.found, 1):
-        which = "intended" if found.intended(each) else "meets another" if each.smallest < MEETING else "other"
+        which = (
+            "intended"
+            if found.intended(each)
+            else "meets another"
+            if each.smallest < MEETING
+            else "other"
+        )
         signs = [_sign(each.orientation), *(_sign(each.signs[name]) for name in telling)]
-        numbers = f"{each.distance:.4g}", f"{each.starts}", f"{each.residual:.1e}", f"{each.smallest:.3g}"
+        numbers = (
+            f"{each.distance:.4g}",
+            f"{each.starts}",
+            f"{each.residual:.1e}",
+            f"{each.smallest:.3g}",
+        )
         table.add_row(f"{number}", which, *numbers, *signs)
     console.print(table)
     if found.reason:
         console.print(f"no assembly is the intended one: {found.reason}", soft_wrap=True)
     console.print(
-        f"distance: from {found.ranked_by}, rms over the bodies of turn [rad] and shift [mechanism sizes]; det, joints: signs of "
-        f"the determinant and of triple products, + as at design; residual: of the mechanism's size. {all_of_them.lost} starts did "
-        f"not close, {all_of_them.spurious} ended on spurious zeros. There may be more: raise --samples.",
+        f"distance: from {found.ranked_by}, rms over the bodies of turn [rad] and shift [mechanism"
+        " sizes]; det, joints: signs of the determinant and of triple products, + as at design;"
+        f" residual: of the mechanism's size. {all_of_them.lost} starts did not close,"
+        f" {all_of_them.spurious} ended on spurious zeros. There may be more: raise --samples.",
         soft_wrap=True,
     )
 

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 SEED = 943745
 STRUT = "mcpherson_strut"
 CASES = (STRUT, "stewart_platform")
-"""Of the benchmark of everything: a suspension, and a mechanism of thirteen bodies whose six loops move at once."""
+"""Of the benchmark of everything: a suspension, and a mechanism of thirteen bodies whose six loops
+move at once.
+"""
 # As many rounds settle a median to a tenth of the quartiles' distance.
 ROUNDS = 20
 
@@ -33,41 +35,86 @@ _MAIN = "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     bench: argparse.ArgumentParser
-    bench = commands.add_parser("bench", help="measure the engines, the formulation and its programs", description=_all.__doc__)
+    bench = commands.add_parser(
+        "bench",
+        help="measure the engines, the formulation and its programs",
+        description=_all.__doc__,
+    )
     bench.set_defaults(do=_all)
-    bench.add_argument("--out", type=Path, metavar="DIR", help="write bench.json and bench.html there")
-    bench.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    bench.add_argument(
+        "--out", type=Path, metavar="DIR", help="write bench.json and bench.html there"
+    )
+    bench.add_argument(
+        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
+    )
     benchmarks = bench.add_subparsers(title="benchmarks", metavar="BENCHMARK")
     engines = benchmarks.add_parser(
-        "engines", help="run time against error, batch and mechanism size, first use, memory", description=_engines.__doc__
+        "engines",
+        help="run time against error, batch and mechanism size, first use, memory",
+        description=_engines.__doc__,
     )
     engines.set_defaults(do=_engines)
     engines.add_argument(
-        "--cases", nargs="+", default=[STRUT], metavar="CASE", help=f"built-in names, or paths to case files; default: {STRUT}"
+        "--cases",
+        nargs="+",
+        default=[STRUT],
+        metavar="CASE",
+        help=f"built-in names, or paths to case files; default: {STRUT}",
     )
     add_joint_types(engines)
-    engines.add_argument("--engine", nargs="+", default=[], metavar="NAME", help="default: all engines, in both modes")
     engines.add_argument(
-        "--rounds", type=whole(1), default=ROUNDS, metavar="N", help="of all contestants in turn; default %(default)s"
+        "--engine",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="default: all engines, in both modes",
+    )
+    engines.add_argument(
+        "--rounds",
+        type=whole(1),
+        default=ROUNDS,
+        metavar="N",
+        help="of all contestants in turn; default %(default)s",
     )
     engines.add_argument(
         "--parts",
         nargs="+",
         choices=("work", "batch", "study", "size", "processes"),
         default=["work", "batch", "study", "size", "processes"],
-        help="work against precision; cost against batch size, of a study by threads, and against mechanism size; first use and "
-        "memory; default: all",
+        help=(
+            "work against precision; cost against batch size, of a study by threads, and against"
+            " mechanism size; first use and memory; default: all"
+        ),
     )
     formulation = benchmarks.add_parser(
-        "formulation", help="operation counts and round-off of the paper's rows", description=_formulation.__doc__
+        "formulation",
+        help="operation counts and round-off of the paper's rows",
+        description=_formulation.__doc__,
     )
     formulation.set_defaults(do=_formulation)
-    formulation.add_argument("--seed", type=int, default=SEED, metavar="N", help="of the random states; default %(default)s")
+    formulation.add_argument(
+        "--seed",
+        type=int,
+        default=SEED,
+        metavar="N",
+        help="of the random states; default %(default)s",
+    )
     for each, names in ((engines, "bench"), (formulation, "bench_formulation")):
         # no defaults: they would take the place of what was given before the name of the benchmark
         given: dict[str, Any] = {"default": argparse.SUPPRESS}
-        each.add_argument("--out", type=Path, metavar="DIR", help=f"write {names}.json and {names}.html there", **given)
-        each.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output", **given)
+        each.add_argument(
+            "--out",
+            type=Path,
+            metavar="DIR",
+            help=f"write {names}.json and {names}.html there",
+            **given,
+        )
+        each.add_argument(
+            "--json",
+            metavar="FILE",
+            help="write the results as JSON; - for standard output",
+            **given,
+        )
 
 
 def _all(options: argparse.Namespace, house: House) -> int:
@@ -77,7 +124,9 @@ def _all(options: argparse.Namespace, house: House) -> int:
 
 
 def _engines(options: argparse.Namespace, house: House) -> int:
-    """Measure run time against error for every engine and mode, at several efforts, contestants taking turns in one process."""
+    """Measure run time against error for every engine and mode, at several efforts, contestants
+    taking turns in one process.
+    """
     return _measured(options, house, formulation=False)
 
 
@@ -99,7 +148,9 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
     engines = [
         engine
         for mode, known in (("projection", house.engines), ("simulate", house.simulations))
-        for engine in house.find_engines([name for name in known if name in options.engine or not options.engine], problems, mode)
+        for engine in house.find_engines(
+            [name for name in known if name in options.engine or not options.engine], problems, mode
+        )
     ]
     house.find_engines(options.engine, problems)  # for names that are none
     if problems:
@@ -119,18 +170,28 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
             rows = bench_formulation.measure(house.case(STRUT), SEED, bench_formulation.STATES)
             found = bench_engines.with_formulation(found, rows)
     deliver(report(found), found, out=options.out, json=options.json)
-    missing = {entry.engine for entry in found.entries if entry.outcome is Outcome.UNAVAILABLE and entry.engine in options.engine}
-    complain(f"engine {name!r} is named and missing; {how_to_install(name)}" for name in sorted(missing))
+    missing = {
+        entry.engine
+        for entry in found.entries
+        if entry.outcome is Outcome.UNAVAILABLE and entry.engine in options.engine
+    }
+    complain(
+        f"engine {name!r} is named and missing; {how_to_install(name)}" for name in sorted(missing)
+    )
     return Status.FAILED if missing else Status.WITHIN
 
 
 def _with_one_thread(command: str, variables: Sequence[str]) -> int:
-    """The same command, its linear algebra on one thread: it reads how many when it is loaded, so the process is a new one.
+    """The same command, its linear algebra on one thread: it reads how many when it is loaded, so
+    the process is a new one.
 
-    The native engine has one, and threads that wait for each other would make the simulators' times those of the machine's load.
+    The native engine has one, and threads that wait for each other would make the simulators' times
+    those of the machine's load.
     """
     environment = {**os.environ, **dict.fromkeys(variables, "1")}
-    return subprocess.run([sys.executable, "-c", _MAIN, *shlex.split(command)[1:]], env=environment, check=False).returncode
+    return subprocess.run(
+        [sys.executable, "-c", _MAIN, *shlex.split(command)[1:]], env=environment, check=False
+    ).returncode
 
 
 def _destinations(options: argparse.Namespace, name: str) -> list[str]:
@@ -140,7 +201,9 @@ def _destinations(options: argparse.Namespace, name: str) -> list[str]:
 
 
 def _formulation(options: argparse.Namespace, house: House) -> int:
-    """Measure the paper's claims: operation counts (Table 3), round-off of rows, errors of a whole sweep. Needs mpmath."""
+    """Measure the paper's claims: operation counts (Table 3), round-off of rows, errors of a whole
+    sweep. Needs mpmath.
+    """
     from ..report import sections as bench
     from ..studies.paper import formulation as bench_formulation
 

@@ -12,17 +12,33 @@ from .registry import House, Status, whole
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     checking: argparse.ArgumentParser
-    checking = commands.add_parser("check-joint", help="check a joint type of your own", description=_check_joint.__doc__)
+    checking = commands.add_parser(
+        "check-joint", help="check a joint type of your own", description=_check_joint.__doc__
+    )
     checking.set_defaults(do=_check_joint)
-    checking.add_argument("joint", metavar="MODULE:CLASS", help="the class, in a module of this folder or an installed one")
-    checking.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the random poses; default %(default)s")
+    checking.add_argument(
+        "joint",
+        metavar="MODULE:CLASS",
+        help="the class, in a module of this folder or an installed one",
+    )
+    checking.add_argument(
+        "--seed",
+        type=whole(0),
+        default=0,
+        metavar="N",
+        help="of the random poses; default %(default)s",
+    )
 
 
 def _check_joint(options: argparse.Namespace, house: House) -> int:
-    """Check a joint type: its equations against their derivatives, its branches, and a closed loop in every engine."""
+    """Check a joint type: its equations against their derivatives, its branches, and a closed loop
+    in every engine.
+    """
     from ..studies.joint_check.check_joint import check_joint
     from ..studies.joint_check.loading import load_joint
 
-    report = check_joint(load_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)])
+    report = check_joint(
+        load_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)]
+    )
     report.print(sys.stdout)
     return Status.WITHIN if report.passed else Status.DEVIATES

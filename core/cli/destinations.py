@@ -18,7 +18,9 @@ if TYPE_CHECKING:  # what draws is imported where a report is asked for
     from ..report.figure_data import Effort, Past
 
     Trends: TypeAlias = Mapping[str, Sequence[Past]] | None
-    """What the engines made of each case in the runs up to this one; None where that is not known."""
+    """What the engines made of each case in the runs up to this one; None where that is not
+    known.
+    """
 
 REPORT = ("results.json", "report.html")
 """The files of a folder of results."""
@@ -53,21 +55,33 @@ class Destinations:
         return any(getattr(self, each.name) is not None for each in fields(self))
 
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
-        """What cannot be written, found before the work and not after it; makes the folder, for files of these names."""
+        """What cannot be written, found before the work and not after it; makes the folder, for
+        files of these names.
+        """
         found, files = list[str](), list[Named]()
         if self.out is not None:
             try:
                 self.out.mkdir(parents=True, exist_ok=True)
                 files += [("--out", self.out / name) for name in names]
             except OSError as error:
-                found.append(f"--out {self.out}: cannot be made a folder ({error.strerror}); give another one")
-        files += [("--json", self.json), ("--junit", self.junit), ("--markdown", self.markdown), ("--store", self.store)]
+                found.append(
+                    f"--out {self.out}: cannot be made a folder ({error.strerror}); give"
+                    " another one"
+                )
+        files += [
+            ("--json", self.json),
+            ("--junit", self.junit),
+            ("--markdown", self.markdown),
+            ("--store", self.store),
+        ]
         return found + unwritable(files, history)
 
 
 @contextmanager
 def json_only() -> Generator[None]:
-    """Keep standard output for the JSON: what simulators print meanwhile, from Python or from C, goes to standard error."""
+    """Keep standard output for the JSON: what simulators print meanwhile, from Python or from C,
+    goes to standard error.
+    """
     import ctypes
 
     sys.stdout.flush()
@@ -92,12 +106,15 @@ def deliver(
     precision: Mapping[str, Sequence[Effort]] | None = None,
     history: Callable[[], Trends] | None = None,
 ) -> None:
-    """Print the table and write what was asked for; a file that cannot be written does not keep back the others.
+    """Print the table and write what was asked for; a file that cannot be written does not keep
+    back the others.
 
     Args:
-        matrix: print a line for each case, and a column for each engine, rather than a line for each pair.
+        matrix: print a line for each case, and a column for each engine, rather than a line for
+            each pair.
         precision: error against time at several efforts, by case, for the report.
-        history: reads the trends for the report, after all else is written; None where no history is kept.
+        history: reads the trends for the report, after all else is written; None where no history
+            is kept.
     """
     from ..report.matrix import print_matrix, to_markdown
     from ..report.table import print_table
@@ -114,7 +131,9 @@ def deliver(
         contents.append((Path(to.json), encoded))
     if to.out is not None:
         contents.append((to.out / "results.json", encoded))
-        contents.append((to.out / "report.html", lambda path: _write_page(results, path, precision, history)))
+        contents.append(
+            (to.out / "report.html", lambda path: _write_page(results, path, precision, history))
+        )
     problems += write_all(contents)
     # last: who reads it may have gone
     (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
@@ -123,7 +142,10 @@ def deliver(
 
 
 def _write_page(
-    results: Results, path: Path, precision: Mapping[str, Sequence[Effort]] | None, history: Callable[[], Trends] | None
+    results: Results,
+    path: Path,
+    precision: Mapping[str, Sequence[Effort]] | None,
+    history: Callable[[], Trends] | None,
 ) -> None:
     """Write the report, without trends where the history has a fault, which it then says."""
     from ..report.report import WITHOUT_TRENDS, write_report

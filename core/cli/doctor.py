@@ -1,4 +1,6 @@
-"""kincheck doctor: what is installed, what is missing and how to get it, and whether the tool works here."""
+"""kincheck doctor: what is installed, what is missing and how to get it, and whether the tool works
+here.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,20 @@ SAMPLE = "mcpherson_strut"
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     doctor: argparse.ArgumentParser
-    doctor = commands.add_parser("doctor", help="what is installed, what is missing, does it work", description=_doctor.__doc__)
+    doctor = commands.add_parser(
+        "doctor",
+        help="what is installed, what is missing, does it work",
+        description=_doctor.__doc__,
+    )
     doctor.set_defaults(do=_doctor)
-    doctor.add_argument("--json", metavar="FILE", help="write the findings as JSON; - for standard output")
+    doctor.add_argument(
+        "--json", metavar="FILE", help="write the findings as JSON; - for standard output"
+    )
 
 
 def _doctor(options: argparse.Namespace, house: House) -> int:
-    """Say what is installed, what is missing and how to get it, and solve a case with the native engine.
+    """Say what is installed, what is missing and how to get it, and solve a case with the native
+    engine.
 
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
     """
@@ -44,7 +53,9 @@ def _print(found: Examination, json: str | None) -> None:
 
     console = page(json)
     machine, check = found.machine, found.check
-    console.print(f"kincheck {found.kincheck}, Python {machine.python}, {machine.platform}", soft_wrap=True)
+    console.print(
+        f"kincheck {found.kincheck}, Python {machine.python}, {machine.platform}", soft_wrap=True
+    )
     console.print(f"{machine.processor}, {machine.processors} processors", soft_wrap=True)
     table = columns("part", "version", "for", "state")
     for part in found.parts:
@@ -53,16 +64,28 @@ def _print(found: Examination, json: str | None) -> None:
             if part.problem
             else Text("ok", "green")
         )
-        table.add_row(part.name, part.version or "–", part.purpose + " (essential)" * part.essential, state)
+        table.add_row(
+            part.name, part.version or "–", part.purpose + " (essential)" * part.essential, state
+        )
     console.print(table)
     width = f", {machine.vector_width} doubles at a time" if machine.vector_width else ""
     console.print(f"programs run by {machine.executor}{width}", soft_wrap=True)
     state = machine.cache_problem or f"writable, {1e-6 * machine.cache_bytes:.3g} MB now"
     console.print(
-        f"compiled code is kept in {machine.cache}: {state}", soft_wrap=True, style="yellow" if machine.cache_problem else None
+        f"compiled code is kept in {machine.cache}: {state}",
+        soft_wrap=True,
+        style="yellow" if machine.cache_problem else None,
     )
-    measured = "" if check.error is None else f", largest error {check.error:.1e} of {check.tolerance:.0e} allowed"
-    time = "" if check.us_per_step is None else f", {check.us_per_step:.3g} us per sample, loop: {check.loop}"
+    measured = (
+        ""
+        if check.error is None
+        else f", largest error {check.error:.1e} of {check.tolerance:.0e} allowed"
+    )
+    time = (
+        ""
+        if check.us_per_step is None
+        else f", {check.us_per_step:.3g} us per sample, loop: {check.loop}"
+    )
     said = f": {check.message}" if check.message else ""
     console.print(f"self-check {check.case}: {check.outcome}{measured}{time}{said}", soft_wrap=True)
     verdict = "can do its work" if found.able else "cannot do its work: see above"

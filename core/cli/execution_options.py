@@ -20,44 +20,68 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
     def limit(text: str) -> float:
         number = positive(text)
         if number > MOST:
-            raise argparse.ArgumentTypeError(f"{text!r} is more than can be counted, expected {MOST:g} at most; give less")
+            raise argparse.ArgumentTypeError(
+                f"{text!r} is more than can be counted, expected {MOST:g} at most; give less"
+            )
         return number
 
-    group = parser.add_argument_group("isolation", "A pair of case and engine is solved in a worker process of its engine.")
+    group = parser.add_argument_group(
+        "isolation", "A pair of case and engine is solved in a worker process of its engine."
+    )
     group.add_argument(
         "--jobs",
         type=whole(0),
         metavar="N",
-        help="worker processes at a time; default: half the processors; 0 solves in this process, without limits, which is the "
-        "default where only the native engine takes part and no limit is given",
+        help=(
+            "worker processes at a time; default: half the processors; 0 solves in this process,"
+            " without limits, which is the default where only the native engine takes part and no"
+            " limit is given"
+        ),
     )
     group.add_argument(
         "--timeout",
         type=limit,
         metavar="SECONDS",
-        help=f"of a pair, from its start; default {TIMEOUT:g}, a hundred times what the built-in cases take",
+        help=(
+            f"of a pair, from its start; default {TIMEOUT:g}, a hundred times what the built-in"
+            " cases take"
+        ),
     )
     group.add_argument(
         "--memory",
         type=limit,
         metavar="GB",
-        help=f"of a worker process, on Linux; default {MEMORY:g}, sixteen times what the built-in cases take",
+        help=(
+            f"of a worker process, on Linux; default {MEMORY:g}, sixteen times what the built-in"
+            " cases take"
+        ),
     )
-    group.add_argument("--scheduler", metavar="ADDRESS", help="solve on the workers of this dask.distributed scheduler instead")
+    group.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="solve on the workers of this dask.distributed scheduler instead",
+    )
 
 
 def contradictions(options: argparse.Namespace) -> list[str]:
     """What is wrong with the options together."""
     problems: list[str] = []
     if options.scheduler is not None and options.jobs is not None:
-        problems.append("--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs")
+        problems.append(
+            "--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs"
+        )
     if options.jobs == 0 and (options.timeout or options.memory):
-        problems.append("--jobs 0 solves in this process, which cannot be limited; leave out --timeout and --memory, or --jobs")
+        problems.append(
+            "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and"
+            " --memory, or --jobs"
+        )
     return problems
 
 
 def unreachable(options: argparse.Namespace) -> list[str]:
-    """Why there is no cluster, where one is asked for: found before the work, and after all other problems, for it takes time."""
+    """Why there is no cluster, where one is asked for: found before the work, and after all other
+    problems, for it takes time.
+    """
     if options.scheduler is None:
         return []
     from ..harness.workers.distributed import ClusterError, connected, loaded
@@ -82,7 +106,10 @@ def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solv
         return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
     jobs: int | None = options.jobs
     if jobs is None:
-        # a process would cost the native engine more time than most cases do, and it has no foreign code to be kept apart
-        ours = all(engine.name == NATIVE for engine in engines) and not (options.timeout or options.memory)
+        # a process would cost the native engine more time than most cases do, and it has no foreign
+        # code to be kept apart
+        ours = all(engine.name == NATIVE for engine in engines) and not (
+            options.timeout or options.memory
+        )
         jobs = 0 if ours else default_jobs()
     return (in_workers(jobs, limits), {"jobs": jobs, **limited}) if jobs else (here, {"jobs": 0})

@@ -14,25 +14,41 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     explaining: argparse.ArgumentParser
     explaining = commands.add_parser(
-        "explain", help="diagnose a case: freedom, conditioning, tolerances", description=_explain.__doc__
+        "explain",
+        help="diagnose a case: freedom, conditioning, tolerances",
+        description=_explain.__doc__,
     )
     explaining.set_defaults(do=_explain)
-    explaining.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
     explaining.add_argument(
-        "--samples", type=whole(1), default=41, metavar="N", help="of the sweep to look at; default %(default)s"
+        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
     )
     explaining.add_argument(
-        "--tol", type=positive, default=TOL, metavar="X", help=f"residual that engines may leave [m or -]; default {TOL:g}"
+        "--samples",
+        type=whole(1),
+        default=41,
+        metavar="N",
+        help="of the sweep to look at; default %(default)s",
     )
-    explaining.add_argument("--json", metavar="FILE", help="write the diagnosis as JSON; - for standard output")
+    explaining.add_argument(
+        "--tol",
+        type=positive,
+        default=TOL,
+        metavar="X",
+        help=f"residual that engines may leave [m or -]; default {TOL:g}",
+    )
+    explaining.add_argument(
+        "--json", metavar="FILE", help="write the diagnosis as JSON; - for standard output"
+    )
     import_options.add_options(explaining)
 
 
 def _explain(options: argparse.Namespace, house: House) -> int:
-    """Diagnose a case: degrees of freedom, redundant and contradictory rows by name, conditioning along the sweep, tolerances that
-    follow from it, sensitivity of the outputs to hardpoints, and what the native engine computes.
+    """Diagnose a case: degrees of freedom, redundant and contradictory rows by name, conditioning
+    along the sweep, tolerances that follow from it, sensitivity of the outputs to hardpoints, and
+    what the native engine computes.
 
-    Exit status: 0 it can be solved, 1 it contradicts itself or is not determined, 2 the tool could not do its work.
+    Exit status: 0 it can be solved, 1 it contradicts itself or is not determined, 2 the tool could
+    not do its work.
     """
     from ..report.terminal import page, write_json
     from ..studies.diagnosis import diagnose

@@ -14,7 +14,9 @@ from . import import_options
 from .registry import House, Status
 
 FORMATS = {"mjcf": "MuJoCo", "exudyn": "a Python script", "urdf": "Pinocchio"}
-"""The formats that the adapters write, for help texts: those are made before adapters are loaded. A test has them equal."""
+"""The formats that the adapters write, for help texts: those are made before adapters are loaded. A
+test has them equal.
+"""
 
 
 def formats() -> str:
@@ -26,16 +28,25 @@ def formats() -> str:
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     export: argparse.ArgumentParser
-    export = commands.add_parser("export", help="write a mechanism for a simulator", description=_export.__doc__)
+    export = commands.add_parser(
+        "export", help="write a mechanism for a simulator", description=_export.__doc__
+    )
     export.set_defaults(do=_export)
-    export.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
+    export.add_argument(
+        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+    )
     export.add_argument("--to", required=True, metavar="FORMAT", help=formats())
-    export.add_argument("--out", type=Path, metavar="FILE", help="default: the case's name, in this folder")
+    export.add_argument(
+        "--out", type=Path, metavar="FILE", help="default: the case's name, in this folder"
+    )
     export.add_argument(
         "--at",
         type=float,
         metavar="VALUE",
-        help="start there: a value of the swept driver as the sweep has it, in SI units; default: the design position",
+        help=(
+            "start there: a value of the swept driver as the sweep has it, in SI units; default:"
+            " the design position"
+        ),
     )
     import_options.add_options(export)
 
@@ -43,7 +54,8 @@ def add(commands: Any) -> None:
 def _export(options: argparse.Namespace, house: House) -> int:
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
-    What the format has no place for goes into a second file beside the first: the constraints of a URDF.
+    What the format has no place for goes into a second file beside the first: the constraints of a
+    URDF.
     """
     from ..case.io.model_writer import written
 
@@ -55,20 +67,27 @@ def _export(options: argparse.Namespace, house: House) -> int:
     return Status.WITHIN
 
 
-def keep_texts(texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None) -> None:
-    """Write texts, given by the endings of their files, beside each other, and print the files' names.
+def keep_texts(
+    texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None
+) -> None:
+    """Write texts, given by the endings of their files, beside each other, and print the files'
+    names.
 
     Args:
         json: where the JSON is written; "-" for standard output, which then has nothing else.
 
     Raises:
-        KincheckError: a file cannot be written, would be over the JSON, or without `out` over what is there.
+        KincheckError: a file cannot be written, would be over the JSON, or without `out` over what
+            is there.
     """
     from ..case.io.atomic_files import unwritable, write
 
     first = next(iter(texts))
     main: Path = out or Path(file_name(name) + first)
-    files = {main if ending == first else main.with_suffix(ending): text for ending, text in texts.items()}
+    files = {
+        main if ending == first else main.with_suffix(ending): text
+        for ending, text in texts.items()
+    }
     for file in files:
         if out is None and file.exists():
             raise KincheckError(f"{file} is there already; name a file with --out to write over it")

@@ -24,17 +24,54 @@ LAST = 20  # runs: what a terminal shows at once
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     history: argparse.ArgumentParser
-    history = commands.add_parser("history", help="list the runs kept, their trends and steps", description=_history.__doc__)
+    history = commands.add_parser(
+        "history", help="list the runs kept, their trends and steps", description=_history.__doc__
+    )
     history.set_defaults(do=_history)
     add_history(history, "the history")
-    history.add_argument("--case", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these cases only")
-    history.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="trends of these engines only")
-    history.add_argument("--last", type=whole(0), default=LAST, metavar="N", help="the latest N runs; default %(default)s; 0: all")
     history.add_argument(
-        "--remove", type=whole(1), nargs="+", default=[], metavar="RUN", help="remove these runs, one that is damaged for instance"
+        "--case",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="trends of these cases only",
     )
-    history.add_argument("--plot", type=Path, metavar="FILE.html", help="draw errors and times over the runs, as a page")
-    history.add_argument("--export", type=Path, metavar="FILE", help="write all runs as one table: FILE.parquet or FILE.csv")
+    history.add_argument(
+        "--engine",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="trends of these engines only",
+    )
+    history.add_argument(
+        "--last",
+        type=whole(0),
+        default=LAST,
+        metavar="N",
+        help="the latest N runs; default %(default)s; 0: all",
+    )
+    history.add_argument(
+        "--remove",
+        type=whole(1),
+        nargs="+",
+        default=[],
+        metavar="RUN",
+        help="remove these runs, one that is damaged for instance",
+    )
+    history.add_argument(
+        "--plot",
+        type=Path,
+        metavar="FILE.html",
+        help="draw errors and times over the runs, as a page",
+    )
+    history.add_argument(
+        "--export",
+        type=Path,
+        metavar="FILE",
+        help="write all runs as one table: FILE.parquet or FILE.csv",
+    )
 
 
 def add_history(parser: argparse.ArgumentParser, what: str) -> None:
@@ -44,19 +81,26 @@ def add_history(parser: argparse.ArgumentParser, what: str) -> None:
         type=Path,
         metavar="FILE",
         default=os.environ.get(HISTORY) or None,
-        help=f"{what}, which kincheck run --history wrote; default: the environment variable {HISTORY}",
+        help=(
+            f"{what}, which kincheck run --history wrote; default: the environment variable"
+            f" {HISTORY}"
+        ),
     )
 
 
 def _history(options: argparse.Namespace, house: House) -> int:
-    """List the runs, the latest first; for a case or an engine, its errors and times in them and the steps in these."""
+    """List the runs, the latest first; for a case or an engine, its errors and times in them and
+    the steps in these.
+    """
     from ..case.io.atomic_files import unwritable
     from ..history.queries import read
     from ..history.store import Store
 
     if options.history is None:
         raise KincheckError(f"history: which file? give --history FILE, or set {HISTORY}")
-    if problems := unwritable([("--plot", options.plot), ("--export", options.export)], options.history):
+    if problems := unwritable(
+        [("--plot", options.plot), ("--export", options.export)], options.history
+    ):
         raise KincheckError("\n".join(problems))
     with Store(Path(options.history), writable=bool(options.remove)) as store:
         for run in options.remove:
@@ -72,8 +116,15 @@ def _history(options: argparse.Namespace, house: House) -> int:
         if options.plot is not None:
             from ..report.history_plot import write_plot
 
-            write_plot(history, options.plot, title=f"{Path(options.history).name}: errors and times over the runs")
-            print(f"{options.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)} runs")
+            write_plot(
+                history,
+                options.plot,
+                title=f"{Path(options.history).name}: errors and times over the runs",
+            )
+            print(
+                f"{options.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)}"
+                " runs"
+            )
         if options.export is not None:
             from ..history.export import export
 
@@ -137,14 +188,30 @@ def _print_trends(history: History) -> None:
 
     console = page(None)
     for (case, engine, mode), entries in history.pairs.items():
-        table = columns("run", "version", "outcome", ">error m", ">us/step", title=f"{case} · {product(engine, mode)}")
+        table = columns(
+            "run",
+            "version",
+            "outcome",
+            ">error m",
+            ">us/step",
+            title=f"{case} · {product(engine, mode)}",
+        )
         for entry in entries:
             row = history.runs[entry.run]
             error = largest_length(entry, case, row)
-            table.add_row(run_name(row), entry.version or "–", entry.outcome.shown, number(error), number(entry.us_per_step))
+            table.add_row(
+                run_name(row),
+                entry.version or "–",
+                entry.outcome.shown,
+                number(error),
+                number(entry.us_per_step),
+            )
         console.print(table)
     for step in steps(history):
         sign = "worse" if step.worse else "better"
-        console.print(f"{sign}: {step.case} · {product(step.engine, step.mode)}: {step_says(step)}", soft_wrap=True)
+        console.print(
+            f"{sign}: {step.case} · {product(step.engine, step.mode)}: {step_says(step)}",
+            soft_wrap=True,
+        )
     if not history.pairs:
         print("no runs of these yet")

@@ -1,4 +1,6 @@
-"""A run's place in the history: kept while it is made, and drawn as trends in the end. A history that fails costs no result."""
+"""A run's place in the history: kept while it is made, and drawn as trends in the end. A history
+that fails costs no result.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,15 @@ if TYPE_CHECKING:
 
 
 def keeping(
-    options: argparse.Namespace, cases: Sequence[Case], engines: Sequence[Engine], unread: Sequence[str], settings: dict[str, Any]
+    options: argparse.Namespace,
+    cases: Sequence[Case],
+    engines: Sequence[Engine],
+    unread: Sequence[str],
+    settings: dict[str, Any],
 ) -> tuple[Keeping | None, list[str]]:
-    """Return the run in its history, None without one; and why it cannot be kept there, in which case it goes on without."""
+    """Return the run in its history, None without one; and why it cannot be kept there, in which
+    case it goes on without.
+    """
     if options.history is None:
         return None, []
     from ..history.run_recorder import keep
@@ -42,7 +50,9 @@ def keeping(
 
 
 def past(keeping: Keeping, problems: list[str]) -> Trends:
-    """Return the runs up to this one by case, for its report; what cannot be read of them is added to the problems."""
+    """Return the runs up to this one by case, for its report; what cannot be read of them is added
+    to the problems.
+    """
     from ..history.queries import NIGHTS, read
     from ..history.store import HistoryError, Store
     from ..report.trends import trends

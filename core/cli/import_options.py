@@ -1,4 +1,6 @@
-"""Options of commands that take files: joint types of one's own, and what files of other tools do not say."""
+"""Options of commands that take files: joint types of one's own, and what files of other tools do
+not say.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +20,33 @@ if TYPE_CHECKING:
 def add_options(command: argparse.ArgumentParser) -> None:
     """Add the options to a command's parser."""
     add_joint_types(command)
-    points = command.add_argument_group("hardpoints", "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv).")
-    points.add_argument(
-        "--template", metavar="NAME", help="mcpherson, double_wishbone or five_link, where the file does not say it"
+    points = command.add_argument_group(
+        "hardpoints", "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv)."
     )
-    points.add_argument("--units", metavar="UNIT", help="mm, m, ... of the coordinates, where the file does not say it")
+    points.add_argument(
+        "--template",
+        metavar="NAME",
+        help="mcpherson, double_wishbone or five_link, where the file does not say it",
+    )
+    points.add_argument(
+        "--units",
+        metavar="UNIT",
+        help="mm, m, ... of the coordinates, where the file does not say it",
+    )
     points.add_argument(
         "--axes",
         metavar="X,Y,Z",
-        help="where x, y and z point, where the file does not say it: forward,left,up or rearward,right,up, ...",
+        help=(
+            "where x, y and z point, where the file does not say it: forward,left,up or"
+            " rearward,right,up, ..."
+        ),
     )
-    points.add_argument("--travel", metavar="M[:SAMPLES]", help="of the wheel, up and down [m]; default 0.05:41")
-    model = command.add_argument_group("models", "Models of MuJoCo (.xml); nothing in them says how they are driven.")
+    points.add_argument(
+        "--travel", metavar="M[:SAMPLES]", help="of the wheel, up and down [m]; default 0.05:41"
+    )
+    model = command.add_argument_group(
+        "models", "Models of MuJoCo (.xml); nothing in them says how they are driven."
+    )
     model.add_argument(
         "--drive",
         action="append",
@@ -38,12 +55,19 @@ def add_options(command: argparse.ArgumentParser) -> None:
         help="the joint that moves [rad or m, as qpos]",
     )
     model.add_argument(
-        "--hold", nargs="+", action="extend", default=[], metavar="NAME", help="joints, or free bodies, that stay where they are"
+        "--hold",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="joints, or free bodies, that stay where they are",
     )
 
 
 def return_cases(options: argparse.Namespace) -> None:
-    """Give back the files that --hold, which takes several names, has swallowed: `run --hold knee hip model.xml`."""
+    """Give back the files that --hold, which takes several names, has swallowed: `run --hold knee
+    hip model.xml`.
+    """
     files = [name for name in options.hold if Path(name).is_file()]
     options.case += files
     options.hold = [name for name in options.hold if name not in files]
@@ -51,7 +75,14 @@ def return_cases(options: argparse.Namespace) -> None:
 
 def supplied(options: argparse.Namespace) -> Supplied:
     """What the options say."""
-    return Supplied(options.template, options.units, options.axes, options.travel, (*options.drive,), (*options.hold,))
+    return Supplied(
+        options.template,
+        options.units,
+        options.axes,
+        options.travel,
+        (*options.drive,),
+        (*options.hold,),
+    )
 
 
 def tell_left_out(cases: Iterable[Case]) -> None:

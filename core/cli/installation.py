@@ -1,4 +1,6 @@
-"""What is installed, what is missing and how to get it, and whether the tool can do its work here."""
+"""What is installed, what is missing and how to get it, and whether the tool can do its work
+here.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +27,16 @@ from ..program.llvm import compiler
 from ..report.progress import how_to_install
 
 SCHEMA = "kincheck-doctor/1"
-# Extra of the package -> what it is for, but for those of engines. What the package itself requires is essential.
+# Extra of the package -> what it is for, but for those of engines. What the package itself requires
+# is essential.
 PURPOSES = {
     "fast": "machine code",
     "proofs": "proved references",
     "parquet": "history as Parquet",
     "distributed": "runs on many machines",
 }
-# What is imported of distributions that are not imported by their own name; of a simulator's it is the engine's name.
+# What is imported of distributions that are not imported by their own name; of a simulator's it is
+# the engine's name.
 MODULES = {"python-flint": "flint", "llvmlite": "llvmlite.binding"}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -57,7 +61,9 @@ class Part(msgspec.Struct, frozen=True):
 
 
 class Machine(msgspec.Struct, frozen=True):
-    """What it runs on. vector_width: doubles that machine code computes at a time; null without it."""
+    """What it runs on. vector_width: doubles that machine code computes at a time; null without
+    it.
+    """
 
     python: str
     platform: str
@@ -71,7 +77,9 @@ class Machine(msgspec.Struct, frozen=True):
 
 
 class Check(msgspec.Struct, frozen=True):
-    """A case solved here and now; error: the largest against its reference [its output's unit], with the tolerance."""
+    """A case solved here and now; error: the largest against its reference [its output's unit],
+    with the tolerance.
+    """
 
     case: str
     outcome: str
@@ -93,12 +101,18 @@ class Examination(msgspec.Struct, frozen=True):
 
     @property
     def able(self) -> bool:
-        """Whether the tool can do its work: nothing essential is missing, and the native engine is right."""
-        return self.check.outcome == Outcome.PASS and not any(part.essential and part.problem for part in self.parts)
+        """Whether the tool can do its work: nothing essential is missing, and the native engine is
+        right.
+        """
+        return self.check.outcome == Outcome.PASS and not any(
+            part.essential and part.problem for part in self.parts
+        )
 
 
 def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) -> Examination:
-    """Look at the installation, of the engines of these names too, and solve a case with the native engine."""
+    """Look at the installation, of the engines of these names too, and solve a case with the native
+    engine.
+    """
     problem = _cache_problem()
     about = circumstances([], started=datetime.now(UTC), tol=tol, command="kincheck doctor")
     machine = Machine(
@@ -106,13 +120,19 @@ def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) ->
         about["platform"],
         about["processor"],
         os.cpu_count() or 1,
-        "machine code" if compiler.available() else "numpy: with llvmlite it is some fifty times faster",
+        (
+            "machine code"
+            if compiler.available()
+            else "numpy: with llvmlite it is some fifty times faster"
+        ),
         compiler.vector_width() if compiler.available() else None,
         str(disk_cache.folder() or "nowhere"),
         0 if problem else disk_cache.size(),
         problem,
     )
-    return Examination(SCHEMA, about["kincheck"], parts(engines), machine, _check(case, native, tol))
+    return Examination(
+        SCHEMA, about["kincheck"], parts(engines), machine, _check(case, native, tol)
+    )
 
 
 def parts(engines: Collection[str]) -> list[Part]:
@@ -131,12 +151,28 @@ def parts(engines: Collection[str]) -> list[Part]:
             if group in engines:
                 modules[name] = group
             version = _version(name)
-            remedy = how_to_install(group) if group else f"pip install '{requirement.split(';')[0].strip()}'"
+            remedy = (
+                how_to_install(group)
+                if group
+                else f"pip install '{requirement.split(';')[0].strip()}'"
+            )
             problem = "not installed" if version is None else ""
-            found.append(Part(name, version, purposes.get(group, "kincheck"), not extra, problem, remedy if problem else ""))
+            found.append(
+                Part(
+                    name,
+                    version,
+                    purposes.get(group, "kincheck"),
+                    not extra,
+                    problem,
+                    remedy if problem else "",
+                )
+            )
     browser = next((path for path in map(shutil.which, BROWSERS) if path), None)
     missing = ("", "") if browser else ("not installed", "apt install chromium")
-    return [*_imported(found, modules), Part("chromium", browser, "tests of the report", False, *missing)]
+    return [
+        *_imported(found, modules),
+        Part("chromium", browser, "tests of the report", False, *missing),
+    ]
 
 
 def _version(name: str) -> str | None:
@@ -147,7 +183,9 @@ def _version(name: str) -> str | None:
 
 
 def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
-    """The parts, with what goes wrong when their modules are imported, in processes of their own: a broken library may end one."""
+    """The parts, with what goes wrong when their modules are imported, in processes of their own: a
+    broken library may end one.
+    """
     running = {
         part.name: subprocess.Popen(
             [sys.executable, "-c", f"import {modules.get(part.name, part.name)}"],
@@ -176,12 +214,18 @@ def _ended(importing: subprocess.Popen[str]) -> str:
         return f"its import does not end within {PATIENCE:g} s"
     if importing.returncode == 0:
         return ""
-    return f"cannot be imported: {said[-1] if said else f'the process ended with status {importing.returncode}'}"
+    return (
+        "cannot be imported:"
+        f" {said[-1] if said else f'the process ended with status {importing.returncode}'}"
+    )
 
 
 def _cache_problem() -> str:
     """Why compiled code cannot be kept; empty where it can."""
-    folder, remedy = disk_cache.folder(), "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is"
+    folder, remedy = (
+        disk_cache.folder(),
+        "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is",
+    )
     if folder is None:
         return f"the user has no home directory; {remedy}"
     try:
@@ -195,7 +239,9 @@ def _cache_problem() -> str:
 def _check(case: Case, native: Engine, tol: float) -> Check:
     (record,) = run([case], [native], tol=tol).records
     error, tolerance = _largest(record)
-    return Check(case.name, record.outcome, record.message, error, tolerance, record.us_per_step, record.loop)
+    return Check(
+        case.name, record.outcome, record.message, error, tolerance, record.us_per_step, record.loop
+    )
 
 
 def _largest(record: Record) -> tuple[float | None, float | None]:

@@ -1,4 +1,6 @@
-"""The command line. The only place that knows adapters and cases; they, and all that is slow to import, are loaded on use."""
+"""The command line. The only place that knows adapters and cases; they, and all that is slow to
+import, are loaded on use.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ if TYPE_CHECKING:
     from .registry import House
 
 FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
-"""What a standard output that takes no more says: files that an option names have messages of their own."""
+"""What a standard output that takes no more says: files that an option names have messages of their
+own.
+"""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,7 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         interrupt, status = raised, 0
     if interrupt is None:
         return status
-    if status not in (ended := (status_of(KeyboardInterrupt()), status_of(Terminated()))):  # else the command has said it
+    # else the command has said it
+    if status not in (ended := (status_of(KeyboardInterrupt()), status_of(Terminated()))):
         print(f"kincheck: {words_of(interrupt)}", file=sys.stderr)
     return status if status in ended else status_of(interrupt)
 
@@ -48,7 +53,9 @@ def _done(argv: list[str]) -> int:
     from .registry import Status
 
     try:
-        options = _parser(argv).parse_args(argv, argparse.Namespace(command=shlex.join(["kincheck", *argv])))
+        options = _parser(argv).parse_args(
+            argv, argparse.Namespace(command=shlex.join(["kincheck", *argv]))
+        )
     except SystemExit as end:  # argparse has said why
         return int(end.code or 0)
     try:
@@ -60,14 +67,26 @@ def _done(argv: list[str]) -> int:
         return _printed(int(options.do(options, house())))
     except KincheckError as error:
         complain(str(error).splitlines())
-    except SystemExit as end:  # an engine's, or a module's that was named: ours come from the parser alone
+    except (
+        SystemExit
+    ) as end:  # an engine's, or a module's that was named: ours come from the parser alone
         where = traceback.extract_tb(end.__traceback__)[-1]
-        complain([f"{where.filename}, line {where.lineno}, ended the program with status {end.code!r}; mend it, or leave it out"])
+        complain(
+            [
+                f"{where.filename}, line {where.lineno}, ended the program with status"
+                f" {end.code!r}; mend it, or leave it out"
+            ]
+        )
     except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
         _print_no_more()
     except OSError as error:
         if error.errno in FULL and error.filename is None:
-            complain([f"standard output cannot be written ({error.strerror}); files that were asked for are"])
+            complain(
+                [
+                    f"standard output cannot be written ({error.strerror}); files that were asked"
+                    " for are"
+                ]
+            )
             _print_no_more()
         else:
             traceback.print_exc()
@@ -77,7 +96,9 @@ def _done(argv: list[str]) -> int:
 
 
 def _be_able_to_print() -> None:
-    """Print what an encoding lacks as question marks: no finished run shall end at a dash. What is closed has nobody to read it."""
+    """Print what an encoding lacks as question marks: no finished run shall end at a dash. What is
+    closed has nobody to read it.
+    """
     for name in ("stdout", "stderr"):
         stream: TextIO | None = getattr(sys, name)
         if stream is None:
@@ -87,7 +108,9 @@ def _be_able_to_print() -> None:
 
 
 def _printed(status: int) -> int:
-    """The status of a command that has come to its end, when all it said is out; that its reader has gone is no failure."""
+    """The status of a command that has come to its end, when all it said is out; that its reader
+    has gone is no failure.
+    """
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -107,12 +130,23 @@ def house() -> House:
     from .registry import House
 
     writers = adapters.WRITERS, adapters.writer
-    return House(tuple(adapters.ENGINES), adapters.engine, cases.names, cases.load, *writers, tuple(adapters.SIMULATIONS))
+    return House(
+        tuple(adapters.ENGINES),
+        adapters.engine,
+        cases.names,
+        cases.load,
+        *writers,
+        tuple(adapters.SIMULATIONS),
+    )
 
 
 def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
-    """Of the command that the arguments begin with; of all, where they begin with none: to make each takes a millisecond."""
-    parser = argparse.ArgumentParser(prog="kincheck", description="Cross-validation of the kinematics of multibody systems.")
+    """Of the command that the arguments begin with; of all, where they begin with none: to make
+    each takes a millisecond.
+    """
+    parser = argparse.ArgumentParser(
+        prog="kincheck", description="Cross-validation of the kinematics of multibody systems."
+    )
     parser.add_argument("--version", action="version", version=f"kincheck {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     named = [name for name in COMMANDS if argv and argv[0] == name.replace("_", "-")]

@@ -3,9 +3,10 @@
     pytest --kincheck                                   # every engine that is installed
     pytest --kincheck --kincheck-engine mujoco          # this one only, and it must be there
 
-Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails where an output is out of tolerance or
-an engine breaks, and is skipped where an engine is missing, cannot express the case, or where nothing was compared (not judged).
-pytest loads this file every time: all that is slow to import waits for --kincheck.
+Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails where an
+output is out of tolerance or an engine breaks, and is skipped where an engine is missing, cannot
+express the case, or where nothing was compared (not judged). pytest loads this file every time: all
+that is slow to import waits for --kincheck.
 """
 
 from __future__ import annotations
@@ -25,20 +26,29 @@ if TYPE_CHECKING:
     from .registry import House
 
 SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
-"""What makes a TOML or JSON file a case file, of whatever version: an unknown one is to be told, not passed by."""
+"""What makes a TOML or JSON file a case file, of whatever version: an unknown one is to be told,
+not passed by.
+"""
 SUFFIXES = ".toml", ".json"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("kincheck", "kinematic case files as tests")
-    group.addoption("--kincheck", action="store_true", help="collect case files (TOML or JSON, schema kincheck-case/1) as tests")
+    group.addoption(
+        "--kincheck",
+        action="store_true",
+        help="collect case files (TOML or JSON, schema kincheck-case/1) as tests",
+    )
     group.addoption(
         "--kincheck-engine",
         action="append",
         default=[],
         metavar="NAME",
-        help="an engine to solve them with, which must be installed; may be repeated; default: all, skipped where not installed",
+        help=(
+            "an engine to solve them with, which must be installed; may be repeated; default: all,"
+            " skipped where not installed"
+        ),
     )
 
 
@@ -56,7 +66,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Take what is a case file."""
-    if parent.config.getoption("--kincheck") and file_path.suffix.lower() in SUFFIXES and SCHEMA.search(file_path.read_bytes()):
+    if (
+        parent.config.getoption("--kincheck")
+        and file_path.suffix.lower() in SUFFIXES
+        and SCHEMA.search(file_path.read_bytes())
+    ):
         return CaseFile.from_parent(parent, path=file_path)  # pyright: ignore[reportUnknownMemberType]
     return None
 
@@ -71,7 +85,9 @@ class CaseFile(pytest.File):
     """A case file: a test for each engine."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """The engines' tests; a file that makes no sense is an error of the collection, with its message."""
+        """The engines' tests; a file that makes no sense is an error of the collection, with its
+        message.
+        """
         from ..errors import KincheckError
 
         house = _house()
@@ -81,7 +97,9 @@ class CaseFile(pytest.File):
             raise self.CollectError(str(error)) from None
         required = _required(self.config)
         for engine in house.find_engines(required or house.engines, []):
-            yield EngineTest.from_parent(self, name=engine.name, case=case, engine=engine, required=bool(required))  # pyright: ignore[reportUnknownMemberType]
+            yield EngineTest.from_parent(
+                self, name=engine.name, case=case, engine=engine, required=bool(required)
+            )  # pyright: ignore[reportUnknownMemberType]
 
 
 class EngineTest(pytest.Item):
@@ -116,7 +134,9 @@ class EngineTest(pytest.Item):
         return super().repr_failure(excinfo)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """The file, and the test in it: pytest prints them as the id that it takes, FILE::ENGINE."""
+        """The file, and the test in it: pytest prints them as the id that it takes,
+        FILE::ENGINE.
+        """
         return self.path, None, self.name
 
 
@@ -125,7 +145,9 @@ class CaseFailedError(Exception):
 
 
 def _solved(case: Case, engine: Engine) -> Record:
-    """The record of the pair; a simulator is kept in a process of its own: it may take the tests down with it."""
+    """The record of the pair; a simulator is kept in a process of its own: it may take the tests
+    down with it.
+    """
     from ..harness.execution import here
     from ..harness.resource_limits import Limits
     from ..harness.run import NATIVE, run
@@ -134,7 +156,13 @@ def _solved(case: Case, engine: Engine) -> Record:
 
     native = engine.name == NATIVE
     solver = here if native else in_workers(1, Limits())
-    (record,) = run([case], [engine], tol=TOL, baseline=None if native else _house().engine(NATIVE), solver=solver).records
+    (record,) = run(
+        [case],
+        [engine],
+        tol=TOL,
+        baseline=None if native else _house().engine(NATIVE),
+        solver=solver,
+    ).records
     return record
 
 

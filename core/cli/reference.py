@@ -1,4 +1,6 @@
-"""kincheck reference: prove the samples of cases, write them as references, and measure the native engine by them."""
+"""kincheck reference: prove the samples of cases, write them as references, and measure the native
+engine by them.
+"""
 
 from __future__ import annotations
 
@@ -26,30 +28,47 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     proving: argparse.ArgumentParser
     proving = commands.add_parser(
-        "reference", help="prove the samples of cases to any number of digits", description=_prove.__doc__
+        "reference",
+        help="prove the samples of cases to any number of digits",
+        description=_prove.__doc__,
     )
     proving.set_defaults(do=_prove)
     proving.add_argument(
-        "case", nargs="*", metavar="CASE", help="built-in name, or path to a case file; default: all built-in cases"
+        "case",
+        nargs="*",
+        metavar="CASE",
+        help="built-in name, or path to a case file; default: all built-in cases",
     )
     add_joint_types(proving)
     proving.add_argument(
-        "--out", type=Path, metavar="DIR", help="write CASE.reference.json there, for run --reference or a case file"
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="write CASE.reference.json there, for run --reference or a case file",
     )
     proving.add_argument(
-        "--digits", type=whole(FEWEST, MOST), default=DIGITS, metavar="N", help="outputs to 10^-N; default %(default)s"
+        "--digits",
+        type=whole(FEWEST, MOST),
+        default=DIGITS,
+        metavar="N",
+        help="outputs to 10^-N; default %(default)s",
     )
     proving.add_argument(
         "--decimal",
         action="store_true",
-        help="take the numbers of a case as the decimals that print them, not as the doubles that engines are given",
+        help=(
+            "take the numbers of a case as the decimals that print them, not as the doubles that"
+            " engines are given"
+        ),
     )
 
 
 def _prove(options: argparse.Namespace, house: House) -> int:
-    """Prove that exactly one solution is near each sample of the native engine, and enclose its outputs.
+    """Prove that exactly one solution is near each sample of the native engine, and enclose its
+    outputs.
 
-    Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not do its work.
+    Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not do
+    its work.
     """
     from ..case.io.atomic_files import unwritable, write
     from ..harness.record import to_json
@@ -62,10 +81,14 @@ def _prove(options: argparse.Namespace, house: House) -> int:
         try:
             options.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            problems.append(f"--out {options.out}: cannot be made a folder ({error.strerror}); give another one")
+            problems.append(
+                f"--out {options.out}: cannot be made a folder ({error.strerror}); give another one"
+            )
     names = [f"{file_name(case.name)}.reference.json" for case in cases]
     if options.out is not None:
-        problems += unwritable((case.name, options.out / name) for case, name in zip(cases, names, strict=True))
+        problems += unwritable(
+            (case.name, options.out / name) for case, name in zip(cases, names, strict=True)
+        )
     if problems:
         raise KincheckError("\n".join(problems))
     complete = True
@@ -84,24 +107,48 @@ def _lines(found: Reference, errors: list[NativeError]) -> list[str]:
     count, proved = len(found.samples), [sample for sample in found.samples if sample.proved]
     each = 1e3 * found.seconds / max(1, count)
     lines = [
-        f"{found.case}: {len(proved)} of {count} samples proved to 1e-{found.digits}, {found.seconds:.2g} s, {each:.2g} ms each"
+        f"{found.case}: {len(proved)} of {count} samples proved to 1e-{found.digits},"
+        f" {found.seconds:.2g} s, {each:.2g} ms each"
     ]
     if proved:
-        lines.append(f"  each solution is the only one within {min(s.alone or 0.0 for s in proved):.2g} of the mechanism's size")
+        lines.append(
+            f"  each solution is the only one within {min(s.alone or 0.0 for s in proved):.2g} of"
+            " the mechanism's size"
+        )
     if found.redundant:
-        worst, contradicted = max((s.redundant or 0.0 for s in proved), default=0.0), sum(s.contradicted > 0 for s in proved)
-        closes = f"; not zero at {contradicted} samples: the geometry, as rounded, closes only without them" if contradicted else ""
-        lines.append(f"  {len(found.redundant)} redundant rows, {worst:.1e} or less at the solutions{closes}")
-    lines += [f"  {name}: no proof: {each.reason}" for name, each in found.outputs.items() if each.reason]
+        worst, contradicted = (
+            max((s.redundant or 0.0 for s in proved), default=0.0),
+            sum(s.contradicted > 0 for s in proved),
+        )
+        closes = (
+            f"; not zero at {contradicted} samples: the geometry, as rounded, closes only without"
+            " them"
+            if contradicted
+            else ""
+        )
+        lines.append(
+            f"  {len(found.redundant)} redundant rows, {worst:.1e} or less at the solutions{closes}"
+        )
+    lines += [
+        f"  {name}: no proof: {each.reason}" for name, each in found.outputs.items() if each.reason
+    ]
     lines += _missing(found)
-    lines += [f"  signs: {words}" for words in dict.fromkeys(each.signs for each in found.outputs.values()) if words]
+    lines += [
+        f"  signs: {words}"
+        for words in dict.fromkeys(each.signs for each in found.outputs.values())
+        if words
+    ]
     if errors:
         wide = max(len(error.output) for error in errors)
         heads = ("native error", *QUANTITIES)
         lines.append(f"  {heads[0]:{wide}}" + "".join(f"  {head:>20}" for head in heads[1:]))
         for error in errors:
             cells = (_cell(*pair) for pair in zip(error.largest, error.ulps, strict=True))
-            lines.append(f"  {error.output:{wide}}" + "".join(f"  {cell:>20}" for cell in cells) + f"  {error.unit}")
+            lines.append(
+                f"  {error.output:{wide}}"
+                + "".join(f"  {cell:>20}" for cell in cells)
+                + f"  {error.unit}"
+            )
     return lines
 
 
@@ -115,5 +162,12 @@ def _missing(found: Reference) -> list[str]:
     """The samples without a proof."""
     name, values = next(iter(found.driver.items()))
     missing = [(k, sample.reason) for k, sample in enumerate(found.samples) if not sample.proved]
-    lines = [f"  sample {k} ({name} = {values[k]:.9g}) not proved: {reason}" for k, reason in missing[:NAMED]]
-    return lines + ([f"  and {len(missing) - NAMED} more; --out writes the reason for each"] if len(missing) > NAMED else [])
+    lines = [
+        f"  sample {k} ({name} = {values[k]:.9g}) not proved: {reason}"
+        for k, reason in missing[:NAMED]
+    ]
+    return lines + (
+        [f"  and {len(missing) - NAMED} more; --out writes the reason for each"]
+        if len(missing) > NAMED
+        else []
+    )

@@ -1,4 +1,6 @@
-"""What commands know of the house they work in, and how they find the cases and engines that a user has named."""
+"""What commands know of the house they work in, and how they find the cases and engines that a user
+has named.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ if TYPE_CHECKING:
 
 
 class Status(IntEnum):
-    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do its work, or part of it.
+    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do
+    its work, or part of it.
 
     A command that is interrupted ends as shells have it: see `interrupts`.
     """
@@ -53,12 +56,14 @@ class House:
     simulations: Sequence[str] = ()
 
     def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
-        """The case of that name or in that file; `supplied` is what a file of another tool does not say.
+        """The case of that name or in that file; `supplied` is what a file of another tool does not
+        say.
 
         Unless it must be driven, its drivers need not match its freedom.
 
         Raises:
-            KincheckError: there is none, its file does not make sense, or its drivers do not match its freedom.
+            KincheckError: there is none, its file does not make sense, or its drivers do not match
+                its freedom.
         """
         from ..case.models.files import SUFFIXES, load
         from ..kinematics.structure.driver_count import require_driven
@@ -66,24 +71,39 @@ class House:
         known = self.cases()
         if name in known:
             if supplied.given:
-                raise KincheckError(f"{name}: --{supplied.given[0]} is for files, and this is a built-in case: leave it out")
+                raise KincheckError(
+                    f"{name}: --{supplied.given[0]} is for files, and this is a built-in case:"
+                    " leave it out"
+                )
             case = self.case(name)
         elif Path(name).suffix in SUFFIXES or os.sep in name or Path(name).exists():
             case = load(Path(name), supplied)
         else:
-            raise KincheckError(unknown("case", name, known) + "; a case file ends in .toml or .json")
+            raise KincheckError(
+                unknown("case", name, known) + "; a case file ends in .toml or .json"
+            )
         if not driven:
             return case
         try:
             require_driven(case.mechanism)
-        except SolveError as error:  # it names the mechanism; the file is what the reader has to open
-            raise KincheckError(f"{name}: {'drivers' if case.mechanism.moving else 'bodies'}: {error}") from error
+        except (
+            SolveError
+        ) as error:  # it names the mechanism; the file is what the reader has to open
+            raise KincheckError(
+                f"{name}: {'drivers' if case.mechanism.moving else 'bodies'}: {error}"
+            ) from error
         return case
 
     def find_cases(
-        self, names: Sequence[str], unread: dict[str, str], found: Sequence[Case] = (), supplied: Supplied = NOTHING
+        self,
+        names: Sequence[str],
+        unread: dict[str, str],
+        found: Sequence[Case] = (),
+        supplied: Supplied = NOTHING,
     ) -> list[Case]:
-        """The cases found already and those named; what is wrong with the others is put beside their names as given."""
+        """The cases found already and those named; what is wrong with the others is put beside
+        their names as given.
+        """
         cases = {case.name: case for case in found}
         for name in dict.fromkeys(names):
             try:
@@ -92,26 +112,44 @@ class House:
                 unread[name] = str(error)
                 continue
             if case.name in cases:
-                unread[name] = f"{name}: there are two cases named {case.name!r}; results go by name: rename one"
+                unread[name] = (
+                    f"{name}: there are two cases named {case.name!r}; results go by name:"
+                    " rename one"
+                )
             else:
                 cases[case.name] = case
         return list(cases.values())
 
-    def find_engines(self, names: Sequence[str], problems: list[str], mode: str | None = None) -> list[Engine]:
-        """The engines named, each once, in a mode or in the first that they have; what is none is added to the problems."""
+    def find_engines(
+        self, names: Sequence[str], problems: list[str], mode: str | None = None
+    ) -> list[Engine]:
+        """The engines named, each once, in a mode or in the first that they have; what is none is
+        added to the problems.
+        """
         engines: list[Engine] = []
         for name in dict.fromkeys(names):
-            modes = [each for each, known in (("projection", self.engines), ("simulate", self.simulations)) if name in known]
+            modes = [
+                each
+                for each, known in (("projection", self.engines), ("simulate", self.simulations))
+                if name in known
+            ]
             if not modes:
-                problems.append(unknown("engine", name, [*dict.fromkeys((*self.engines, *self.simulations))]))
+                problems.append(
+                    unknown("engine", name, [*dict.fromkeys((*self.engines, *self.simulations))])
+                )
             elif mode not in (None, *modes):
-                problems.append(f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}: leave out --mode or the engine")
+                problems.append(
+                    f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}: leave out --mode or"
+                    " the engine"
+                )
             else:
                 engines.append(self._loaded(name, mode or modes[0]))
         return engines
 
     def _loaded(self, name: str, mode: str) -> Engine:
-        """The engine, or what stands for it where loading it fails: one broken adapter must not end a run of all."""
+        """The engine, or what stands for it where loading it fails: one broken adapter must not end
+        a run of all.
+        """
         from ..harness.unloadable import Unloadable
 
         try:
@@ -127,14 +165,22 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="MODULE:CLASS",
-        help="a joint type of your own, which case files may name then, in a module of this folder or an installed one; may be "
-        "repeated; check-joint checks it",
+        help=(
+            "a joint type of your own, which case files may name then, in a module of this folder"
+            " or an installed one; may be repeated; check-joint checks it"
+        ),
     )
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> str:
-    """Return those of the options that were given, to be named in a message; they have no default, or false, or no names."""
-    found = (name for name in names if getattr(options, name) not in ([], None) and getattr(options, name) is not False)
+    """Return those of the options that were given, to be named in a message; they have no default,
+    or false, or no names.
+    """
+    found = (
+        name
+        for name in names
+        if getattr(options, name) not in ([], None) and getattr(options, name) is not False
+    )
     return ", ".join(f"--{name.replace('_', '-')}" for name in found)
 
 

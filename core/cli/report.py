@@ -32,32 +32,51 @@ def add(commands: Any) -> None:
         "run",
         nargs="?",
         metavar="RUN",
-        help="number of a run in the history, or a results.json; default: the latest that is not under way",
+        help=(
+            "number of a run in the history, or a results.json; default: the latest that is not"
+            " under way"
+        ),
     )
     report.add_argument(
         "--against",
         default="last-green",
         metavar="RUN",
-        help="the same, or last-green (the latest earlier run in which nothing went wrong, and no engine was missing that is there "
-        "otherwise), or BRANCH-baseline (the latest earlier run of that branch, without changes to its files); default %(default)s",
+        help=(
+            "the same, or last-green (the latest earlier run in which nothing went wrong, and no"
+            " engine was missing that is there otherwise), or BRANCH-baseline (the latest earlier"
+            " run of that branch, without changes to its files); default %(default)s"
+        ),
     )
     report.add_argument(
         "--missing-is-failure",
         action="store_true",
-        help="status 1 also where a case or an engine is missing that the run compared with had, or the last run by the same "
-        "command; for nightly runs, which should never have fewer",
+        help=(
+            "status 1 also where a case or an engine is missing that the run compared with had, or"
+            " the last run by the same command; for nightly runs, which should never have fewer"
+        ),
     )
     add_history(report, "the history of the runs, their steps and their spread")
     report.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(OUT)} there")
-    report.add_argument("--json", metavar="FILE", help="write what changed as JSON; - for standard output")
     report.add_argument(
-        "--junit", type=Path, metavar="FILE", help="write the run as JUnit XML, with a failure for every regression"
+        "--json", metavar="FILE", help="write what changed as JSON; - for standard output"
     )
-    report.add_argument("--markdown", type=Path, metavar="FILE", help="write the summary as Markdown, for a pull request or a mail")
+    report.add_argument(
+        "--junit",
+        type=Path,
+        metavar="FILE",
+        help="write the run as JUnit XML, with a failure for every regression",
+    )
+    report.add_argument(
+        "--markdown",
+        type=Path,
+        metavar="FILE",
+        help="write the summary as Markdown, for a pull request or a mail",
+    )
 
 
 def _report(options: argparse.Namespace, house: House) -> int:
-    """Say what changed: new failures, fixed, lost, less accurate, slower, versions, since when, and tolerances to tighten.
+    """Say what changed: new failures, fixed, lost, less accurate, slower, versions, since when, and
+    tolerances to tighten.
 
     Exit status: 0 nothing regressed, 1 something did, 2 the tool could not do its work.
     """
@@ -70,10 +89,16 @@ def _report(options: argparse.Namespace, house: House) -> int:
     if problems := Destinations.of(options).problems(OUT, options.history):
         raise KincheckError("\n".join(problems))
     with ExitStack() as open_files:
-        store = open_files.enter_context(Store(Path(options.history), writable=False)) if options.history else None
+        store = (
+            open_files.enter_context(Store(Path(options.history), writable=False))
+            if options.history
+            else None
+        )
         subject = find(options.run, store)
         against, reason = find_against(options.against, subject, store)
-        found = regressions(subject, against, reason, store, missing_is_failure=options.missing_is_failure)
+        found = regressions(
+            subject, against, reason, store, missing_is_failure=options.missing_is_failure
+        )
         print(to_markdown(found), end="", file=sys.stderr if options.json == "-" else sys.stdout)
         _write(options, subject, found, store, problems)
         problems += store.damage if store is not None else []
@@ -83,7 +108,13 @@ def _report(options: argparse.Namespace, house: House) -> int:
     return Status.DEVIATES if found.regressed else Status.WITHIN
 
 
-def _write(options: argparse.Namespace, subject: Subject, found: Regressions, store: Store | None, problems: list[str]) -> None:
+def _write(
+    options: argparse.Namespace,
+    subject: Subject,
+    found: Regressions,
+    store: Store | None,
+    problems: list[str],
+) -> None:
     """Write what was asked for; a file that cannot be written does not keep back the others."""
     from ..case.io.atomic_files import to_standard_output, written
     from ..harness.record import to_json
@@ -103,8 +134,16 @@ def _write(options: argparse.Namespace, subject: Subject, found: Regressions, st
         "junit.xml": lambda path: path.write_bytes(to_regression_junit(subject.results, found)),
         "report.html": page,
     }
-    wanted = [(options.out / name, write) for name, write in contents.items()] if options.out is not None else []
-    named = (("regressions.json", options.json), ("regressions.md", options.markdown), ("junit.xml", options.junit))
+    wanted = (
+        [(options.out / name, write) for name, write in contents.items()]
+        if options.out is not None
+        else []
+    )
+    named = (
+        ("regressions.json", options.json),
+        ("regressions.md", options.markdown),
+        ("junit.xml", options.junit),
+    )
     wanted += [(Path(path), contents[name]) for name, path in named if path not in (None, "-")]
     for path, write in wanted:
         problems += written(path, write)

@@ -1,4 +1,6 @@
-"""kincheck stress: situations that break kinematic solvers, and whether any answer is wrong without saying so."""
+"""kincheck stress: situations that break kinematic solvers, and whether any answer is wrong without
+saying so.
+"""
 
 from __future__ import annotations
 
@@ -26,32 +28,71 @@ OF_FAMILIES = ("family", "samples", "seed", "no_proofs")
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     stress: argparse.ArgumentParser
-    stress = commands.add_parser("stress", help="nasty mechanisms: is any answer silently wrong?", description=_stress.__doc__)
+    stress = commands.add_parser(
+        "stress",
+        help="nasty mechanisms: is any answer silently wrong?",
+        description=_stress.__doc__,
+    )
     stress.set_defaults(do=_stress)
-    stress.add_argument("--family", nargs="+", action="extend", default=[], metavar="NAME", help="default: all families")
+    stress.add_argument(
+        "--family",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="default: all families",
+    )
     stress.add_argument("--list", action="store_true", help="list the families")
-    stress.add_argument("--samples", type=whole(1), metavar="N", help=f"over all families; default {SAMPLES}")
-    stress.add_argument("--seed", type=whole(0), metavar="S", help="of the random mechanisms; default 0")
-    stress.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native")
-    stress.add_argument("--mode", choices=MODES, help="the engines' mode; projection, unless an engine named has only the other")
     stress.add_argument(
-        "--out", type=Path, metavar="DIR", help="write the tables there, and the smallest bad cases, reduced, as case files"
-    )
-    stress.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
-    stress.add_argument("--no-proofs", action="store_true", help="do not prove a share of the truth, which needs python-flint")
-    stress.add_argument(
-        "--replay", nargs="+", action="extend", default=[], type=Path, metavar="FILE", help="judge case files instead"
+        "--samples", type=whole(1), metavar="N", help=f"over all families; default {SAMPLES}"
     )
     stress.add_argument(
-        "--tol", type=positive, metavar="X", help=f"of replayed files: largest constraint residual; default {TOL:g}"
+        "--seed", type=whole(0), metavar="S", help="of the random mechanisms; default 0"
+    )
+    stress.add_argument(
+        "--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native"
+    )
+    stress.add_argument(
+        "--mode",
+        choices=MODES,
+        help="the engines' mode; projection, unless an engine named has only the other",
+    )
+    stress.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="write the tables there, and the smallest bad cases, reduced, as case files",
+    )
+    stress.add_argument(
+        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
+    )
+    stress.add_argument(
+        "--no-proofs",
+        action="store_true",
+        help="do not prove a share of the truth, which needs python-flint",
+    )
+    stress.add_argument(
+        "--replay",
+        nargs="+",
+        action="extend",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="judge case files instead",
+    )
+    stress.add_argument(
+        "--tol",
+        type=positive,
+        metavar="X",
+        help=f"of replayed files: largest constraint residual; default {TOL:g}",
     )
 
 
 def _stress(options: argparse.Namespace, house: House) -> int:
     """Drive engines through random mechanisms that break kinematic solvers, and judge every sample.
 
-    Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool could not do its work, or an
-    engine supports none of the samples.
+    Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool
+    could not do its work, or an engine supports none of the samples.
     """
     from ..case.io.atomic_files import write
     from ..report.sections import deliver
@@ -61,7 +102,9 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     from . import destinations as delivery
 
     if options.list:
-        if found := given(options, [name for name in vars(options) if name not in ("list", "command", "do")]):
+        if found := given(
+            options, [name for name in vars(options) if name not in ("list", "command", "do")]
+        ):
             raise KincheckError(f"--list runs nothing; leave out {found}")
         width = max(map(len, Family.registry))
         for name, family in Family.registry.items():
@@ -73,24 +116,34 @@ def _stress(options: argparse.Namespace, house: House) -> int:
         if options.out or options.json:
             problems.append("--replay prints what it finds; leave out --out and --json")
         if found := given(options, OF_FAMILIES):
-            problems.append(f"--replay judges files as they are, which are of no family; leave out {found}")
+            problems.append(
+                f"--replay judges files as they are, which are of no family; leave out {found}"
+            )
         if problems:
             raise KincheckError("\n".join(problems))
         return _replay(options, house, engines)
     if options.tol is not None:
-        problems.append("--tol is for replayed files, and families have tolerances of their own; leave it out, or give --replay")
+        problems.append(
+            "--tol is for replayed files, and families have tolerances of their own; leave it out,"
+            " or give --replay"
+        )
     known = Family.registry
     problems += [unknown("family", name, [*known]) for name in options.family if name not in known]
     problems += delivery.Destinations.of(options).problems(FILES)
     if problems:
         raise KincheckError("\n".join(problems))
     with delivery.json_only() if options.json == "-" else nullcontext():
-        found = _run(options, [known[name] for name in dict.fromkeys(options.family or known)], engines)
+        found = _run(
+            options, [known[name] for name in dict.fromkeys(options.family or known)], engines
+        )
     made = report(found)
     deliver(made, found, out=options.out, json=options.json)
     if options.out is not None:
         write("--out", options.out / FILES[2], markdown(made).encode())
-    if undone := [*(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()), *idle(found)]:
+    if undone := [
+        *(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()),
+        *idle(found),
+    ]:
         raise KincheckError("\n".join(undone))
     bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
     return Status.DEVIATES if bad else Status.WITHIN
@@ -130,19 +183,34 @@ def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) ->
         case = house.find_case(str(file))
         for engine in engines:
             found = judge(case, engine, options.tol or TOL)
-            counts = ", ".join(f"{verdict} {found.counts[verdict]}" for verdict in Verdict if found.counts[verdict])
+            counts = ", ".join(
+                f"{verdict} {found.counts[verdict]}" for verdict in Verdict if found.counts[verdict]
+            )
             print(f"{file.name}  {engine.name} {engine.mode}: {counts}")
-            if any(found.counts[verdict] for verdict in Verdict if verdict not in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)):
+            if any(
+                found.counts[verdict]
+                for verdict in Verdict
+                if verdict not in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)
+            ):
                 examined.add(engine.name)
             for verdict in BAD:
                 sample = found.first(verdict)
                 if sample is not None:
                     bad = True
                     worst = found.worst[0]
-                    off = "" if worst is None else f", positions off by {worst:.2g} of what is round-off"
-                    print(f"  {verdict} first at {case.sweep.driver} = {case.sweep.values[sample]:.9g}{off}")
+                    off = (
+                        ""
+                        if worst is None
+                        else f", positions off by {worst:.2g} of what is round-off"
+                    )
+                    print(
+                        f"  {verdict} first at {case.sweep.driver} ="
+                        f" {case.sweep.values[sample]:.9g}{off}"
+                    )
             if found.message:
                 print(f"  {found.message}")
     if idle := [engine.name for engine in engines if engine.name not in examined]:
-        raise KincheckError(f"no sample was examined of {', '.join(idle)}: give another engine or other files")
+        raise KincheckError(
+            f"no sample was examined of {', '.join(idle)}: give another engine or other files"
+        )
     return Status.DEVIATES if bad else Status.WITHIN

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 EVERY = 10.0
 
 PART = "sweep.part"
-"""File of the finished part of a sweep, in the folder of its results until it has come to its end."""
+"""File of the finished part of a sweep, in the folder of its results until it has come to its
+end.
+"""
 
 FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 
@@ -40,47 +42,96 @@ FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     sweep: argparse.ArgumentParser
-    sweep = commands.add_parser("sweep", help="solve many variants of a design", description=_sweep.__doc__)
-    sweep.set_defaults(do=_sweep)
-    sweep.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
-    sweep.add_argument("--vary", type=Path, required=True, metavar="FILE", help="what varies, and by how much (kincheck-vary/1)")
-    sweep.add_argument("--samples", type=whole(1), metavar="N", help="variants that are drawn")
-    sweep.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the draws; default %(default)s")
-    sweep.add_argument("--output", nargs="+", action="extend", default=[], metavar="NAME", help="only these outputs; default: all")
-    sweep.add_argument(
-        "--order", type=int, choices=(0, 1, 2), default=0, help="derivatives of the outputs by time too; default %(default)s"
+    sweep = commands.add_parser(
+        "sweep", help="solve many variants of a design", description=_sweep.__doc__
     )
-    sweep.add_argument("--tol", type=positive, default=TOL, metavar="X", help=f"largest constraint residual; default {TOL:g}")
-    sweep.add_argument("--jobs", type=whole(1), metavar="N", help="threads; default: half the processors")
-    sweep.add_argument("--scheduler", metavar="ADDRESS", help="solve on the workers of this dask.distributed scheduler instead")
+    sweep.set_defaults(do=_sweep)
+    sweep.add_argument(
+        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+    )
+    sweep.add_argument(
+        "--vary",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="what varies, and by how much (kincheck-vary/1)",
+    )
+    sweep.add_argument("--samples", type=whole(1), metavar="N", help="variants that are drawn")
+    sweep.add_argument(
+        "--seed", type=whole(0), default=0, metavar="S", help="of the draws; default %(default)s"
+    )
+    sweep.add_argument(
+        "--output",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="only these outputs; default: all",
+    )
+    sweep.add_argument(
+        "--order",
+        type=int,
+        choices=(0, 1, 2),
+        default=0,
+        help="derivatives of the outputs by time too; default %(default)s",
+    )
+    sweep.add_argument(
+        "--tol",
+        type=positive,
+        default=TOL,
+        metavar="X",
+        help=f"largest constraint residual; default {TOL:g}",
+    )
+    sweep.add_argument(
+        "--jobs", type=whole(1), metavar="N", help="threads; default: half the processors"
+    )
+    sweep.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="solve on the workers of this dask.distributed scheduler instead",
+    )
     sweep.add_argument(
         "--check",
         metavar="ENGINE[:SHARE]",
-        help="rebuild a share of the variants as cases of their own, at least one, and solve them with this engine; default 0.01",
+        help=(
+            "rebuild a share of the variants as cases of their own, at least one, and solve them"
+            " with this engine; default 0.01"
+        ),
     )
     sweep.add_argument(
         "--replay",
         type=whole(0),
         nargs="+",
         metavar="INDEX",
-        help="solve only these variants of the seed, each as a case of its own, as kincheck run does; with --check its engine too",
+        help=(
+            "solve only these variants of the seed, each as a case of its own, as kincheck run"
+            " does; with --check its engine too"
+        ),
     )
-    sweep.add_argument("--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet")
+    sweep.add_argument(
+        "--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet"
+    )
     sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
-    sweep.add_argument("--json", metavar="FILE", help="write the results as JSON; - for standard output")
+    sweep.add_argument(
+        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
+    )
     sweep.add_argument(
         "--resume",
         action="store_true",
-        help=f"go on from the finished part of the same sweep, which is {PART} in the folder of --out",
+        help=(
+            f"go on from the finished part of the same sweep, which is {PART} in the folder of"
+            " --out"
+        ),
     )
     import_options.add_options(sweep)
 
 
 def _sweep(options: argparse.Namespace, house: House) -> int:
-    """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its outputs over them.
+    """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its
+    outputs over them.
 
-    Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the work could not be done. A sweep
-    that is interrupted writes what it has, and ends with 130.
+    Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the
+    work could not be done. A sweep that is interrupted writes what it has, and ends with 130.
     """
     from ..case.variation.variation_file import read_variation
     from ..studies.tolerance.study import Study
@@ -95,11 +146,17 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     if options.replay and options.samples is not None:
         problems.append("--replay: a variant is known by seed and index; leave out --samples")
     if options.replay and (options.store or options.scheduler):
-        problems.append("--replay solves here, and stores nothing; leave out --store and --scheduler")
+        problems.append(
+            "--replay solves here, and stores nothing; leave out --store and --scheduler"
+        )
     if options.resume and (options.out is None or options.replay):
-        problems.append("--resume goes on from a folder of results: give --out DIR, and leave out --replay")
+        problems.append(
+            "--resume goes on from a folder of results: give --out DIR, and leave out --replay"
+        )
     engine, share = _check(options, house, problems)
-    case = _only(house.find_case(options.case, import_options.supplied(options)), options.output, problems)
+    case = _only(
+        house.find_case(options.case, import_options.supplied(options)), options.output, problems
+    )
     import_options.tell_left_out([case])
     problems = problems or execution_options.unreachable(options)
     if problems:
@@ -117,8 +174,14 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
         problems += _deliver(options, results) + (part.problems if part is not None else [])
     for reason in stops:
         why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
-        goes_on = "--resume goes on from there" if part is not None else "with --out DIR it can be taken up with --resume"
-        problems.append(f"{why}: {results.samples} of {results.asked} variants are solved; {goes_on}")
+        goes_on = (
+            "--resume goes on from there"
+            if part is not None
+            else "with --out DIR it can be taken up with --resume"
+        )
+        problems.append(
+            f"{why}: {results.samples} of {results.asked} variants are solved; {goes_on}"
+        )
     complain(problems)
     if stops and isinstance(stops[0], KeyboardInterrupt):
         return status_of(stops[0])
@@ -129,7 +192,9 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     return Status.DEVIATES if results.unsolved or results.deviating else Status.WITHIN
 
 
-def _check(options: argparse.Namespace, house: House, problems: list[str]) -> tuple[Engine | None, float]:
+def _check(
+    options: argparse.Namespace, house: House, problems: list[str]
+) -> tuple[Engine | None, float]:
     """The engine to check with, and the share of the variants."""
     if options.check is None:
         return None, 0.0
@@ -139,7 +204,10 @@ def _check(options: argparse.Namespace, house: House, problems: list[str]) -> tu
     except ValueError:
         share = math.nan
     if not 0.0 < share <= 1.0:
-        problems.append(f"--check {options.check}: found the share {text!r}, expected a part of one such as 0.01; correct it")
+        problems.append(
+            f"--check {options.check}: found the share {text!r}, expected a part of one such as"
+            " 0.01; correct it"
+        )
     engines = house.find_engines([name], problems)
     return (engines[0] if engines else None), share
 
@@ -148,7 +216,11 @@ def _only(case: Case, names: list[str], problems: list[str]) -> Case:
     """The case with the named outputs only; all of them unless some are named."""
     there = [output.name for output in case.outputs]
     problems += [unknown("output", name, there) for name in names if name not in there]
-    return replace(case, outputs=tuple(output for output in case.outputs if output.name in names)) if names else case
+    return (
+        replace(case, outputs=tuple(output for output in case.outputs if output.name in names))
+        if names
+        else case
+    )
 
 
 def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
@@ -173,8 +245,15 @@ def _part(options: argparse.Namespace) -> Part:
     from ..studies.joint_check.loading import sources
     from ..studies.tolerance.part_file import Part
 
-    facts = {"kincheck": VERSION, "numpy": np.__version__, "llvm": available(), "processor": processor()}
-    return Part(options.out / PART, facts | {"joints": sources(options.joint_type)}, resume=options.resume)
+    facts = {
+        "kincheck": VERSION,
+        "numpy": np.__version__,
+        "llvm": available(),
+        "processor": processor(),
+    }
+    return Part(
+        options.out / PART, facts | {"joints": sources(options.joint_type)}, resume=options.resume
+    )
 
 
 def _solve(
@@ -196,7 +275,11 @@ def _solve(
         check = Check(engine, share, _solver(options, engine), options.tol, tell.checked)
     with ExitStack() as stack:
         stack.callback(tell.end)
-        store = None if options.store is None else stack.enter_context(ParquetStore(options.store, study))
+        store = (
+            None
+            if options.store is None
+            else stack.enter_context(ParquetStore(options.store, study))
+        )
         return sweep_designs(
             study.case,
             study.variation,
@@ -222,11 +305,20 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
 
     for index in options.replay:
         if study.samples and index >= study.samples:
-            raise KincheckError(f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1}; give one of them")
+            raise KincheckError(
+                f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1};"
+                " give one of them"
+            )
     native = house.engine(running.NATIVE)
     engines = [native] if engine is None or engine.name == running.NATIVE else [native, engine]
     cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
-    results = running.run(cases, engines, tol=options.tol, command=options.command, solver=_solver(options, engines[-1]))
+    results = running.run(
+        cases,
+        engines,
+        tol=options.tol,
+        command=options.command,
+        solver=_solver(options, engines[-1]),
+    )
     problems: list[str] = []
     delivery.deliver(results, problems, delivery.Destinations.of(options))
     if engine is not None:
@@ -234,7 +326,9 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
     complain(problems)
     if problems:
         return Status.FAILED
-    return Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
+    return (
+        Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
+    )
 
 
 def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
@@ -247,7 +341,12 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
     encoded = to_json(results)
     contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
     if options.out is not None:
-        texts = (encoded, page(results).encode(), envelope_csv(results).encode(), gradient_csv(results).encode())
+        texts = (
+            encoded,
+            page(results).encode(),
+            envelope_csv(results).encode(),
+            gradient_csv(results).encode(),
+        )
         contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
     problems = write_all(contents)  # before anything is printed: who reads it may have gone
     print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
@@ -257,7 +356,9 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
 
 
 class Teller:
-    """Tells on standard error how far a sweep is: one line that changes on a terminal, now and then a line elsewhere."""
+    """Tells on standard error how far a sweep is: one line that changes on a terminal, now and then
+    a line elsewhere.
+    """
 
     def __init__(self) -> None:
         self.terminal = sys.stderr.isatty()
@@ -280,7 +381,12 @@ class Teller:
         if now - self.told < (0.1 if self.terminal else EVERY):
             return
         self.told = now
-        print(f"\r\x1b[2K{line}" if self.terminal else line, end="" if self.terminal else "\n", file=sys.stderr, flush=True)
+        print(
+            f"\r\x1b[2K{line}" if self.terminal else line,
+            end="" if self.terminal else "\n",
+            file=sys.stderr,
+            flush=True,
+        )
 
     def end(self) -> None:
         """Leave the line to what comes."""

@@ -23,11 +23,19 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     tracing: argparse.ArgumentParser
     tracing = commands.add_parser(
-        "trace", help="follow a motion beyond lock-ups; find limit and branch points", description=_trace.__doc__
+        "trace",
+        help="follow a motion beyond lock-ups; find limit and branch points",
+        description=_trace.__doc__,
     )
     tracing.set_defaults(do=_trace)
-    tracing.add_argument("case", metavar="CASE", help="built-in name, or path to a case file or another tool's")
-    tracing.add_argument("--driver", metavar="NAME", help="whose value is an outcome; default: the one that the case sweeps")
+    tracing.add_argument(
+        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+    )
+    tracing.add_argument(
+        "--driver",
+        metavar="NAME",
+        help="whose value is an outcome; default: the one that the case sweeps",
+    )
     tracing.add_argument(
         "--length",
         type=positive,
@@ -35,16 +43,20 @@ def add(commands: Any) -> None:
         metavar="L",
         help="either way, in lengths of the mechanism's size and radians; default %(default)s",
     )
-    tracing.add_argument("--json", metavar="FILE", help="write the curve as JSON; - for standard output")
+    tracing.add_argument(
+        "--json", metavar="FILE", help="write the curve as JSON; - for standard output"
+    )
     import_options.add_options(tracing)
 
 
 def _trace(options: argparse.Namespace, house: House) -> int:
-    """Follow a case's motion from its design position both ways by its length, and name the singular poses on it.
+    """Follow a case's motion from its design position both ways by its length, and name the
+    singular poses on it.
 
-    A limit point is where the driver's value turns back (lock-up); beyond it the motion goes on with the value going the other way.
-    A branch point is where the joints let the motion go on in more ways than one (bifurcation); it is followed straight on.
-    Exit status: 0 the whole length was traced, or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
+    A limit point is where the driver's value turns back (lock-up); beyond it the motion goes on
+    with the value going the other way. A branch point is where the joints let the motion go on in
+    more ways than one (bifurcation); it is followed straight on. Exit status: 0 the whole length
+    was traced, or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
     """
     from ..case.io.atomic_files import unwritable
     from ..kinematics.continuation.trace import trace
@@ -72,14 +84,18 @@ def _trace(options: argparse.Namespace, house: House) -> int:
 
 def _lines(case: str, curve: Curve, direction: int, design: float, unit: str) -> list[str]:
     low, high = curve.values.min() + design, curve.values.max() + design
-    end = "back at the design position" if curve.closed else curve.message or "to the length asked for"
+    end = (
+        "back at the design position"
+        if curve.closed
+        else curve.message or "to the length asked for"
+    )
     head = (
-        f"{case}: {curve.driver} first {WAYS[direction]}: {len(curve.arc)} poses over the length {abs(curve.arc[-1]):.6g}, {end}; "
-        f"{curve.driver} from {low:.9g} to {high:.9g} {unit}"
+        f"{case}: {curve.driver} first {WAYS[direction]}: {len(curve.arc)} poses over the length"
+        f" {abs(curve.arc[-1]):.6g}, {end}; {curve.driver} from {low:.9g} to {high:.9g} {unit}"
     )
     return [head] + [
-        f"  {event.kind} at {curve.driver} = {event.value + design:.9f} {unit} (length {event.arc:.6g}); at the pose nearest to it "
-        f"{event.singularity.words}"
+        f"  {event.kind} at {curve.driver} = {event.value + design:.9f} {unit} (length"
+        f" {event.arc:.6g}); at the pose nearest to it {event.singularity.words}"
         for event in curve.events
     ]
 
@@ -89,7 +105,10 @@ def _facts(case: str, curves: list[Curve], design: float, unit: str) -> dict[str
 
     def event(each: Event) -> dict[str, Any]:
         place = {"kind": each.kind, "arc": each.arc, "value": each.value + design}
-        return place | {"points": {name: x.tolist() for name, x in each.points.items()}, "nearest_pose": each.singularity.facts}
+        return place | {
+            "points": {name: x.tolist() for name, x in each.points.items()},
+            "nearest_pose": each.singularity.facts,
+        }
 
     found = [
         {
@@ -103,4 +122,10 @@ def _facts(case: str, curves: list[Curve], design: float, unit: str) -> dict[str
         }
         for curve in curves
     ]
-    return {"schema": "kincheck-trace/1", "case": case, "driver": curves[0].driver, "unit": unit, "curves": found}
+    return {
+        "schema": "kincheck-trace/1",
+        "case": case,
+        "driver": curves[0].driver,
+        "unit": unit,
+        "curves": found,
+    }

@@ -1,4 +1,6 @@
-"""The harness: cases, the engine protocol, running, comparing and reporting. It knows no simulator."""
+"""The harness: cases, the engine protocol, running, comparing and reporting. It knows no
+simulator.
+"""
 
 from importlib import import_module
 from typing import Any

@@ -1,19 +1,24 @@
-"""Comparing: the outputs of a trajectory, and how far they are from a reference or from another engine's.
+"""Comparing: the outputs of a trajectory, and how far they are from a reference or from another
+engine's.
 
-Same samples, no interpolation, and outputs only: generalized coordinates differ legally between engines. A deviation is
-accepted up to atol + rtol * range, the range being that of the reference over the samples compared.
+Same samples, no interpolation, and outputs only: generalized coordinates differ legally between
+engines. A deviation is accepted up to atol + rtol * range, the range being that of the reference
+over the samples compared.
 
-An output's atol is given for positions. A wrong pose passes its error on: the velocities of a mechanism are its driver's rate
-times functions of the pose, so moving the pose by d, small against the size D of the mechanism, changes a velocity by about
-d * rate / D and an acceleration by d * (rate / D)^2. Hence velocities are held to atol * pace, accelerations to atol * pace^2,
-with pace = rate / D [1/s]; D is a radian for a driver that turns and the mechanism's size for one that shifts. A driver with
-a motion adds d * s / D to an acceleration, s being its own: pace is then sqrt(s / D) if that is more, the rate being its
-fastest; both are the largest over the samples, and of all drivers the one that goes fastest through D counts. So the same
-relative accuracy is asked of all three, at any scale and any rate: with atol = 1e-9 m, a mechanism of 1 m and a drive of 1 m/s,
-an acceleration of 1 m/s^2 that is wrong by 1e-6 of itself is a thousand times out of tolerance.
+An output's atol is given for positions. A wrong pose passes its error on: the velocities of a
+mechanism are its driver's rate times functions of the pose, so moving the pose by d, small against
+the size D of the mechanism, changes a velocity by about d * rate / D and an acceleration by d *
+(rate / D)^2. Hence velocities are held to atol * pace, accelerations to atol * pace^2, with pace =
+rate / D [1/s]; D is a radian for a driver that turns and the mechanism's size for one that shifts.
+A driver with a motion adds d * s / D to an acceleration, s being its own: pace is then sqrt(s / D)
+if that is more, the rate being its fastest; both are the largest over the samples, and of all
+drivers the one that goes fastest through D counts. So the same relative accuracy is asked of all
+three, at any scale and any rate: with atol = 1e-9 m, a mechanism of 1 m and a drive of 1 m/s, an
+acceleration of 1 m/s^2 that is wrong by 1e-6 of itself is a thousand times out of tolerance.
 
-The same holds for outputs in other units, an angle for one: they too are functions of the pose. The derivative of an output by
-wheel travel is one with an atol of its own, that of the output over D; its rate is held to that times the pace.
+The same holds for outputs in other units, an angle for one: they too are functions of the pose. The
+derivative of an output by wheel travel is one with an atol of its own, that of the output over D;
+its rate is held to that times the pace.
 """
 
 from __future__ import annotations
@@ -47,22 +52,42 @@ def pace(case: Case) -> float:
 
 
 def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Series:
-    """The output over the samples of a trajectory: NaN where the sample was not solved, None where the engine has none."""
+    """The output over the samples of a trajectory: NaN where the sample was not solved, None where
+    the engine has none.
+    """
     at = {name: _moving(trajectory.points[name]) for name in output.points}
     with np.errstate(all="ignore"):  # what is not known is NaN, and what is made of it becomes NaN
-        jet = output.of(at, {name: _standing(case.mechanism.point(name).position) for name in output.points})
+        jet = output.of(
+            at, {name: _standing(case.mechanism.point(name).position) for name in output.points}
+        )
     solved = trajectory.solved
-    position, *rates = (np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a))
+    position, *rates = (
+        np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a)
+    )
     motions = [trajectory.points[name] for name in output.points]
-    given = 1 + sum(all(getattr(each, quantity) is not None for each in motions) for quantity in QUANTITIES[1:])
-    known = given - (ORDERS - output.orders)  # the value of a derivative takes what the engine gives as a rate
-    return Series(position, *(rate if order < known else None for order, rate in enumerate(rates, 1)), possible=known > 0)
+    given = 1 + sum(
+        all(getattr(each, quantity) is not None for each in motions) for quantity in QUANTITIES[1:]
+    )
+    # the value of a derivative takes what the engine gives as a rate
+    known = given - (ORDERS - output.orders)
+    return Series(
+        position,
+        *(rate if order < known else None for order, rate in enumerate(rates, 1)),
+        possible=known > 0,
+    )
 
 
 def _moving(motion: PointMotion) -> Vec3:
     """A point's position as jets, NaN for derivatives that the engine does not give."""
     given = (motion.position, motion.velocity, motion.acceleration)
-    x, v, a = (np.full(np.shape(motion.position), np.nan) if each is None else np.asarray(each, dtype=np.float64) for each in given)
+    x, v, a = (
+        (
+            np.full(np.shape(motion.position), np.nan)
+            if each is None
+            else np.asarray(each, dtype=np.float64)
+        )
+        for each in given
+    )
     return Vec3(*(Jet(x[:, k], v[:, k], a[:, k]) for k in range(3)))
 
 
@@ -101,9 +126,12 @@ def deviations(
 
     Args:
         found: the engine's output.
-        standards: what it may be compared with, (name, series), best first; each quantity takes the first that has it.
-        complete: every sample was solved: one without a value where the standard has one is out of tolerance.
-        refused: samples that the standard's solver cannot reach, shape (n,): a value there contradicts it.
+        standards: what it may be compared with, (name, series), best first; each quantity takes the
+            first that has it.
+        complete: every sample was solved: one without a value where the standard has one is out of
+            tolerance.
+        refused: samples that the standard's solver cannot reach, shape (n,): a value there
+            contradicts it.
     """
     beat = pace(case)
     compared: dict[str, Deviation | None] = {}
@@ -113,7 +141,9 @@ def deviations(
     for order, quantity in enumerate(QUANTITIES):
         values: Array | None = getattr(found, quantity)
         known: list[tuple[str, Array]] = [
-            (name, getattr(series, quantity)) for name, series in standards if getattr(series, quantity) is not None
+            (name, getattr(series, quantity))
+            for name, series in standards
+            if getattr(series, quantity) is not None
         ]
         compared[quantity] = None
         if order >= output.orders:
@@ -122,10 +152,16 @@ def deviations(
             reasons.append(f"{quantity}: the engine gives none")
         elif not known:
             names = " and ".join(name for name, _ in standards)
-            reasons.append(f"{quantity}: {names} gives none" if names else f"{quantity}: there is nothing to compare with")
+            reasons.append(
+                f"{quantity}: {names} gives none"
+                if names
+                else f"{quantity}: there is nothing to compare with"
+            )
         else:
             name, reference = known[0]
-            compared[quantity] = off = deviation(values, reference, output.atol * beat**order, output.rtol, name)
+            compared[quantity] = off = deviation(
+                values, reference, output.atol * beat**order, output.rtol, name
+            )
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
             if lost and (order or found.possible):
                 compared[quantity] = off and msgspec.structs.replace(off, within=False)
@@ -140,7 +176,10 @@ def deviations(
                 reasons.append(f"{quantity}: {name} {NO_VALUE} {count} of {len(values)} samples")
     contradicted = int((unreached & np.isfinite(found.position)).sum())
     if contradicted:
-        reasons.append(f"values at {contradicted} of {len(found.position)} samples that the standard cannot reach")
+        reasons.append(
+            f"values at {contradicted} of {len(found.position)} samples that the standard cannot"
+            " reach"
+        )
     return Deviations(
         **compared,
         reason="; ".join(reasons) or None,
@@ -149,8 +188,11 @@ def deviations(
     )
 
 
-def deviation(values: Array, reference: Array, atol: float, rtol: float, against: str) -> Deviation | None:
-    """How far values are from a reference, over the samples both have; None where there is no such sample.
+def deviation(
+    values: Array, reference: Array, atol: float, rtol: float, against: str
+) -> Deviation | None:
+    """How far values are from a reference, over the samples both have; None where there is no such
+    sample.
 
     Args:
         values, reference: shape (n,), NaN at samples that are not known.
@@ -159,7 +201,10 @@ def deviation(values: Array, reference: Array, atol: float, rtol: float, against
         CaseError: the shapes differ.
     """
     if values.shape != reference.shape:
-        raise CaseError(f"{against} has shape {reference.shape}, expected {values.shape}: one number for each sample of the sweep")
+        raise CaseError(
+            f"{against} has shape {reference.shape}, expected {values.shape}: one number for each"
+            " sample of the sweep"
+        )
     both = np.isfinite(values) & np.isfinite(reference)
     if not both.any():
         return None
@@ -176,12 +221,22 @@ def deviation(values: Array, reference: Array, atol: float, rtol: float, against
     )
 
 
-def describe(output: str, quantity: str, worst: Deviation, driver: str, values: Sequence[float], unit: str = "m") -> str:
-    """One line that says how far off an output is, and where, or that it has no value somewhere; `unit` is the output's."""
+def describe(
+    output: str,
+    quantity: str,
+    worst: Deviation,
+    driver: str,
+    values: Sequence[float],
+    unit: str = "m",
+) -> str:
+    """One line that says how far off an output is, and where, or that it has no value somewhere;
+    `unit` is the output's.
+    """
     if worst.max_abs <= worst.tolerance:
         return f"{output}: {quantity} has no value at samples where {worst.against} has one"
     unit += PER_TIME[QUANTITIES.index(quantity)]
     return (
-        f"{output}: {quantity} is off by {worst.max_abs:.3g} {unit} at sample {worst.worst_step} ({driver} = "
-        f"{values[worst.worst_step]:.9g}), tolerance {worst.tolerance:.3g} {unit}, against {worst.against}"
+        f"{output}: {quantity} is off by {worst.max_abs:.3g} {unit} at sample {worst.worst_step}"
+        f" ({driver} = {values[worst.worst_step]:.9g}), tolerance {worst.tolerance:.3g} {unit},"
+        f" against {worst.against}"
     )

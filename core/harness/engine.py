@@ -1,4 +1,6 @@
-"""The door every engine enters by, the native one included. The harness knows nothing else of them."""
+"""The door every engine enters by, the native one included. The harness knows nothing else of
+them.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,10 @@ class Engine(Protocol):
 
     Attributes:
         name: as on the command line.
-        mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or "simulate" (its own
-            solver or time stepping). Modes are different products and never share a ranking. Name and mode together are an
-            engine's identity: the simulate mode that is recommended has the simulator's name, variants of it have one of their own.
+        mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or
+            "simulate" (its own solver or time stepping). Modes are different products and never
+            share a ranking. Name and mode together are an engine's identity: the simulate mode that
+            is recommended has the simulator's name, variants of it have one of their own.
         loop: where the loop over samples and iterations runs: "python", "simulator" or "compiled".
         settings: what the report prints so that a reader can repeat the run.
     """
@@ -36,7 +39,9 @@ class Engine(Protocol):
         ...
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the reason why this engine cannot express the case, naming the joint or driver; None where it can."""
+        """Return the reason why this engine cannot express the case, naming the joint or driver;
+        None where it can.
+        """
         ...
 
     def build(self, case: Case) -> Any:
@@ -48,13 +53,13 @@ class Engine(Protocol):
 
         Args:
             model: what `build` gave; may be used for several solves.
-            tol: largest accepted constraint residual, relative to the mechanism's size. A pair whose solved samples have a
-                larger one fails. In simulate mode the simulator's own
+            tol: largest accepted constraint residual, relative to the mechanism's size. A pair
+                whose solved samples have a larger one fails. In simulate mode the simulator's own
                 settings say what it accepts, and the residual tells what came of it.
 
         Returns:
-            A trajectory of case.points; samples that cannot be reached are NaN and explained, never numbers. Its iterations are
-            Newton's; in simulate mode, time or load steps.
+            A trajectory of case.points; samples that cannot be reached are NaN and explained, never
+            numbers. Its iterations are Newton's; in simulate mode, time or load steps.
         """
         ...
 
@@ -78,7 +83,8 @@ class Floor:
 class Measurable(Engine, Protocol):
     """An engine that a diagram of work against precision can be drawn of.
 
-    The predictor and the warm start are the same for all its efforts; what an effort spares or spends is in its settings.
+    The predictor and the warm start are the same for all its efforts; what an effort spares or
+    spends is in its settings.
     """
 
     def efforts(self) -> Mapping[str, Engine]:
@@ -86,5 +92,7 @@ class Measurable(Engine, Protocol):
         ...
 
     def floor(self, case: Case) -> Floor | None:
-        """What its compiled code alone needs for a sample; None where the loop is compiled and its time is the floor itself."""
+        """What its compiled code alone needs for a sample; None where the loop is compiled and its
+        time is the floor itself.
+        """
         ...

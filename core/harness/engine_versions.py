@@ -1,4 +1,6 @@
-"""Versions of engines, asked in processes of their own: a broken library ends, blocks or kills the process that loads it."""
+"""Versions of engines, asked in processes of their own: a broken library ends, blocks or kills the
+process that loads it.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from functools import partial
 from .engine import Engine
 from .run import NATIVE
 
-# A library may print too, and end its process as if all were well: what is told has these words before it.
+# A library may print too, and end its process as if all were well: what is told has these words
+# before it.
 TOLD = "its version is "
 COMMAND = f"""
 import pickle, sys
@@ -26,7 +29,8 @@ PATIENCE = 60.0
 
 
 def versions(engines: Sequence[Engine], patience: float = PATIENCE) -> list[str | None]:
-    """The version of each engine, in their order; None where it is not installed, or where its process has no answer.
+    """The version of each engine, in their order; None where it is not installed, or where its
+    process has no answer.
 
     Args:
         patience: for an answer [s].
@@ -38,12 +42,18 @@ def versions(engines: Sequence[Engine], patience: float = PATIENCE) -> list[str 
 def _version(engine: Engine, patience: float) -> str | None:
     if engine.name == NATIVE:  # it has no foreign code to be kept apart
         return engine.version()
-    ask = partial(subprocess.run, [sys.executable, "-P", "-c", COMMAND], capture_output=True, check=True)
+    ask = partial(
+        subprocess.run, [sys.executable, "-P", "-c", COMMAND], capture_output=True, check=True
+    )
     try:
         ended = ask(input=pickle.dumps(sys.path) + pickle.dumps(engine), timeout=patience)
     except (subprocess.TimeoutExpired, subprocess.CalledProcessError):
         return None
-    except (pickle.PicklingError, AttributeError, TypeError):  # its pairs cannot be sent either, and will say so
+    except (
+        pickle.PicklingError,
+        AttributeError,
+        TypeError,
+    ):  # its pairs cannot be sent either, and will say so
         return None
     _, told, version = ended.stdout.decode("utf-8", "replace").rpartition(TOLD)
     return version.strip() or None if told else None

@@ -1,4 +1,6 @@
-"""What is known of the reference of a case: where it comes from, which one it was, and whether it is to be suspected."""
+"""What is known of the reference of a case: where it comes from, which one it was, and whether it
+is to be suspected.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ from ..trajectory import QUANTITIES, Array
 VALUES = "values"
 """What a digest is of where no file holds the reference."""
 IDENTICAL = (
-    "the reference is identical to native's own result in every bit, which no data of others is: no pass is called validated; "
-    "give the data of their source"
+    "the reference is identical to native's own result in every bit, which no data of others is: no"
+    " pass is called validated; give the data of their source"
 )
 # A straight line through the samples is met by rounding, and a driven coordinate is one.
 FEWEST, STRAIGHT = 3, 1e-9
@@ -27,7 +29,8 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         citation: where it comes from; empty where nobody says.
         sha256: digest of its content.
-        of: the content: the name of a file, whose bytes they are, or "values", which `digest` describes.
+        of: the content: the name of a file, whose bytes they are, or "values", which `digest`
+            describes.
         own: it claims to be of others, and is native's own result in every bit.
     """
 
@@ -38,7 +41,9 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def sound(self) -> bool:
-        """Whether agreement with it can validate: it says where it comes from, and is not kincheck's own."""
+        """Whether agreement with it can validate: it says where it comes from, and is not
+        kincheck's own.
+        """
         return bool(self.citation and self.sha256) and not self.own
 
 
@@ -60,7 +65,9 @@ def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
 
 
 def _identical(case: Case, native: Mapping[str, Series]) -> bool:
-    """Whether every value of the reference equals native's in every bit, of series that are neither constant nor straight."""
+    """Whether every value of the reference equals native's in every bit, of series that are neither
+    constant nor straight.
+    """
     telling = False
     for name, series in case.reference.items():
         for quantity in QUANTITIES:
@@ -69,7 +76,11 @@ def _identical(case: Case, native: Mapping[str, Series]) -> bool:
                 continue
             found: Array | None = getattr(native.get(name), quantity, None)
             known = np.isfinite(reference)
-            if found is None or found.shape != reference.shape or not np.array_equal(reference[known], found[known]):
+            if (
+                found is None
+                or found.shape != reference.shape
+                or not np.array_equal(reference[known], found[known])
+            ):
                 return False
             telling = telling or not _straight(case.sweep.values[known], reference[known])
     return telling
@@ -84,7 +95,9 @@ def _straight(x: Array, y: Array) -> bool:
 
 
 def digest(reference: Mapping[str, Series]) -> str:
-    """Return the SHA-256 of true values: names of outputs and quantities in order, and after each its little-endian doubles, SI."""
+    """Return the SHA-256 of true values: names of outputs and quantities in order, and after each
+    its little-endian doubles, SI.
+    """
     whole = hashlib.sha256()
     for name, series in sorted(reference.items()):
         for quantity in QUANTITIES:
@@ -99,7 +112,8 @@ class Explanation(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         change: in words, after "the reference"; several that do, with "or" between them.
-        difference, tolerance: the largest difference that is left in the first of the quantities, and what it is within [unit].
+        difference, tolerance: the largest difference that is left in the first of the quantities,
+            and what it is within [unit].
     """
 
     outputs: list[str]

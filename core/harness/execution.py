@@ -1,4 +1,6 @@
-"""One pair: what an engine makes of a case, as plain data that can be sent between processes. Judging it is done elsewhere."""
+"""One pair: what an engine makes of a case, as plain data that can be sent between processes.
+Judging it is done elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,9 @@ from .record import Outcome, Seconds
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
 
-# Enough solves for a median that one interruption cannot move; slow engines stop after the budget [s], but not between two of
-# which one took so many times as long as the other: in it something was compiled.
+# Enough solves for a median that one interruption cannot move; slow engines stop after the budget
+# [s], but not between two of which one took so many times as long as the other: in it something was
+# compiled.
 WARM_SOLVES = 5
 WARM_BUDGET = 0.5
 UNLIKE = 2.0
@@ -106,11 +109,15 @@ class Attempt:
 
 Attempts: TypeAlias = Generator[tuple[int, Attempt]]
 Solver: TypeAlias = Callable[[Sequence[Pair]], Attempts]
-"""Solves pairs somewhere: gives the index of each and what became of it, once each, in any order."""
+"""Solves pairs somewhere: gives the index of each and what became of it, once each, in any
+order.
+"""
 
 
 def here(pairs: Sequence[Pair]) -> Attempts:
-    """The solver of this process: one pair after the other. What kills or blocks an engine, does so to the run."""
+    """The solver of this process: one pair after the other. What kills or blocks an engine, does so
+    to the run.
+    """
     for index, pair in enumerate(pairs):
         yield index, attempt(pair)
 
@@ -134,7 +141,11 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
         version = engine.version()
         if version is None:
             return become(
-                Failure(Outcome.UNAVAILABLE, f"{engine.name} is not installed, or cannot be imported: kincheck doctor says which")
+                Failure(
+                    Outcome.UNAVAILABLE,
+                    f"{engine.name} is not installed, or cannot be imported: kincheck doctor says"
+                    " which",
+                )
             )
         facts = replace(facts, version=bounded(version))
         tell(facts)
@@ -144,12 +155,16 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
         return become(_solve(pair, seconds))
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # anything a simulator may raise: some end the interpreter where they should raise
+    except (
+        BaseException
+    ) as error:  # anything a simulator may raise: some end the interpreter where they should raise
         return become(Failure(Outcome.ERROR, said(error)))
 
 
 def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
-    """Build once, solve, and solve again for the time. The answer kept is the last: the one that was timed."""
+    """Build once, solve, and solve again for the time. The answer kept is the last: the one that
+    was timed.
+    """
     case, engine = pair.case, pair.engine
     begin = perf_counter()
     model = engine.build(case)
@@ -194,17 +209,24 @@ def check(case: Case, engine: str, trajectory: Trajectory) -> None:
     """Hold an answer to the engine protocol.
 
     Raises:
-        BadTrajectoryError: a point is missing, a shape is wrong, or a sample that is called solved is not finite.
+        BadTrajectoryError: a point is missing, a shape is wrong, or a sample that is called solved
+            is not finite.
     """
     n = len(case.sweep.values)
     for name in ("solved", "iterations"):
         _check_shape(f"{engine}: {name}", getattr(trajectory, name), (n,))
     solved = np.asarray(trajectory.solved, dtype=np.bool_)
     if solved.any() and not np.isfinite(trajectory.residual):
-        raise BadTrajectoryError(f"{engine}: residual is {trajectory.residual} although {solved.sum()} samples are called solved")
+        raise BadTrajectoryError(
+            f"{engine}: residual is {trajectory.residual} although {solved.sum()} samples are"
+            " called solved"
+        )
     for point in case.points:
         if point not in trajectory.points:
-            raise BadTrajectoryError(f"{engine}: no motion of point {point!r}; found: {', '.join(trajectory.points) or 'none'}")
+            raise BadTrajectoryError(
+                f"{engine}: no motion of point {point!r}; found:"
+                f" {', '.join(trajectory.points) or 'none'}"
+            )
         motion = trajectory.points[point]
         for quantity in QUANTITIES:
             values: Array | None = getattr(motion, quantity)
@@ -215,9 +237,11 @@ def check(case: Case, engine: str, trajectory: Trajectory) -> None:
             bad = np.flatnonzero(solved & ~finite)
             if bad.size:
                 raise BadTrajectoryError(
-                    f"{engine}: {quantity} of point {point!r} is {np.asarray(values)[bad[0]].tolist()} at sample {bad[0]} "
-                    f"({case.sweep.driver} = {case.sweep.values[bad[0]]:.9g}), which is called solved; "
-                    f"{bad.size} of {n} samples are so: mark them unsolved and explain, or give finite numbers"
+                    f"{engine}: {quantity} of point {point!r} is"
+                    f" {np.asarray(values)[bad[0]].tolist()} at sample {bad[0]}"
+                    f" ({case.sweep.driver} = {case.sweep.values[bad[0]]:.9g}), which is called"
+                    f" solved; {bad.size} of {n} samples are so: mark them unsolved and explain, or"
+                    " give finite numbers"
                 )
 
 
@@ -243,5 +267,7 @@ def bounded(text: Any) -> str:
     whole = text if isinstance(text, str) else str(text)
     if len(whole) > LONGEST_MESSAGE:
         half = LONGEST_MESSAGE // 2
-        whole = f"{whole[:half]} [... {len(whole) - 2 * half} characters left out ...] {whole[-half:]}"
+        whole = (
+            f"{whole[:half]} [... {len(whole) - 2 * half} characters left out ...] {whole[-half:]}"
+        )
     return readable(whole)

@@ -1,4 +1,6 @@
-"""Interrupts: Ctrl-C and SIGTERM stop the work of a command, and never what it writes of the work that is done."""
+"""Interrupts: Ctrl-C and SIGTERM stop the work of a command, and never what it writes of the work
+that is done.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ def words_of(interrupt: KeyboardInterrupt) -> str:
 class Interrupts:
     """What a command does at Ctrl-C and SIGTERM.
 
-    The first one raises KeyboardInterrupt. One more is only noted, so that results are written; the next raises again.
+    The first one raises KeyboardInterrupt. One more is only noted, so that results are written; the
+    next raises again.
 
     Attributes:
         held: the one that was noted, None without.
@@ -67,7 +70,9 @@ _current = Interrupts()
 
 
 def hold() -> None:
-    """From now on the command writes its results: the first interrupt is noted, and acted on when they are written."""
+    """From now on the command writes its results: the first interrupt is noted, and acted on when
+    they are written.
+    """
     _current.hold()
 
 
@@ -78,7 +83,9 @@ def deferred() -> AbstractContextManager[None]:
 
 @contextmanager
 def listening() -> Generator[Interrupts]:
-    """Take the signals of this process for a command; those that the process was started to ignore stay ignored."""
+    """Take the signals of this process for a command; those that the process was started to ignore
+    stay ignored.
+    """
     global _current
     _current = found = Interrupts()
     before: dict[int, Any] = {}

@@ -28,7 +28,9 @@ def engine_name(record: Record) -> str:
 
 
 def product(engine: str, mode: str) -> str:
-    """The engine, with its mode unless it is projection: the same engine in another mode is another product."""
+    """The engine, with its mode unless it is projection: the same engine in another mode is another
+    product.
+    """
     return engine if mode == "projection" else f"{engine} · {mode}"
 
 
@@ -40,7 +42,9 @@ def output_label(name: str) -> str:
 
 
 def signs(run: Mapping[str, Any]) -> list[str]:
-    """The conventions of signs that outputs have, a line each with the cases that they are of, by the circumstances of a run."""
+    """The conventions of signs that outputs have, a line each with the cases that they are of, by
+    the circumstances of a run.
+    """
     said: dict[str, list[str]] = {}
     for case, facts in run.get("cases", {}).items():
         if words := facts.get("signs"):
@@ -50,7 +54,11 @@ def signs(run: Mapping[str, Any]) -> list[str]:
 
 def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Cases and what is to be known of their geometry, by the circumstances of a run."""
-    return [(case, note) for case, facts in run.get("cases", {}).items() for note in facts.get("notes", ())]
+    return [
+        (case, note)
+        for case, facts in run.get("cases", {}).items()
+        for note in facts.get("notes", ())
+    ]
 
 
 def suspects(results: Results) -> list[tuple[str, str]]:
@@ -59,7 +67,9 @@ def suspects(results: Results) -> list[tuple[str, str]]:
 
 
 def unsound(record: Record) -> str:
-    """Why the reference cannot validate though its kind could; empty where it can, or never could."""
+    """Why the reference cannot validate though its kind could; empty where it can, or never
+    could.
+    """
     if not Truth(record.truth).validates or record.evidence is None or record.evidence.sound:
         return ""
     return "kincheck's own" if record.evidence.own else "uncited"
@@ -94,7 +104,12 @@ def number(value: float | None) -> str:
 def known(value: Any) -> Any:
     """A value of any kind from a results file, in words."""
     if isinstance(value, Mapping):
-        return "; ".join(f"{key} {known(each)}" for key, each in cast("Mapping[str, Any]", value).items()) or "–"
+        return (
+            "; ".join(
+                f"{key} {known(each)}" for key, each in cast("Mapping[str, Any]", value).items()
+            )
+            or "–"
+        )
     if isinstance(value, list | tuple):
         return ", ".join(str(known(each)) for each in cast("Sequence[Any]", value)) or "–"
     if isinstance(value, float):

@@ -26,7 +26,9 @@ from .scheduler_delay import waited
 from .suspect import suspect
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Environment variables by which linear algebra learns how many threads it may use, when numpy is loaded."""
+"""Environment variables by which linear algebra learns how many threads it may use, when numpy is
+loaded.
+"""
 
 
 def results(
@@ -39,15 +41,19 @@ def results(
     facts: Mapping[str, Any] | None = None,
     plan: Sequence[tuple[str, str, str]] = (),
 ) -> Results:
-    """The records, with what a reader needs to repeat the run: versions, machine, settings, cases and their references.
+    """The records, with what a reader needs to repeat the run: versions, machine, settings, cases
+    and their references.
 
     Args:
-        facts: further circumstances; they come before those found here, for a run that began in another process.
+        facts: further circumstances; they come before those found here, for a run that began in
+            another process.
         plan: the pairs that there were to be, of a run that does not have them all.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
     known["cases"] = _with_identical(
-        known["cases"], records, [case.name for case in cases if not (case.origin and case.origin.own)]
+        known["cases"],
+        records,
+        [case.name for case in cases if not (case.origin and case.origin.own)],
     )
     suspects = {case.name: found for case in cases if (found := suspect(case, records))}
     return Results(
@@ -58,16 +64,28 @@ def results(
     )
 
 
-def _with_identical(cases: Mapping[str, Any], records: Sequence[Record], of_others: Sequence[str]) -> dict[str, Any]:
-    """The facts of the cases, with a note on each whose reference has turned out to be native's own result."""
-    own = {record.case for record in records if record.evidence and record.evidence.own and record.case in of_others}
+def _with_identical(
+    cases: Mapping[str, Any], records: Sequence[Record], of_others: Sequence[str]
+) -> dict[str, Any]:
+    """The facts of the cases, with a note on each whose reference has turned out to be native's own
+    result.
+    """
+    own = {
+        record.case
+        for record in records
+        if record.evidence and record.evidence.own and record.case in of_others
+    }
     return {
-        name: {**facts, "notes": [*dict.fromkeys((*facts["notes"], IDENTICAL))]} if name in own else facts
+        name: {**facts, "notes": [*dict.fromkeys((*facts["notes"], IDENTICAL))]}
+        if name in own
+        else facts
         for name, facts in cases.items()
     }
 
 
-def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, command: str) -> dict[str, Any]:
+def circumstances(
+    cases: Sequence[Case], *, started: datetime, tol: float, command: str
+) -> dict[str, Any]:
     """What is known of a run before it begins, as JSON has it."""
     return plain(
         {
@@ -87,16 +105,21 @@ def circumstances(cases: Sequence[Case], *, started: datetime, tol: float, comma
 
 
 def versions(records: Sequence[Record]) -> dict[str, str | None]:
-    """The version of each engine, by name: all of them, where a run that was resumed found another; None where none is known."""
+    """The version of each engine, by name: all of them, where a run that was resumed found another;
+    None where none is known.
+    """
     found: dict[str, list[str]] = {record.engine: [] for record in records}
     for record in records:
-        if record.version is not None and record.version not in found[record.engine]:  # one that crashed may not have told it
+        # one that crashed may not have told it
+        if record.version is not None and record.version not in found[record.engine]:
             found[record.engine].append(record.version)
     return {engine: " and ".join(each) or None for engine, each in found.items()}
 
 
 def missing(plan: Sequence[tuple[str, str, str]], records: Sequence[Record]) -> dict[str, Any]:
-    """Case, engine and mode of the pairs that a run was to make and did not, as `run` has them; empty where all are there."""
+    """Case, engine and mode of the pairs that a run was to make and did not, as `run` has them;
+    empty where all are there.
+    """
     made = {(record.case, record.engine, record.mode) for record in records}
     pairs = [list(pair) for pair in plan if pair not in made]
     return {"missing": pairs} if pairs else {}
@@ -106,7 +129,9 @@ def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
     """The true values of each case that has any, by case and output."""
     return {
         case.name: {
-            output.name: as_numbers(case.reference[output.name], output) for output in case.outputs if output.name in case.reference
+            output.name: as_numbers(case.reference[output.name], output)
+            for output in case.outputs
+            if output.name in case.reference
         }
         for case in cases
         if case.reference
@@ -114,15 +139,25 @@ def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
 
 
 def git_state(folder: Path) -> dict[str, Any] | None:
-    """Commit, branch (null where none is checked out), whether files differ from it, and a digest of how where they do.
+    """Commit, branch (null where none is checked out), whether files differ from it, and a digest
+    of how where they do.
 
     None where there is no repository.
     """
 
     def git(*arguments: str) -> str | None:
         try:
-            done = subprocess.run(["git", "-C", folder, *arguments], capture_output=True, text=True, timeout=10, check=False)
-        except (OSError, subprocess.TimeoutExpired):  # no git, or a repository on a drive that does not answer
+            done = subprocess.run(
+                ["git", "-C", folder, *arguments],
+                capture_output=True,
+                text=True,
+                timeout=10,
+                check=False,
+            )
+        except (
+            OSError,
+            subprocess.TimeoutExpired,
+        ):  # no git, or a repository on a drive that does not answer
             return None
         return done.stdout.strip() if done.returncode == 0 else None
 
@@ -130,7 +165,11 @@ def git_state(folder: Path) -> dict[str, Any] | None:
     changed = git("status", "--porcelain", "--untracked-files=no")
     if not commit:
         return None
-    edits = {"edits": hashlib.sha256((git("diff", "HEAD") or "").encode()).hexdigest()[:12]} if changed else {}
+    edits = (
+        {"edits": hashlib.sha256((git("diff", "HEAD") or "").encode()).hexdigest()[:12]}
+        if changed
+        else {}
+    )
     return {
         "commit": commit,
         "branch": git("symbolic-ref", "--short", "HEAD"),
@@ -140,15 +179,18 @@ def git_state(folder: Path) -> dict[str, Any] | None:
 
 
 def conditions() -> dict[str, Any]:
-    """What a later run is compared by, and takes a moment to find out: the state of the files, and how fast this machine is now."""
+    """What a later run is compared by, and takes a moment to find out: the state of the files, and
+    how fast this machine is now.
+    """
     return {"git": git_state(Path.cwd()), "calibration_seconds": calibration()}
 
 
 def calibration() -> float:
-    """Seconds of a fixed piece of work, the median of five: what times are divided by to be compared with another day's.
+    """Seconds of a fixed piece of work, the median of five: what times are divided by to be
+    compared with another day's.
 
-    Without those in which others had the processor. About 20 ms: interpreter steps and small linear solves in turn, which is what
-    the engines' loops consist of.
+    Without those in which others had the processor. About 20 ms: interpreter steps and small linear
+    solves in turn, which is what the engines' loops consist of.
     """
     matrix, column = np.eye(12) + 0.01 * np.arange(144.0).reshape(12, 12) / 144.0, np.ones(12)
     times: list[float] = []
@@ -166,12 +208,19 @@ def calibration() -> float:
 
 def _facts(case: Case) -> dict[str, Any]:
     sweep = case.sweep
-    swept = {"name": TIME, "type": TIME} if sweep.driver == TIME else _driver(case, sweep.driver) | {"rate": sweep.rate}
+    swept = (
+        {"name": TIME, "type": TIME}
+        if sweep.driver == TIME
+        else _driver(case, sweep.driver) | {"rate": sweep.rate}
+    )
     return {
         "source": case.source,
         "truth": truth_of(case),
         "driver": swept,
-        "motions": {name: _driver(case, name) | {"motion": _motion(motion)} for name, motion in sweep.motions.items()},
+        "motions": {
+            name: _driver(case, name) | {"motion": _motion(motion)}
+            for name, motion in sweep.motions.items()
+        },
         "signs": case.signs,
         "notes": notes(case),
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
@@ -184,11 +233,17 @@ def _driver(case: Case, name: str) -> dict[str, Any]:
 
 
 def _motion(motion: Motion) -> dict[str, Any]:
-    return _motion(motion.motion) if isinstance(motion, Absolute) else {"type": motion.type, **asdict(motion)}
+    return (
+        _motion(motion.motion)
+        if isinstance(motion, Absolute)
+        else {"type": motion.type, **asdict(motion)}
+    )
 
 
 def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Facts of any origin as JSON has them: what is read equals what was written. What has no counterpart becomes its text."""
+    """Facts of any origin as JSON has them: what is read equals what was written. What has no
+    counterpart becomes its text.
+    """
 
     def instead(value: Any) -> Any:
         return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)  # pyright: ignore
@@ -197,12 +252,16 @@ def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def readable(text: str) -> str:
-    """Text that UTF-8 can hold: file names and foreign messages may be undecodable bytes in disguise."""
+    """Text that UTF-8 can hold: file names and foreign messages may be undecodable bytes in
+    disguise.
+    """
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def truth_of(case: Case) -> Truth:
-    """Return the kind of truth of a case: without a reference there is only consensus, whatever it claims."""
+    """Return the kind of truth of a case: without a reference there is only consensus, whatever it
+    claims.
+    """
     return case.truth if case.reference else Truth.CONSENSUS_ONLY
 
 
@@ -210,6 +269,8 @@ def processor() -> str:
     """Return the processor's name; platform.processor() gives none on Linux."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+            return next(
+                line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")
+            )
     except (OSError, StopIteration):
         return platform.processor() or platform.machine()

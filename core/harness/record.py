@@ -1,4 +1,6 @@
-"""Results as data: the record of one (case, engine) pair and of a whole run; the JSON schema kincheck-results/1."""
+"""Results as data: the record of one (case, engine) pair and of a whole run; the JSON schema
+kincheck-results/1.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ from .evidence import Evidence, Suspect
 class Outcome(StrEnum):
     """What became of a pair. Every pair gets exactly one.
 
-    UNJUDGED is a pair that was solved and that nothing could be compared with: neither a pass nor a fault.
+    UNJUDGED is a pair that was solved and that nothing could be compared with: neither a pass nor a
+    fault.
     """
 
     PASS = "pass"
@@ -31,8 +34,15 @@ class Outcome(StrEnum):
 
     @property
     def bad(self) -> bool:
-        """Whether something was run and went wrong; a missing engine or feature is no fault of a result."""
-        return self not in (Outcome.PASS, Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
+        """Whether something was run and went wrong; a missing engine or feature is no fault of a
+        result.
+        """
+        return self not in (
+            Outcome.PASS,
+            Outcome.UNJUDGED,
+            Outcome.UNSUPPORTED,
+            Outcome.UNAVAILABLE,
+        )
 
     @property
     def judged(self) -> bool:
@@ -46,7 +56,8 @@ class Outcome(StrEnum):
 
 
 class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
-    """One output over the samples, in SI. A sample, or a whole series, that was not computed is null; `reason` says why.
+    """One output over the samples, in SI. A sample, or a whole series, that was not computed is
+    null; `reason` says why.
 
     Attributes:
         sense: what a positive value means, where name and unit do not say it.
@@ -80,9 +91,10 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
     """Deviations of one output; null where there is nothing to compare, and `reason` says why.
 
     Attributes:
-        lost: how many values there are none of where what they are compared with has one, all samples being solved; absent where
-            none are. Where all are there is no deviation either.
-        contradicted: how many samples have a value although the standard's solver cannot reach them; absent where none have.
+        lost: how many values there are none of where what they are compared with has one, all
+            samples being solved; absent where none are. Where all are there is no deviation either.
+        contradicted: how many samples have a value although the standard's solver cannot reach
+            them; absent where none have.
     """
 
     position: Deviation | None
@@ -109,7 +121,8 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Seconds(msgspec.Struct, frozen=True, kw_only=True):
-    """Wall-clock seconds: making the model, the first solve, a solve after it (median of several), and judging the answer.
+    """Wall-clock seconds: making the model, the first solve, a solve after it (median of several),
+    and judging the answer.
 
     A phase that was not reached is null, and so are those after it.
 
@@ -125,22 +138,28 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
-    """The result of one (case, engine) pair. What was not computed is null, never zero; `message` says why.
+    """The result of one (case, engine) pair. What was not computed is null, never zero; `message`
+    says why.
 
     Attributes:
-        truth: kind of the case's reference; consensus_only where it has none, whatever the case claims.
-        driver: values at the samples by name: of what is swept [m, rad or s] first, then of every further moving driver.
+        truth: kind of the case's reference; consensus_only where it has none, whatever the case
+            claims.
+        driver: values at the samples by name: of what is swept [m, rad or s] first, then of every
+            further moving driver.
         errors: one entry for every output of the case, whatever the outcome.
         residual_max: the engine's own largest constraint residual over the solved samples [m or -].
-        rank: of the rows that the engine solves, at the design: native's are those of the joints, Cartesian and without drivers
-            (unknowns less rank is dof), a simulator's those of its own model, loops, relations and drivers. Ranks of different
-            engines are not to be compared.
+        rank: of the rows that the engine solves, at the design: native's are those of the joints,
+            Cartesian and without drivers (unknowns less rank is dof), a simulator's those of its
+            own model, loops, relations and drivers. Ranks of different engines are not to be
+            compared.
         dof: degrees of freedom, drivers apart; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: how many samples were reached, out of how many.
         us_per_step: warm solve by sample [us]; null unless all samples were reached.
-        evidence: of the reference that it was judged against; null where there is none, and in records of before.
-        reasons: why a number is null, by its key: residual_max, rank, dof, iterations, us_per_step. Records of before have none.
+        evidence: of the reference that it was judged against; null where there is none, and in
+            records of before.
+        reasons: why a number is null, by its key: residual_max, rank, dof, iterations, us_per_step.
+            Records of before have none.
     """
 
     case: str
@@ -169,7 +188,9 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def validated(self) -> bool:
-        """Whether it passed, and every output was judged against a truth that nobody here made and whose source is cited."""
+        """Whether it passed, and every output was judged against a truth that nobody here made and
+        whose source is cited.
+        """
         judged = [deviations.position for deviations in self.errors.values()]
         return (
             self.outcome is Outcome.PASS
@@ -191,7 +212,8 @@ class SceneBody(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         origin, euler_parameters: at the design, global [m, -].
-        r: origins, global [m], shape (frames, 3); empty where only the design is known, or the body is fixed.
+        r: origins, global [m], shape (frames, 3); empty where only the design is known, or the body
+            is fixed.
         p: Euler parameters e0..e3, body -> global [-], shape (frames, 4); empty as r.
     """
 
@@ -229,10 +251,12 @@ class ScenePoint(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Scene(msgspec.Struct, frozen=True, kw_only=True):
-    """A case's mechanism to look at. Poses are rounded to what a screen shows, and never compared with anything.
+    """A case's mechanism to look at. Poses are rounded to what a screen shows, and never compared
+    with anything.
 
     Attributes:
-        frames: indices of the samples at which there are poses; empty where only the design position is known.
+        frames: indices of the samples at which there are poses; empty where only the design
+            position is known.
         message: empty, or why samples have no pose.
     """
 
@@ -247,7 +271,8 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
     """A run.
 
     Attributes:
-        run: its circumstances: versions, machine, settings, what the cases are, and where it ended early, what is missing.
+        run: its circumstances: versions, machine, settings, what the cases are, and where it ended
+            early, what is missing.
         records: one per (case, engine) pair.
         references: the true values of each case that has any, by case and output.
         scenes: the mechanism of each case, by case; a run made without them has none.
@@ -262,13 +287,19 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
     suspects: dict[str, Suspect] = {}
 
     def blames_reference(self, record: Record) -> bool:
-        """Whether a failure is told by what is said of its case's reference, and not by its own message."""
-        whole = record.solved == record.samples and not any(each.lost for each in record.errors.values())
+        """Whether a failure is told by what is said of its case's reference, and not by its own
+        message.
+        """
+        whole = record.solved == record.samples and not any(
+            each.lost for each in record.errors.values()
+        )
         return record.case in self.suspects and record.outcome is Outcome.FAIL and whole
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:
-        """Case, engine and mode of the pairs that were asked for and have no record: the run ended before them, or see `unread`."""
+        """Case, engine and mode of the pairs that were asked for and have no record: the run ended
+        before them, or see `unread`.
+        """
         return [(case, engine, mode) for case, engine, mode in self.run.get("missing", [])]
 
     @property
@@ -282,11 +313,15 @@ def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
     text = msgspec.json.format(msgspec.json.encode(results), indent=2)
     # a string cannot hold a bare line break, so only white space between numbers is touched
     rows = re.compile(rb"\[[^][{}\"]*\]")
-    return rows.sub(lambda row: re.sub(rb"\n *", b"", row[0].replace(b",\n", b", \n")), text) + b"\n"
+    return (
+        rows.sub(lambda row: re.sub(rb"\n *", b"", row[0].replace(b",\n", b", \n")), text) + b"\n"
+    )
 
 
 def settled(record: Record) -> Record:
-    """Return a record with the outcome that it has today: older files call it a pass where nothing was compared."""
+    """Return a record with the outcome that it has today: older files call it a pass where nothing
+    was compared.
+    """
     if record.outcome is Outcome.PASS and not record.compared:
         return msgspec.structs.replace(record, outcome=Outcome.UNJUDGED)
     return record

@@ -1,4 +1,6 @@
-"""Results in a file, kincheck-results/1, read so that nothing made of them can fail: a file may be cut, edited, or made up."""
+"""Results in a file, kincheck-results/1, read so that nothing made of them can fail: a file may be
+cut, edited, or made up.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from ..trajectory import QUANTITIES
 from .record import Outcome, OutputSeries, Record, Results, Scene, from_json
 
 LARGEST_FILE = 512_000_000
-# Numbers are shown in thousandths and degrees, and subtracted: within this bound that does not overflow.
+# Numbers are shown in thousandths and degrees, and subtracted: within this bound that does not
+# overflow.
 LARGEST = 1e300
 _ADVICE = "make it anew with kincheck run --json"
 
@@ -53,8 +56,8 @@ def read_results(file: Path) -> Results:
     """The results in a file.
 
     Raises:
-        CaseError: it cannot be read, is none, or contradicts itself: series of other lengths than the driver's, names that are
-            not there.
+        CaseError: it cannot be read, is none, or contradicts itself: series of other lengths than
+            the driver's, names that are not there.
     """
     text = read_text(file, LARGEST_FILE, "give results that kincheck run wrote")
     try:
@@ -69,7 +72,12 @@ def read_results(file: Path) -> Results:
         _check_record(file, f"records[{k}]", record, samples)
     for case, outputs in results.references.items():
         for name, series in outputs.items():
-            _check_series(file, join(join("references", case), name), series, samples.get(case, len(series.position)))
+            _check_series(
+                file,
+                join(join("references", case), name),
+                series,
+                samples.get(case, len(series.position)),
+            )
     for case, scene in results.scenes.items():
         _check_scene(file, join("scenes", case), scene)
     return results
@@ -88,7 +96,12 @@ def _check(file: Path, key: str, holds: bool, problem: str) -> None:
 
 
 def _check_record(file: Path, key: str, record: Record, samples: dict[str, int]) -> None:
-    _check(file, f"{key}.truth", record.truth in set(Truth), f"found {shown(record.truth)}, expected one of {', '.join(Truth)}")
+    _check(
+        file,
+        f"{key}.truth",
+        record.truth in set(Truth),
+        f"found {shown(record.truth)}, expected one of {', '.join(Truth)}",
+    )
     _convert(file, f"{key}.details", record.details, _Details)
     if record.driver:
         count = samples.setdefault(record.case, len(next(iter(record.driver.values()))))
@@ -104,8 +117,18 @@ def _check_record(file: Path, key: str, record: Record, samples: dict[str, int])
             place = f"{join(f'{key}.errors', name)}.{quantity}"
             given = record.outputs.get(name)
             known = given is not None and getattr(given, quantity) is not None
-            _check(file, place, known, f"found a deviation of what is not there, expected {quantity} in outputs")
-            _check(file, f"{place}.worst_step", 0 <= found.worst_step < count, f"found no sample, expected one of {count}")
+            _check(
+                file,
+                place,
+                known,
+                f"found a deviation of what is not there, expected {quantity} in outputs",
+            )
+            _check(
+                file,
+                f"{place}.worst_step",
+                0 <= found.worst_step < count,
+                f"found no sample, expected one of {count}",
+            )
             _check_sizes(file, place, (found.max_abs, found.rms, found.tolerance))
     numbers = [record.residual_max, record.us_per_step]
     numbers += [] if record.seconds is None else [*msgspec.structs.astuple(record.seconds)]
@@ -120,23 +143,53 @@ def _check_series(file: Path, key: str, series: OutputSeries, count: int) -> Non
 
 
 def _check_numbers(file: Path, key: str, values: Sequence[float | None], count: int) -> None:
-    _check(file, key, len(values) == count, f"found {len(values)} numbers, expected {count}, as many as samples of the case")
-    _check(file, key, all(each is None or abs(each) <= LARGEST for each in values), f"found a number beyond {LARGEST:g}")
+    _check(
+        file,
+        key,
+        len(values) == count,
+        f"found {len(values)} numbers, expected {count}, as many as samples of the case",
+    )
+    _check(
+        file,
+        key,
+        all(each is None or abs(each) <= LARGEST for each in values),
+        f"found a number beyond {LARGEST:g}",
+    )
 
 
 def _check_sizes(file: Path, key: str, values: Iterable[float | None]) -> None:
     usable = all(each is None or 0.0 <= each <= LARGEST for each in values)
-    _check(file, key, usable, f"found a negative number or one beyond {LARGEST:g}, expected errors and times")
+    _check(
+        file,
+        key,
+        usable,
+        f"found a negative number or one beyond {LARGEST:g}, expected errors and times",
+    )
 
 
 def _check_scene(file: Path, key: str, scene: Scene) -> None:
     bodies: Mapping[str, Any] = {body.name: body for body in scene.bodies}
-    _check(file, f"{key}.bodies", len(bodies) == len(scene.bodies) and GROUND not in bodies, "found a name twice, or the ground")
+    _check(
+        file,
+        f"{key}.bodies",
+        len(bodies) == len(scene.bodies) and GROUND not in bodies,
+        "found a name twice, or the ground",
+    )
     for body in scene.bodies:
-        rows = [(3, body.origin), (4, body.euler_parameters), *((3, each) for each in body.r), *((4, each) for each in body.p)]
+        rows = [
+            (3, body.origin),
+            (4, body.euler_parameters),
+            *((3, each) for each in body.r),
+            *((4, each) for each in body.p),
+        ]
         _check_rows(file, f"{key}.bodies", rows)
         counts = {len(body.r), len(body.p)}
-        _check(file, f"{key}.bodies", counts <= {len(scene.frames)} or counts == {0}, "found other poses than frames")
+        _check(
+            file,
+            f"{key}.bodies",
+            counts <= {len(scene.frames)} or counts == {0},
+            "found other poses than frames",
+        )
     known = {GROUND, *bodies}
     for joint in scene.joints:
         there = len(joint.bodies) == 2 and known.issuperset(joint.bodies)
@@ -145,7 +198,12 @@ def _check_scene(file: Path, key: str, scene: Scene) -> None:
         directions = all(1e-100 < math.hypot(*axis) < 1e100 for axis in joint.axes)
         _check(file, f"{key}.joints", directions, f"found {shown(joint.axes)}, expected directions")
     for point in scene.points:
-        _check(file, f"{key}.points", point.body in known, f"found {shown(point.body)}, expected a body")
+        _check(
+            file,
+            f"{key}.points",
+            point.body in known,
+            f"found {shown(point.body)}, expected a body",
+        )
         _check_rows(file, f"{key}.points", [(3, point.position)])
 
 

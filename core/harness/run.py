@@ -1,4 +1,6 @@
-"""Running: every case with every engine, each pair judged and timed, exactly one record per pair."""
+"""Running: every case with every engine, each pair judged and timed, exactly one record per
+pair.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ Progress = Callable[[Record, int, int], None]
 
 @dataclass(eq=False)
 class _Judging:
-    """A case being judged: what to compare with, None until the native engine is through, and the pairs that wait for it."""
+    """A case being judged: what to compare with, None until the native engine is through, and the
+    pairs that wait for it.
+    """
 
     standard: Standard | None
     waiting: list[tuple[Pair, Attempt]] = field(default_factory=list[tuple[Pair, Attempt]])
@@ -69,17 +73,21 @@ def run(
 
     Args:
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        baseline: the native engine, to compare with, where it is not among the engines; it gets no records.
+        baseline: the native engine, to compare with, where it is not among the engines; it gets no
+            records.
         command: the command line, kept with the results.
         solver: where pairs are solved: in this process, in worker processes, on a cluster.
-        made: records made earlier, by a run of the same cases and engines; their pairs are not solved again.
+        made: records made earlier, by a run of the same cases and engines; their pairs are not
+            solved again.
         facts: further circumstances, kept with the results; they come before those of now.
-        unread: names of cases that were asked for and make no sense; their pairs are among those that are missing.
+        unread: names of cases that were asked for and make no sense; their pairs are among those
+            that are missing.
         residuals: fail an engine in projection mode that calls samples solved whose residual is
             above `tol`; not for efforts that leave a residual on purpose.
 
     Raises:
-        CaseError: two cases share their name, or two engines theirs and the mode: records go by names.
+        CaseError: two cases share their name, or two engines theirs and the mode: records go by
+            names.
     """
     started = datetime.now(UTC)
     _distinct("cases", [case.name for case in cases])
@@ -87,8 +95,13 @@ def run(
     records = {_key(record): record for record in made}
     ordered = sorted(engines, key=_native_first)
     wanted = planned(cases, engines)
-    judging = {case.name: _Judging(_standard_known(case, ordered, baseline, records)) for case in cases}
-    pairs = [Pair(case, engine, tol) for case, engine in _to_solve(cases, ordered, baseline, records, judging)]
+    judging = {
+        case.name: _Judging(_standard_known(case, ordered, baseline, records)) for case in cases
+    }
+    pairs = [
+        Pair(case, engine, tol)
+        for case, engine in _to_solve(cases, ordered, baseline, records, judging)
+    ]
 
     def judge(pair: Pair, attempt: Attempt, standard: Standard) -> Record:
         record = _record(pair, attempt, standard, residuals=residuals)
@@ -116,13 +129,24 @@ def run(
 def _distinct(what: str, names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise CaseError(f"run: there are two {what} named {twice[0]!r}; results go by name: rename one, or leave it out")
+        raise CaseError(
+            f"run: there are two {what} named {twice[0]!r}; results go by name: rename one, or"
+            " leave it out"
+        )
 
 
-def planned(cases: Sequence[Case], engines: Sequence[Engine], unread: Sequence[str] = ()) -> list[tuple[str, str, str]]:
-    """Case, engine and mode of every pair, in the order of the records; last those of cases that cannot be read."""
+def planned(
+    cases: Sequence[Case], engines: Sequence[Engine], unread: Sequence[str] = ()
+) -> list[tuple[str, str, str]]:
+    """Case, engine and mode of every pair, in the order of the records; last those of cases that
+    cannot be read.
+    """
     names = [*(case.name for case in cases), *unread]
-    return [(name, engine.name, engine.mode) for name in names for engine in sorted(engines, key=_native_first)]
+    return [
+        (name, engine.name, engine.mode)
+        for name in names
+        for engine in sorted(engines, key=_native_first)
+    ]
 
 
 def _native_first(engine: Engine) -> bool:
@@ -142,14 +166,19 @@ def _to_solve(
 ) -> Iterator[tuple[Case, Engine]]:
     """Every pair that has no record, and the baseline where it is to be compared with."""
     for case in cases:
-        missing = [engine for engine in engines if (case.name, engine.name, engine.mode) not in made]
+        missing = [
+            engine for engine in engines if (case.name, engine.name, engine.mode) not in made
+        ]
         if baseline is not None and missing and judging[case.name].standard is None:
             yield case, baseline
         yield from ((case, engine) for engine in missing)
 
 
 def _standard_known(
-    case: Case, engines: Sequence[Engine], baseline: Engine | None, made: Mapping[tuple[str, str, str], Record]
+    case: Case,
+    engines: Sequence[Engine],
+    baseline: Engine | None,
+    made: Mapping[tuple[str, str, str], Record],
 ) -> Standard | None:
     """What to compare with, if it is known before anything is solved."""
     # of data of others it has to be known whether they are native's own
@@ -175,10 +204,17 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
             verdict = judged(case, result, native, tol)
             found = result.outputs if engine.name == NATIVE else native.outputs
             own = evidence(case, found)
-            return _answered(case, engine, facts, result, attempt.seconds or Seconds(), verdict, own)
+            return _answered(
+                case, engine, facts, result, attempt.seconds or Seconds(), verdict, own
+            )
         except Exception as error:  # a reference that does not fit, for one
             result = Failure(Outcome.ERROR, said(error))
-    nothing = Deviations(position=None, velocity=None, acceleration=None, reason=f"{result.outcome}: {result.message}")
+    nothing = Deviations(
+        position=None,
+        velocity=None,
+        acceleration=None,
+        reason=f"{result.outcome}: {result.message}",
+    )
     return _made(
         case,
         engine,
@@ -194,7 +230,13 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
 
 
 def _answered(
-    case: Case, engine: Engine, facts: Facts, answer: Answer, seconds: Seconds, verdict: Verdict, own: Evidence | None
+    case: Case,
+    engine: Engine,
+    facts: Facts,
+    answer: Answer,
+    seconds: Seconds,
+    verdict: Verdict,
+    own: Evidence | None,
 ) -> Record:
     """Return the record of an answer."""
     solved, samples = answer.solved, len(case.sweep.values)
@@ -206,7 +248,9 @@ def _answered(
         "rank": details.pop("rank", None),
         "dof": details.pop("dof", None),
         "iterations": answer.iterations if solved else None,
-        "us_per_step": 1e6 * seconds.warm / samples if solved == samples and seconds.warm is not None else None,
+        "us_per_step": (
+            1e6 * seconds.warm / samples if solved == samples and seconds.warm is not None else None
+        ),
     }
     return _made(
         case,
@@ -215,7 +259,9 @@ def _answered(
         outcome=verdict.outcome,
         message="; ".join(messages),
         driver={name: each.tolist() for name, each in case.sweep.moved.items()},
-        outputs={output.name: as_numbers(answer.outputs[output.name], output) for output in case.outputs},
+        outputs={
+            output.name: as_numbers(answer.outputs[output.name], output) for output in case.outputs
+        },
         errors=dict(verdict.errors),
         **numbers,
         reasons={key: UNTOLD[key] for key, number in numbers.items() if number is None},

@@ -29,16 +29,19 @@ TOL = 1e-9
 
 
 def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
-    """The same results with a scene of every case, but for mechanisms of more than `LARGEST` moving bodies.
+    """The same results with a scene of every case, but for mechanisms of more than `LARGEST` moving
+    bodies.
 
-    Poses over the sweep are solved for only where the native engine has an answer in these results: what it has been seen to
-    manage, in a process of its own perhaps, will neither hang nor end this one.
+    Poses over the sweep are solved for only where the native engine has an answer in these results:
+    what it has been seen to manage, in a process of its own perhaps, will neither hang nor end this
+    one.
     """
     answered = {record.case for record in results.records if _answers(record)}
     asked = any(record.engine == NATIVE for record in results.records)
     shown = [case for case in cases if len(case.mechanism.moving) <= LARGEST]
     return msgspec.structs.replace(
-        results, scenes={case.name: scene(case, poses=case.name in answered, asked=asked) for case in shown}
+        results,
+        scenes={case.name: scene(case, poses=case.name in answered, asked=asked) for case in shown},
     )
 
 
@@ -55,13 +58,19 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
     """
     mechanism = case.mechanism
     frames, motions = list[int](), dict[str, BodyMotion]()
-    message = f"the native engine {'has no answer' if asked else 'was not asked'} in this run: this is the design position"
+    message = (
+        f"the native engine {'has no answer' if asked else 'was not asked'} in this run: this is"
+        " the design position"
+    )
     if poses:
         try:
             frames, motions, message = _poses(case)
         except KincheckError as error:
             message = f"no poses, this is the design position: {error}"
-    size = _size([body.origin for body in mechanism.bodies] + [point for joint in mechanism.joints for point in joint.points_on()])
+    size = _size(
+        [body.origin for body in mechanism.bodies]
+        + [point for joint in mechanism.joints for point in joint.points_on()]
+    )
     return Scene(
         bodies=[
             SceneBody(
@@ -85,7 +94,12 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
             for joint in mechanism.joints
         ],
         points=[
-            ScenePoint(name=point.name, body=point.body, position=list(point.position), output=point.name in case.points)
+            ScenePoint(
+                name=point.name,
+                body=point.body,
+                position=list(point.position),
+                output=point.name in case.points,
+            )
             for point in mechanism.points
             if not point.name.startswith(MARKER)
         ],
@@ -103,7 +117,10 @@ def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
     # not compiled: for so few samples the compiler takes longer than numpy
     request = Request(tuple(path.motions), (), bodies, order=0, compiled=False)
     found = prepare(case.mechanism, request, replace(path, times=path.times[taken]))(TOL)
-    reached = {name: replace(motion, r=motion.r[found.solved], p=motion.p[found.solved]) for name, motion in found.bodies.items()}
+    reached = {
+        name: replace(motion, r=motion.r[found.solved], p=motion.p[found.solved])
+        for name, motion in found.bodies.items()
+    }
     return taken[found.solved].tolist(), reached if found.solved.any() else {}, found.message
 
 

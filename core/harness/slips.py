@@ -1,7 +1,9 @@
-"""Slips: simple mistakes in a reference, tried on the whole series: sign, unit, offset, order of samples, exchanged columns.
+"""Slips: simple mistakes in a reference, tried on the whole series: sign, unit, offset, order of
+samples, exchanged columns.
 
-A slip is named only where undoing it brings the reference within the tolerance, and where that says something: a series of zeros
-fits with either sign, a constant one fits after any offset, and two samples prove nothing.
+A slip is named only where undoing it brings the reference within the tolerance, and where that says
+something: a series of zeros fits with either sign, a constant one fits after any offset, and two
+samples prove nothing.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from .compare import deviation
 
 # Two samples are met by too many changes.
 FEWEST = 3
-# A series whose values, or whose changes, are smaller than so many tolerances is met by too many changes, too.
+# A series whose values, or whose changes, are smaller than so many tolerances is met by too many
+# changes, too.
 MEANINGFUL = 10.0
 OTHER_SIGN = "with the other sign"
 FACTORS: Mapping[str, float] = {
@@ -40,12 +43,16 @@ FACTORS: Mapping[str, float] = {
     "2": 2.0,
     "1/2": 0.5,
 }
-"""Between units of length and of angle, percent and parts, half and whole; by their names in messages."""
+"""Between units of length and of angle, percent and parts, half and whole; by their names in
+messages.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """The values of one output, and what they are held to: atol + rtol * range of what they are compared with."""
+    """The values of one output, and what they are held to: atol + rtol * range of what they are
+    compared with.
+    """
 
     values: Array
     atol: float
@@ -76,8 +83,11 @@ class Slip:
 _Change = tuple[str, Callable[[Array], Array]]
 
 
-def slips(held: Held, reference: Array, others: Mapping[str, Held], *, offsets: bool = True) -> list[Slip]:
-    """Return all single changes that make the reference fit, or where there are none, all pairs of changes.
+def slips(
+    held: Held, reference: Array, others: Mapping[str, Held], *, offsets: bool = True
+) -> list[Slip]:
+    """Return all single changes that make the reference fit, or where there are none, all pairs of
+    changes.
 
     Args:
         held: the values that the engines agree on.
@@ -85,16 +95,22 @@ def slips(held: Held, reference: Array, others: Mapping[str, Held], *, offsets: 
         others: values of the other outputs, by name, which the reference may be of.
         offsets: whether a constant may be added; to a derivative nobody adds one.
     """
-    return list(_single(held, reference, others, offsets)) or list(_pairs(held, reference, others, offsets))
+    return list(_single(held, reference, others, offsets)) or list(
+        _pairs(held, reference, others, offsets)
+    )
 
 
-def _single(held: Held, reference: Array, others: Mapping[str, Held], offsets: bool) -> Iterator[Slip]:
+def _single(
+    held: Held, reference: Array, others: Mapping[str, Held], offsets: bool
+) -> Iterator[Slip]:
     yield from _fitting(held, reference, _scales(), "", constant=True)
     yield from _fitting(held, reference, _moves(held, reference, offsets), "")
     yield from _exchanged(reference, others, "")
 
 
-def _pairs(held: Held, reference: Array, others: Mapping[str, Held], offsets: bool) -> Iterator[Slip]:
+def _pairs(
+    held: Held, reference: Array, others: Mapping[str, Held], offsets: bool
+) -> Iterator[Slip]:
     both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
     yield from _fitting(held, reference, both, "", constant=True)
     for words, change in _scales():
@@ -104,7 +120,10 @@ def _pairs(held: Held, reference: Array, others: Mapping[str, Held], offsets: bo
 
 
 def _scales() -> list[_Change]:
-    return [(OTHER_SIGN, _times(-1.0)), *((f"times {name}", _times(factor)) for name, factor in FACTORS.items())]
+    return [
+        (OTHER_SIGN, _times(-1.0)),
+        *((f"times {name}", _times(factor)) for name, factor in FACTORS.items()),
+    ]
 
 
 def _times(factor: float) -> Callable[[Array], Array]:
@@ -116,15 +135,26 @@ def _moves(held: Held, reference: Array, offsets: bool) -> Iterator[_Change]:
     known = np.isfinite(off)
     if offsets and known.any():
         constant = 0.5 * float(off[known].max() + off[known].min())
-        yield f"{'plus' if constant > 0 else 'minus'} {abs(constant):.9g} {held.unit}", lambda x: x + constant
+        yield (
+            f"{'plus' if constant > 0 else 'minus'} {abs(constant):.9g} {held.unit}",
+            lambda x: x + constant,
+        )
     yield "with its samples in reversed order", lambda x: x[::-1]
     gap = np.full(1, np.nan)
     yield "shifted by one sample, each taken from the next", lambda x: np.concatenate([x[1:], gap])
-    yield "shifted by one sample, each taken from the one before", lambda x: np.concatenate([gap, x[:-1]])
+    yield (
+        "shifted by one sample, each taken from the one before",
+        lambda x: np.concatenate([gap, x[:-1]]),
+    )
 
 
 def _fitting(
-    held: Held, reference: Array, changes: Iterator[_Change] | list[_Change], before: str, *, constant: bool = False
+    held: Held,
+    reference: Array,
+    changes: Iterator[_Change] | list[_Change],
+    before: str,
+    *,
+    constant: bool = False,
 ) -> Iterator[Slip]:
     """The changes after which the reference fits.
 
@@ -147,4 +177,6 @@ def _fitting(
 def _exchanged(reference: Array, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
     """The outputs of which the reference is, where it varies."""
     for name, other in others.items():
-        yield from _fitting(other, reference, [(f"{before}taken as that of output {name}", lambda x: x)], "")
+        yield from _fitting(
+            other, reference, [(f"{before}taken as that of output {name}", lambda x: x)], ""
+        )

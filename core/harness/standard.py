@@ -1,4 +1,6 @@
-"""Standards: what the native engine gives or refuses where the reference of a case does not say it all."""
+"""Standards: what the native engine gives or refuses where the reference of a case does not say it
+all.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +29,8 @@ class Standard:
         outputs: by name; empty where there are none.
         absent: why there are none, as the end of a sentence on the missing reference.
         refused: samples that the native engine cannot reach, shape (n,); None where there are none.
-            Samples that it reaches, and refuses because the pose or its rates are uncertain beside a
-            singular pose, are not among them: it says nothing of the values of others there.
+            Samples that it reaches, and refuses because the pose or its rates are uncertain beside
+            a singular pose, are not among them: it says nothing of the values of others there.
         why: its own message.
     """
 
@@ -38,7 +40,9 @@ class Standard:
     why: str = ""
 
     def refuses(self, case: Case) -> NDArray[np.bool_] | None:
-        """Return the samples that the native engine cannot reach and the reference does not have, shape (n,)."""
+        """Return the samples that the native engine cannot reach and the reference does not have,
+        shape (n,).
+        """
         if self.refused is None:
             return None
         return self.refused & ~known(case.reference.values(), len(self.refused))
@@ -58,10 +62,15 @@ def standard_of(native: Record) -> Standard:
 
 
 def has_everything(case: Case) -> bool:
-    """Return whether the reference has a value of everything there is to compare, at every sample."""
+    """Return whether the reference has a value of everything there is to compare, at every
+    sample.
+    """
     return all(
         (series := case.reference.get(output.name)) is not None
-        and all(each is not None for each in (series.position, series.velocity, series.acceleration)[: output.orders])
+        and all(
+            each is not None
+            for each in (series.position, series.velocity, series.acceleration)[: output.orders]
+        )
         and np.isfinite(series.position).all()
         for output in case.outputs
     )
@@ -77,5 +86,8 @@ def known(outputs: Iterable[Series], samples: int) -> NDArray[np.bool_]:
 
 def _series(output: OutputSeries) -> Series:
     """Return what `as_numbers` wrote down, without loss: NaN for null."""
-    rates = [None if each is None else np.array(each, dtype=np.float64) for each in (output.velocity, output.acceleration)]
+    rates = [
+        None if each is None else np.array(each, dtype=np.float64)
+        for each in (output.velocity, output.acceleration)
+    ]
     return Series(np.array(output.position, dtype=np.float64), *rates)

@@ -1,4 +1,6 @@
-"""Suspecting the reference: where all engines of a case agree with each other and not with it, it is the odd one out."""
+"""Suspecting the reference: where all engines of a case agree with each other and not with it, it
+is the odd one out.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ from .slips import Held, Slip, slips
 # A sentence that explains more outputs than these is not read; further ones are counted.
 MOST_EXPLAINED = 12
 ADVICE = "suspect the reference, the output's component or a sign"
-UNEXPLAINED = "no sign, unit, offset, exchanged column, reversed or shifted order of samples explains it"
+UNEXPLAINED = (
+    "no sign, unit, offset, exchanged column, reversed or shifted order of samples explains it"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +43,17 @@ class _Off:
 
 
 def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
-    """Return what there is to be said where the engines agree within tolerance and the reference does not fit; else None.
+    """Return what there is to be said where the engines agree within tolerance and the reference
+    does not fit; else None.
 
-    One engine alone agrees with nobody: its reference is suspected only where a slip explains all of it.
+    One engine alone agrees with nobody: its reference is suspected only where a slip explains all
+    of it.
     """
     mine = [record for record in records if record.case == case.name and record.solved]
     whole = [record for record in mine if record.solved == record.samples]
-    if not case.reference or not any(_against(each, case) for record in mine for each in record.errors.values()):
+    if not case.reference or not any(
+        _against(each, case) for record in mine for each in record.errors.values()
+    ):
         return None
     if not whole:
         return None
@@ -71,7 +79,10 @@ def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
         unit=worst.held.unit,
         explanations=explanations,
         unexplained=left,
-        message=f"{_engines(engines, agreed, worst)}; {_difference(case, worst)}: {ADVICE}; {_reasons(explanations, left)}",
+        message=(
+            f"{_engines(engines, agreed, worst)}; {_difference(case, worst)}: {ADVICE};"
+            f" {_reasons(explanations, left)}"
+        ),
     )
 
 
@@ -83,9 +94,15 @@ def _engines(engines: Sequence[str], agreed: float, worst: _Off) -> str:
 
 def _difference(case: Case, worst: _Off) -> str:
     step = worst.deviation.worst_step
-    at = f"sample {step} ({case.sweep.driver} = {_unit(case).written(float(case.sweep.values[step]))})"
+    at = (
+        f"sample {step} ({case.sweep.driver} ="
+        f" {_unit(case).written(float(case.sweep.values[step]))})"
+    )
     off = f"{_number(worst.deviation.max_abs)} {worst.held.unit}"
-    held = f"{QUANTITIES[worst.order]}, tolerance {_number(worst.deviation.tolerance)} {worst.held.unit}"
+    held = (
+        f"{QUANTITIES[worst.order]}, tolerance {_number(worst.deviation.tolerance)}"
+        f" {worst.held.unit}"
+    )
     return f"the reference differs by {off} at {at} of output {worst.output} ({held})"
 
 
@@ -99,8 +116,9 @@ def _unit(case: Case) -> Unit:
 
 def _reasons(explanations: Sequence[Explanation], left: Sequence[str]) -> str:
     said = [
-        f"{', '.join(each.outputs)} ({', '.join(each.quantities)}): the reference {each.change} fits within "
-        f"{_number(each.difference)} {each.unit}, tolerance {_number(each.tolerance)} {each.unit}"
+        f"{', '.join(each.outputs)} ({', '.join(each.quantities)}): the reference {each.change}"
+        f" fits within {_number(each.difference)} {each.unit}, tolerance {_number(each.tolerance)}"
+        f" {each.unit}"
         for each in explanations
     ]
     if left:
@@ -126,13 +144,22 @@ def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held
     """The values of a record by output, and what they are held to."""
     found: dict[str, Held] = {}
     for output in case.outputs:
-        if order < output.orders and (values := _series(record.outputs[output.name], order)) is not None:
-            found[output.name] = Held(values, output.atol * beat**order, output.rtol, output.unit + PER_TIME[order])
+        if (
+            order < output.orders
+            and (values := _series(record.outputs[output.name], order)) is not None
+        ):
+            found[output.name] = Held(
+                values, output.atol * beat**order, output.rtol, output.unit + PER_TIME[order]
+            )
     return found
 
 
-def _agreement(case: Case, beat: float, first: Record, records: Sequence[Record]) -> dict[tuple[str, int], float] | None:
-    """The largest difference between the first engine and the others, by output and order; None where one is not within."""
+def _agreement(
+    case: Case, beat: float, first: Record, records: Sequence[Record]
+) -> dict[tuple[str, int], float] | None:
+    """The largest difference between the first engine and the others, by output and order; None
+    where one is not within.
+    """
     largest: dict[tuple[str, int], float] = {}
     for order in range(len(QUANTITIES)):
         held = _held(case, beat, first, order)
@@ -140,7 +167,9 @@ def _agreement(case: Case, beat: float, first: Record, records: Sequence[Record]
             for name, other in _held(case, beat, record, order).items():
                 if name not in held:
                     continue
-                off = deviation(other.values, held[name].values, other.atol, other.rtol, first.engine)
+                off = deviation(
+                    other.values, held[name].values, other.atol, other.rtol, first.engine
+                )
                 if off is None:
                     continue
                 if not off.within:
@@ -161,8 +190,12 @@ def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
                 yield _Off(name, order, held, reference, found)
 
 
-def _explained(case: Case, beat: float, record: Record, off: Sequence[_Off]) -> tuple[list[Explanation], list[str]]:
-    """Slips that explain what is out of tolerance, alike ones together, and the outputs that none explains, by name."""
+def _explained(
+    case: Case, beat: float, record: Record, off: Sequence[_Off]
+) -> tuple[list[Explanation], list[str]]:
+    """Slips that explain what is out of tolerance, alike ones together, and the outputs that none
+    explains, by name.
+    """
     every = {order: _held(case, beat, record, order) for order in range(len(QUANTITIES))}
     units = {output.name: output.unit for output in case.outputs}
     found: dict[tuple[str, tuple[str, ...]], list[tuple[str, str, Slip]]] = {}
@@ -171,12 +204,24 @@ def _explained(case: Case, beat: float, record: Record, off: Sequence[_Off]) -> 
     for name in names[:MOST_EXPLAINED]:
         fitting: dict[_Off, dict[str, Slip]] = {}
         for each in (each for each in off if each.output == name):
-            others = {other: held for other, held in every[each.order].items() if other != name and units[other] == units[name]}
+            others = {
+                other: held
+                for other, held in every[each.order].items()
+                if other != name and units[other] == units[name]
+            }
             all_slips = slips(each.held, each.reference, others, offsets=each.order == 0)
             fitting[each] = {slip.change: slip for slip in all_slips}
-        common = [words for words in next(iter(fitting.values())) if all(words in fits for fits in fitting.values())]
+        common = [
+            words
+            for words in next(iter(fitting.values()))
+            if all(words in fits for fits in fitting.values())
+        ]
         unexplained: list[str] = []
-        for quantities, changes in [([*fitting], common)] if common else [([each], [*fits]) for each, fits in fitting.items()]:
+        for quantities, changes in (
+            [([*fitting], common)]
+            if common
+            else [([each], [*fits]) for each, fits in fitting.items()]
+        ):
             orders = sorted(each.order for each in quantities)
             if not changes:
                 unexplained += [QUANTITIES[order] for order in orders]
@@ -189,7 +234,9 @@ def _explained(case: Case, beat: float, record: Record, off: Sequence[_Off]) -> 
     return [_explanation(*key, members) for key, members in found.items()], left
 
 
-def _explanation(change: str, quantities: Sequence[str], members: Sequence[tuple[str, str, Slip]]) -> Explanation:
+def _explanation(
+    change: str, quantities: Sequence[str], members: Sequence[tuple[str, str, Slip]]
+) -> Explanation:
     _, unit, worst = max(members, key=lambda each: each[2].ratio)
     return Explanation(
         outputs=[name for name, _, _ in members],

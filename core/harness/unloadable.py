@@ -12,7 +12,9 @@ from ..trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Unloadable:
-    """What stands in the place of an engine whose own module fails when it is imported: its pairs are errors, which say why."""
+    """What stands in the place of an engine whose own module fails when it is imported: its pairs
+    are errors, which say why.
+    """
 
     name: str
     reason: str

@@ -53,14 +53,21 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     begin = perf_counter()
     solved, samples = answer.solved, len(case.sweep.values)
     complete = solved == samples
-    errors = {output.name: _deviations(case, output, answer, native, complete=complete) for output in case.outputs}
+    errors = {
+        output.name: _deviations(case, output, answer, native, complete=complete)
+        for output in case.outputs
+    }
     faults: list[str] = []
     if not complete:
         why = answer.message or "the engine does not say why; ask it to"
-        faults.append(f"{solved} of {samples} samples solved: {why}{_reached_elsewhere(case, answer, native)}")
+        faults.append(
+            f"{solved} of {samples} samples solved: {why}{_reached_elsewhere(case, answer, native)}"
+        )
     faults += filter(None, (_contradiction(case, answer, native), _worst(case, errors)))
     # an output without any value has no deviation to be out of tolerance
-    faults += [f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within]
+    faults += [
+        f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within
+    ]
     faults += filter(None, (excess(case, answer.residual if solved else 0.0, tol),))
     if faults:
         return Verdict(Outcome.FAIL, faults, errors, perf_counter() - begin)
@@ -74,7 +81,9 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     return Verdict(outcome, messages, errors, perf_counter() - begin)
 
 
-def _deviations(case: Case, output: Quantity, answer: Answer, native: Standard, *, complete: bool) -> Deviations:
+def _deviations(
+    case: Case, output: Quantity, answer: Answer, native: Standard, *, complete: bool
+) -> Deviations:
     name, found = output.name, answer.outputs[output.name]
     standards = [(str(case.truth), case.reference[name])] if name in case.reference else []
     standards += [(NATIVE, native.outputs[name])] if name in native.outputs else []
@@ -103,7 +112,9 @@ def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
 
 
 def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
-    """Return what an engine has where the native engine refuses the sample, with both sides; empty where they agree."""
+    """Return what an engine has where the native engine refuses the sample, with both sides; empty
+    where they agree.
+    """
     refused = native.refuses(case)
     if refused is None:
         return ""
@@ -119,23 +130,29 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
     ]
     where = f"sample {first} ({case.sweep.driver} = {case.sweep.values[first]:.9g})"
     return (
-        f"values at {at.sum()} of {samples} samples that {NATIVE} cannot reach, first at {where}: {shortened(values, NAMED)}; "
-        f"{NATIVE}: {native.why or 'gives no reason'}"
+        f"values at {at.sum()} of {samples} samples that {NATIVE} cannot reach, first at {where}:"
+        f" {shortened(values, NAMED)}; {NATIVE}: {native.why or 'gives no reason'}"
     )
 
 
 def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
-    """Return how many of the samples that an engine did not solve have a value in a standard; empty where none has."""
+    """Return how many of the samples that an engine did not solve have a value in a standard; empty
+    where none has.
+    """
     samples = len(case.sweep.values)
     unsolved = ~known(answer.outputs.values(), samples)
-    for name, series in ((str(case.truth), case.reference.values()), (NATIVE, native.outputs.values())):
+    for name, series in (
+        (str(case.truth), case.reference.values()),
+        (NATIVE, native.outputs.values()),
+    ):
         if count := int((unsolved & known(series, samples)).sum()):
             return f"; {name} has values at {count} of the others"
     return ""
 
 
 def promised(engine: Engine, tol: float) -> float:
-    """Return the largest residual that an engine promises for its solved samples, relative to the size.
+    """Return the largest residual that an engine promises for its solved samples, relative to the
+    size.
 
     A simulation accepts what its own settings say, and is held to its outputs alone. The native
     engine knows better how far a residual moves a pose.
@@ -144,24 +161,32 @@ def promised(engine: Engine, tol: float) -> float:
 
 
 def excess(case: Case, residual: float, tol: float) -> str:
-    """Return by how much the residual of solved samples is above the tolerance; empty where it is not.
+    """Return by how much the residual of solved samples is above the tolerance; empty where it is
+    not.
 
-    The tolerance is relative to the mechanism's size for lengths, and absolute for residuals without a unit.
+    The tolerance is relative to the mechanism's size for lengths, and absolute for residuals
+    without a unit.
     """
     extent = size(case)
     if not residual > tol * max(1.0, ROUNDED * extent):
         return ""
     return (
-        f"the residual of samples that the engine calls solved is {residual:.3g}, tolerance {tol:.3g} of the mechanism's "
-        f"size ({extent:.3g} m): it has not converged; let it iterate further, or allow more by --tol"
+        f"the residual of samples that the engine calls solved is {residual:.3g}, tolerance"
+        f" {tol:.3g} of the mechanism's size ({extent:.3g} m): it has not converged; let it iterate"
+        " further, or allow more by --tol"
     )
 
 
 def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
-    """Return which outputs, quantities or samples were not compared, and why; outputs with the same reason together."""
+    """Return which outputs, quantities or samples were not compared, and why; outputs with the same
+    reason together.
+    """
     reasons: dict[str, list[str]] = {}
     for output in case.outputs:
         each = errors[output.name]
         if len(each.items()) < output.orders or NO_VALUE in (each.reason or ""):
             reasons.setdefault(each.reason or "", []).append(output.name)
-    return [reason if len(names) == len(case.outputs) else f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    return [
+        reason if len(names) == len(case.outputs) else f"{', '.join(names)}: {reason}"
+        for reason, names in reasons.items()
+    ]

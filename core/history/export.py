@@ -1,4 +1,6 @@
-"""A history as one table for other programs: Parquet or CSV, a row a case, engine, mode, output and motion of a run."""
+"""A history as one table for other programs: Parquet or CSV, a row a case, engine, mode, output and
+motion of a run.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,14 @@ from .store import Store
 INTEGERS = ("run", "solved", "samples", "worst_step")
 TRUTHS = ("git_changed", "validated", "within")
 NUMBERS = (
-    *("calibration_seconds", "build_seconds", "first_seconds", "warm_seconds", "waited_seconds", "compare_seconds"),
+    *(
+        "calibration_seconds",
+        "build_seconds",
+        "first_seconds",
+        "warm_seconds",
+        "waited_seconds",
+        "compare_seconds",
+    ),
     *("us_per_step", "residual_max", "max_abs", "rms", "tolerance"),
 )
 """Columns of the view `measured` that are no text. What was not computed is null, in CSV empty."""
@@ -27,7 +36,9 @@ SUFFIXES = (".parquet", ".csv")
 ROWS = 10_000  # at a time: a few megabytes, and row groups of a size that readers like
 
 
-def export(store: Store, path: Path, *, cases: Sequence[str] = (), engines: Sequence[str] = ()) -> int:
+def export(
+    store: Store, path: Path, *, cases: Sequence[str] = (), engines: Sequence[str] = ()
+) -> int:
     """Write a file, Parquet or CSV by its end; gives the number of rows.
 
     Args:
@@ -35,20 +46,27 @@ def export(store: Store, path: Path, *, cases: Sequence[str] = (), engines: Sequ
 
     Raises:
         HistoryError: the history cannot be read.
-        KincheckError: the file cannot be written, its end says neither, or pyarrow is not installed.
+        KincheckError: the file cannot be written, its end says neither, or pyarrow is not
+            installed.
     """
     kind = {".parquet": _parquet, ".csv": _csv}.get(path.suffix.lower())
     if kind is None:
         raise KincheckError(
-            f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in {' or '.join(SUFFIXES)}"
+            f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in"
+            f" {' or '.join(SUFFIXES)}"
         )
     return write("--export", path, lambda part: kind(part, _rows(store, cases, engines)))
 
 
-def _rows(store: Store, cases: Sequence[str], engines: Sequence[str]) -> Iterator[list[tuple[Any, ...]]]:
+def _rows(
+    store: Store, cases: Sequence[str], engines: Sequence[str]
+) -> Iterator[list[tuple[Any, ...]]]:
     """The names of the columns, then the rows, so many at a time."""
     chosen = [(column, names) for column, names in (("case", cases), ("engine", engines)) if names]
-    where = " AND ".join(f'"{column}" IN ({", ".join("?" * len(names))})' for column, names in chosen) or "true"
+    where = (
+        " AND ".join(f'"{column}" IN ({", ".join("?" * len(names))})' for column, names in chosen)
+        or "true"
+    )
     now = {row.id: row.status for row in readable(store)}
     with store.explained("read"):
         _leave_out(store)
@@ -64,9 +82,13 @@ def _rows(store: Store, cases: Sequence[str], engines: Sequence[str]) -> Iterato
 def _leave_out(store: Store) -> None:
     """Have the view without the runs that cannot be read: their texts would end the query."""
     if store.passed_over:
-        (view,) = store.connection.execute("SELECT sql FROM sqlite_master WHERE name = 'measured'").fetchone()
+        (view,) = store.connection.execute(
+            "SELECT sql FROM sqlite_master WHERE name = 'measured'"
+        ).fetchone()
         listed = ", ".join(str(run) for run in store.passed_over)
-        spared = view.replace("CREATE VIEW", "CREATE TEMP VIEW", 1).replace("FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1)
+        spared = view.replace("CREATE VIEW", "CREATE TEMP VIEW", 1).replace(
+            "FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1
+        )
         store.connection.execute(spared)
 
 
@@ -92,14 +114,23 @@ def _parquet(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:
         arrow: Any = importlib.import_module("pyarrow")
         parquet: Any = importlib.import_module("pyarrow.parquet")
     except ImportError:
-        raise KincheckError(f"--export {path}: Parquet needs pyarrow: pip install 'kincheck[parquet]'; or give a .csv") from None
-    kinds = dict.fromkeys(INTEGERS, arrow.int64()) | dict.fromkeys(NUMBERS, arrow.float64()) | dict.fromkeys(TRUTHS, arrow.bool_())
+        raise KincheckError(
+            f"--export {path}: Parquet needs pyarrow: pip install 'kincheck[parquet]'; or give a"
+            " .csv"
+        ) from None
+    kinds = (
+        dict.fromkeys(INTEGERS, arrow.int64())
+        | dict.fromkeys(NUMBERS, arrow.float64())
+        | dict.fromkeys(TRUTHS, arrow.bool_())
+    )
     (columns,) = next(chunks)
     schema = arrow.schema([(name, kinds.get(name, arrow.string())) for name in columns])
     count = 0
     with parquet.ParquetWriter(path, schema) as writer:
         for rows in chunks:
-            values = {name: [*each] for name, each in zip(columns, zip(*rows, strict=True), strict=True)}
+            values = {
+                name: [*each] for name, each in zip(columns, zip(*rows, strict=True), strict=True)
+            }
             for name in TRUTHS:  # SQLite has 0 and 1
                 values[name] = [None if each is None else bool(each) for each in values[name]]
             writer.write_table(arrow.table(values, schema=schema))

@@ -15,7 +15,9 @@ def owner() -> str:
 
 
 def alive(owner: str) -> bool:
-    """Whether that process is still there. One of another host counts as gone: it cannot be seen from here."""
+    """Whether that process is still there. One of another host counts as gone: it cannot be seen
+    from here.
+    """
     host, number, begun = owner.rsplit("|", 2)
     if host != readable(platform.node()):
         return False
@@ -29,11 +31,13 @@ def alive(owner: str) -> bool:
 
 
 def _begun(number: int) -> str:
-    """Clock ticks from the start of the system to that of the process; empty where there is no /proc, or it has ended and nobody
-    has asked how (in containers nobody may)."""
+    """Clock ticks from the start of the system to that of the process; empty where there is no
+    /proc, or it has ended and nobody has asked how (in containers nobody may)."""
     try:
         # the second field is the program's name in brackets, and may hold anything
-        state, *fields = Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
+        state, *fields = (
+            Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
+        )
         return "" if state in "ZX" else fields[18]
     except (OSError, ValueError, IndexError):
         return ""

@@ -1,4 +1,6 @@
-"""What a history has of each pair of case and engine over its runs: what trends, thresholds and steps are made from."""
+"""What a history has of each pair of case and engine over its runs: what trends, thresholds and
+steps are made from.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from .schema import OUTCOME
 from .store import RunRow, Store
 
 NIGHTS = 60
-"""Runs that trends and steps look back on: two months, whose points can still be told apart in a figure."""
+"""Runs that trends and steps look back on: two months, whose points can still be told apart in a
+figure.
+"""
 
 IDLE = Outcome.UNAVAILABLE, Outcome.UNSUPPORTED
 """Outcomes of a pair whose engine is missing or not able: they say nothing about its results."""
@@ -28,7 +32,8 @@ class Entry:
 
     Attributes:
         errors: by output.
-        seconds: of a warm solve, without those in which others had the processor; None where it was not reached.
+        seconds: of a warm solve, without those in which others had the processor; None where it was
+            not reached.
         us_per_step: as the record has it.
     """
 
@@ -42,7 +47,9 @@ class Entry:
 
 @dataclass(frozen=True)
 class History:
-    """Runs of a history that nobody is writing, oldest first, and the entries of their pairs, likewise."""
+    """Runs of a history that nobody is writing, oldest first, and the entries of their pairs,
+    likewise.
+    """
 
     runs: Mapping[int, RunRow]
     pairs: Mapping[Pair, Sequence[Entry]]
@@ -70,7 +77,11 @@ def read(
     Raises:
         HistoryError: the file cannot be read.
     """
-    rows = [row for row in store.runs() if row.status != "running" and (before is None or row.id < before)]
+    rows = [
+        row
+        for row in store.runs()
+        if row.status != "running" and (before is None or row.id < before)
+    ]
     if cases or engines:
         rows = [row for row in rows if any(_wanted(pair, cases, engines) for pair in row.plan)]
     runs = {row.id: row for row in reversed(rows[:last])}
@@ -84,7 +95,8 @@ def read(
 
 
 def readable(store: Store) -> list[RunRow]:
-    """The runs whose facts and records' columns can all be read, the latest first; the others are passed over.
+    """The runs whose facts and records' columns can all be read, the latest first; the others are
+    passed over.
 
     Raises:
         HistoryError: the file cannot be read.
@@ -101,51 +113,76 @@ def _wanted(pair: Pair, cases: Sequence[str], engines: Sequence[str]) -> bool:
 
 
 def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
-    columns = f"case_name, engine, mode, {OUTCOME}, version, errors, warm_seconds, waited_seconds, us_per_step, message, truth"
+    columns = (
+        f"case_name, engine, mode, {OUTCOME}, version, errors, warm_seconds, waited_seconds,"
+        " us_per_step, message, truth"
+    )
     found: list[tuple[Pair, Entry]] = []
-    with store.explained("read", run):  # also the texts that are not used here: nothing of a damaged run is
+    # also the texts that are not used here: nothing of a damaged run is
+    with store.explained("read", run):
         # rowid: the order in which they were made
-        for row in store.connection.execute(f"SELECT {columns} FROM records WHERE run_id = ? ORDER BY rowid", (run,)):
+        for row in store.connection.execute(
+            f"SELECT {columns} FROM records WHERE run_id = ? ORDER BY rowid", (run,)
+        ):
             errors = msgspec.json.decode(row[5], type=dict[str, Deviations])
             found.append(
-                ((row[0], row[1], row[2]), Entry(run, Outcome(row[3]), row[4], errors, own_seconds(row[6], row[7]), row[8]))
+                (
+                    (row[0], row[1], row[2]),
+                    Entry(
+                        run, Outcome(row[3]), row[4], errors, own_seconds(row[6], row[7]), row[8]
+                    ),
+                )
             )
     return found
 
 
 def own_seconds(warm: float | None, waited: float | None) -> float | None:
-    """Return the seconds of a warm solve in which it was not kept waiting by others; None where there are none.
+    """Return the seconds of a warm solve in which it was not kept waiting by others; None where
+    there are none.
 
-    Measured by 25 equal runs on two processors with five processes: the ratio of two runs reaches 4.1 by the clock, and 1.9 so.
+    Measured by 25 equal runs on two processors with five processes: the ratio of two runs reaches
+    4.1 by the clock, and 1.9 so.
     """
     return None if warm is None else warm - (waited or 0.0)
 
 
 def green(store: Store, *, before: int | None = None) -> list[RunRow]:
-    """The runs that have all the pairs they were to make, in which something passed and nothing went wrong, the latest first.
+    """The runs that have all the pairs they were to make, in which something passed and nothing
+    went wrong, the latest first.
 
     Raises:
         HistoryError: the file cannot be read.
     """
     bad = ", ".join(f"'{outcome}'" for outcome in Outcome if outcome.bad)
     query = (
-        f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0 AND sum({OUTCOME} = 'pass') > 0"
+        f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0"
+        f" AND sum({OUTCOME} = 'pass') > 0"
     )
     with store.explained("read"):
         good: dict[int, int] = dict(store.connection.execute(query).fetchall())
     # a finished run lacks the pairs of cases that could not be read: its status was 2
-    whole = [row for row in readable(store) if row.status == "finished" and good.get(row.id) == len(row.plan)]
+    whole = [
+        row
+        for row in readable(store)
+        if row.status == "finished" and good.get(row.id) == len(row.plan)
+    ]
     return [row for row in whole if before is None or row.id < before]
 
 
 def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
-    """Of the pairs of a run whose engine was there and able, the outputs and motions that were compared.
+    """Of the pairs of a run whose engine was there and able, the outputs and motions that were
+    compared.
 
     Raises:
         HistoryError: the file cannot be read.
     """
-    able = ((pair, entry.errors) for pair, entry in _entries(store, run) if entry.outcome not in IDLE)
-    return {pair: {(output, motion) for output, each in errors.items() for motion, _ in each.items()} for pair, errors in able}
+    able = (
+        (pair, entry.errors) for pair, entry in _entries(store, run) if entry.outcome not in IDLE
+    )
+    return {
+        pair: {(output, motion) for output, each in errors.items() for motion, _ in each.items()}
+        for pair, errors in able
+    }
 
 
 def calibration(run: RunRow | Mapping[str, Any]) -> float | None:
@@ -157,5 +194,7 @@ def calibration(run: RunRow | Mapping[str, Any]) -> float | None:
 
 def unit_of(row: RunRow, case: str, output: str) -> str:
     """Return the unit of an output in that run; metres where the run does not say."""
-    outputs: Mapping[str, Mapping[str, Any]] = row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
+    outputs: Mapping[str, Mapping[str, Any]] = (
+        row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
+    )
     return outputs.get(output, {}).get("unit", "m")

@@ -11,10 +11,11 @@ import numpy as np
 
 
 def digest(*things: Any) -> str:
-    """SHA-256 of data: dataclasses by their class and fields, arrays by their bits, and what these are made of.
+    """SHA-256 of data: dataclasses by their class and fields, arrays by their bits, and what these
+    are made of.
 
-    Not of their pickle: that one changes with which equal parts happen to be one object. What else is in there counts by its
-    text; where that has an address, no two digests are equal.
+    Not of their pickle: that one changes with which equal parts happen to be one object. What else
+    is in there counts by its text; where that has an address, no two digests are equal.
     """
     whole = hashlib.sha256()
     for piece in _pieces(things):

@@ -44,7 +44,10 @@ class Keeping:
         try:
             self.store.add_record(self.run, record)
         except HistoryError as error:
-            self.problems.append(f"{error}; the records before {record.case} {record.engine} are kept there as run {self.run}")
+            self.problems.append(
+                f"{error}; the records before {record.case} {record.engine} are kept there as run"
+                f" {self.run}"
+            )
 
     def end(self, results: Results, *, interrupted: bool) -> None:
         """The run has ended: with all its records, or by an interrupt."""
@@ -52,7 +55,10 @@ class Keeping:
             try:
                 self.store.finish(self.run, results, "interrupted" if interrupted else "finished")
             except HistoryError as error:
-                self.problems.append(f"{error}; all records are kept there, but run {self.run} has no end; --resume gives it one")
+                self.problems.append(
+                    f"{error}; all records are kept there, but run {self.run} has no end; --resume"
+                    " gives it one"
+                )
         self.store.close()
 
 
@@ -68,7 +74,8 @@ def keep(
     unread: Sequence[str] = (),
     joints: Mapping[str, str] | None = None,
 ) -> Keeping:
-    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance, limits, versions, machine and files.
+    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance,
+    limits, versions, machine and files.
 
     Args:
         settings: further circumstances.
@@ -80,14 +87,21 @@ def keep(
         HistoryError: the file cannot be read or written.
     """
     started = datetime.now(UTC)
-    facts = circumstances(cases, started=started, tol=tol, command=command) | plain({**settings, **conditions()})
+    facts = circumstances(cases, started=started, tol=tol, command=command) | plain(
+        {**settings, **conditions()}
+    )
     plan = planned(cases, engines, unread)
-    limits = [settings.get(name) for name in ("timeout", "memory_gb")]  # where and how many at a time changes no record
+    # where and how many at a time changes no record
+    limits = [settings.get(name) for name in ("timeout", "memory_gb")]
     git: Mapping[str, Any] = facts["git"] or {}
-    state = [facts[name] for name in ("kincheck", "python", "numpy")] + [git.get(name) for name in ("commit", "changed", "edits")]
+    state = [facts[name] for name in ("kincheck", "python", "numpy")] + [
+        git.get(name) for name in ("commit", "changed", "edits")
+    ]
     code = [*state, *(joints or {}).items()]
     found = versions(engines, min(settings.get("timeout", PATIENCE), PATIENCE))
-    versioned = [(each.name, each.mode, version) for each, version in zip(engines, found, strict=True)]
+    versioned = [
+        (each.name, each.mode, version) for each, version in zip(engines, found, strict=True)
+    ]
     machine = [*(facts[name] for name in ("host", "processor")), *versioned]
     identity = digest(cases, plan, tol, limits, code, machine)
     store = Store(path)
@@ -96,7 +110,13 @@ def keep(
             with store.sparing():
                 earlier = store.resume_run(identity)
                 if earlier is not None:
-                    return Keeping(store, earlier.id, earlier.circumstances, resumed=True, made=store.records(earlier.id))
+                    return Keeping(
+                        store,
+                        earlier.id,
+                        earlier.circumstances,
+                        resumed=True,
+                        made=store.records(earlier.id),
+                    )
         run = store.begin_run(identity, plan, facts, references(cases))
     except BaseException:
         store.close()

@@ -1,8 +1,9 @@
 """The tables of a history, and how files of earlier versions come to have them.
 
-`runs`: a row a run. `records`: a row a (case, engine, mode) of a run; the columns are what trends and tables read, the whole record
-is in `record`. `documents`: what belongs to a run's case besides, references above all, each text once however many runs have it.
-`measured`: all of it in one flat table, a row a case, engine, mode, output and motion of a run, for other programs and for export.
+`runs`: a row a run. `records`: a row a (case, engine, mode) of a run; the columns are what trends
+and tables read, the whole record is in `record`. `documents`: what belongs to a run's case besides,
+references above all, each text once however many runs have it. `measured`: all of it in one flat
+table, a row a case, engine, mode, output and motion of a run, for other programs and for export.
 """
 
 from __future__ import annotations
@@ -12,10 +13,13 @@ from collections.abc import Iterator
 from time import monotonic, sleep
 
 APPLICATION = 0x6B696E63
-"""The application_id of these files ("kinc"): another program's database is refused, not added to."""
+"""The application_id of these files ("kinc"): another program's database is refused, not added
+to.
+"""
 
 OUTCOME = """CASE WHEN outcome = 'pass' AND NOT errors GLOB '*"max_abs":[0-9]*' THEN 'unjudged' ELSE outcome END"""
-"""The outcome of a row of `records`: older versions call a solved pair a pass although nothing was compared.
+"""The outcome of a row of `records`: older versions call a solved pair a pass although nothing was
+compared.
 
 No text in a JSON string looks like a deviation, for its quotation marks are escaped.
 """
@@ -99,7 +103,9 @@ MIGRATIONS = (
     ORDER BY run, "case", engine, mode, output;
     """,
 )
-"""One text for each version of the schema, which brings the tables from the one before it. A text that was published stays."""
+"""One text for each version of the schema, which brings the tables from the one before it. A text
+that was published stays.
+"""
 
 
 def migrate(connection: sqlite3.Connection) -> None:
@@ -131,19 +137,24 @@ def check(connection: sqlite3.Connection) -> int:
     """
     # in one statement: another process may be making the tables, and is not to be seen halfway
     tables, version, application = connection.execute(
-        "SELECT (SELECT count(*) FROM sqlite_master), user_version, application_id FROM pragma_user_version, pragma_application_id"
+        "SELECT (SELECT count(*) FROM sqlite_master), user_version, application_id FROM"
+        " pragma_user_version, pragma_application_id"
     ).fetchone()
     if application != APPLICATION and (tables or version or application):
         raise ValueError("a database of another program; give another file")
     if version > len(MIGRATIONS):
-        raise ValueError(f"its schema is version {version}, this kincheck knows {len(MIGRATIONS)}; update kincheck")
+        raise ValueError(
+            f"its schema is version {version}, this kincheck knows {len(MIGRATIONS)}; update"
+            " kincheck"
+        )
     return version
 
 
 def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
     """Have readers and a writer not wait for each other.
 
-    Of those who ask for that in a new file at once, SQLite has some fail instead of wait: they ask again.
+    Of those who ask for that in a new file at once, SQLite has some fail instead of wait: they ask
+    again.
     """
     end = monotonic() + patience
     while True:
@@ -159,7 +170,8 @@ def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
 
 def _statements(text: str) -> Iterator[str]:
     begun = ""
-    for part in text.split(";")[:-1]:  # a semicolon may be in a string or a comment: then the statement goes on
+    # a semicolon may be in a string or a comment: then the statement goes on
+    for part in text.split(";")[:-1]:
         begun += f"{part};"
         if sqlite3.complete_statement(begun):
             yield begun

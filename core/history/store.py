@@ -35,7 +35,8 @@ Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
 """The file says that a run is running until it ends; where its process is gone it was killed."""
 Plan: TypeAlias = Sequence[tuple[str, str, str]]
 
-# Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB as JSON).
+# Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB
+# as JSON).
 QUICK = 1
 
 
@@ -69,11 +70,16 @@ class Store:
 
     def close(self) -> None:
         """Let go of the file."""
-        with suppress(sqlite3.Error):  # what was committed is on the disk; tidying up can fail on a full one
+        # what was committed is on the disk; tidying up can fail on a full one
+        with suppress(sqlite3.Error):
             self.connection.close()
 
     def begin_run(
-        self, identity: str, plan: Plan, circumstances: dict[str, Any], references: Mapping[str, Any] | None = None
+        self,
+        identity: str,
+        plan: Plan,
+        circumstances: dict[str, Any],
+        references: Mapping[str, Any] | None = None,
     ) -> int:
         """A new run; its number.
 
@@ -81,13 +87,15 @@ class Store:
             identity: by which it is found to be resumed: equal for runs that give the same records.
             plan: case, engine and mode of its pairs, in the order of the results.
             circumstances: as `Results.run`; among them when it started, and the command.
-            references: as `Results.references`, for whoever reads the run before it has ended, or if it never does.
+            references: as `Results.references`, for whoever reads the run before it has ended, or
+                if it never does.
         """
         started, command = circumstances["started"], circumstances["command"]
         row = (started, "running", command, identity, owner(), _json(plan), _json(circumstances))
         with self._transaction():
             done = self.connection.execute(
-                "INSERT INTO runs (started, status, command, identity, owner, plan, circumstances) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                "INSERT INTO runs (started, status, command, identity, owner, plan, circumstances)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?)",
                 row,
             )
             assert done.lastrowid is not None
@@ -95,12 +103,20 @@ class Store:
         return done.lastrowid
 
     def resume_run(self, identity: str) -> RunRow | None:
-        """The last run of that identity, if it has no end and no other process is at it. It is this process's from now on."""
+        """The last run of that identity, if it has no end and no other process is at it. It is this
+        process's from now on.
+        """
         with self._transaction():
-            query = "SELECT id, owner FROM runs WHERE identity = ? AND status != 'finished' ORDER BY id DESC"
+            query = (
+                "SELECT id, owner FROM runs WHERE identity = ? AND status != 'finished' ORDER BY id"
+                " DESC"
+            )
             for run, other in self.connection.execute(query, (identity,)).fetchall():
                 if other == owner() or not alive(other):
-                    change = "UPDATE runs SET status = 'running', finished = NULL, owner = ? WHERE id = ?"
+                    change = (
+                        "UPDATE runs SET status = 'running', finished = NULL, owner = ? WHERE"
+                        " id = ?"
+                    )
                     self.connection.execute(change, (owner(), run))
                     return self.run(run)
         return None
@@ -134,22 +150,36 @@ class Store:
         names = ", ".join(row)
         with self._transaction():
             places = ", ".join("?" * len(row))
-            self.connection.execute(f"INSERT OR IGNORE INTO records ({names}) VALUES ({places})", [*row.values()])
+            self.connection.execute(
+                f"INSERT OR IGNORE INTO records ({names}) VALUES ({places})", [*row.values()]
+            )
 
     def finish(self, run: int, results: Results | None = None, status: Status = "finished") -> None:
-        """The run has ended. What the results have besides records, references above all, is kept with it."""
+        """The run has ended. What the results have besides records, references above all, is kept
+        with it.
+        """
         with self._transaction():
             if results is not None:
-                for kind in (name for name in results.__struct_fields__ if name not in ("schema", "run", "records")):
+                for kind in (
+                    name
+                    for name in results.__struct_fields__
+                    if name not in ("schema", "run", "records")
+                ):
                     self._attach(run, kind, getattr(results, kind))
-            self.connection.execute("UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run))
+            self.connection.execute(
+                "UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run)
+            )
 
     def remove(self, run: int) -> None:
         """Remove a run and all that belongs to it alone."""
         with self._transaction():
             for table, column in (("attachments", "run_id"), ("records", "run_id"), ("runs", "id")):
-                removed = self.connection.execute(f"DELETE FROM {table} WHERE {column} = ?", (run,)).rowcount
-            self.connection.execute("DELETE FROM documents WHERE digest NOT IN (SELECT digest FROM attachments)")
+                removed = self.connection.execute(
+                    f"DELETE FROM {table} WHERE {column} = ?", (run,)
+                ).rowcount
+            self.connection.execute(
+                "DELETE FROM documents WHERE digest NOT IN (SELECT digest FROM attachments)"
+            )
         if not removed:
             raise HistoryError(f"history {self.path}: there is no run {run}")
 
@@ -183,7 +213,10 @@ class Store:
             HistoryError: there is none.
         """
         with self.explained("read", run):
-            query = "SELECT id, started, finished, status, command, plan, circumstances, owner FROM runs WHERE id = ?"
+            query = (
+                "SELECT id, started, finished, status, command, plan, circumstances, owner FROM"
+                " runs WHERE id = ?"
+            )
             row = self.connection.execute(query, (run,)).fetchone()
             if row is not None:
                 return RunRow(
@@ -201,16 +234,27 @@ class Store:
         """The records of a run, in the order of its plan."""
         place = {pair: k for k, pair in enumerate(self.run(run).plan)}
         with self.explained("read", run):
-            rows = self.connection.execute("SELECT record FROM records WHERE run_id = ?", (run,)).fetchall()
-            records = [settled(msgspec.json.decode(zlib.decompress(blob), type=Record)) for (blob,) in rows]
-        return sorted(records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place)))
+            rows = self.connection.execute(
+                "SELECT record FROM records WHERE run_id = ?", (run,)
+            ).fetchall()
+            records = [
+                settled(msgspec.json.decode(zlib.decompress(blob), type=Record)) for (blob,) in rows
+            ]
+        return sorted(
+            records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place))
+        )
 
     def results(self, run: int) -> Results:
-        """A run as the command wrote it; of one without an end, what there is, and in `run["missing"]` what is not."""
+        """A run as the command wrote it; of one without an end, what there is, and in
+        `run["missing"]` what is not.
+        """
         row, records = self.run(run), self.records(run)
         attached: dict[str, dict[str, Any]] = {}
         with self.explained("read", run):
-            query = "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest) WHERE run_id = ?"
+            query = (
+                "SELECT kind, case_name, content FROM attachments JOIN documents USING (digest)"
+                " WHERE run_id = ?"
+            )
             for kind, case, content in self.connection.execute(query, (run,)):
                 attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
             facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
@@ -221,8 +265,12 @@ class Store:
         for case, document in documents.items():
             text = msgspec.json.encode(document)
             digest = hashlib.sha256(text).hexdigest()
-            self.connection.execute("INSERT OR IGNORE INTO documents VALUES (?, ?)", (digest, zlib.compress(text)))
-            self.connection.execute("INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest))
+            self.connection.execute(
+                "INSERT OR IGNORE INTO documents VALUES (?, ?)", (digest, zlib.compress(text))
+            )
+            self.connection.execute(
+                "INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest)
+            )
 
     def _writable(self) -> sqlite3.Connection:
         connection = sqlite3.connect(self.path, timeout=faults.BUSY, isolation_level=None)
@@ -239,11 +287,18 @@ class Store:
 
     def _readable(self) -> sqlite3.Connection:
         if not self.path.is_file():
-            raise HistoryError(f"history {self.path}: there is no such file; `kincheck run --history FILE` makes one")
-        # a file in a place where nothing can be written has no journal beside it: then nobody else is writing it either
+            raise HistoryError(
+                f"history {self.path}: there is no such file; `kincheck run --history FILE`"
+                " makes one"
+            )
+        # a file in a place where nothing can be written has no journal beside it: then nobody else
+        # is writing it either
         for how in ("mode=ro", "mode=ro&immutable=1"):
             connection = sqlite3.connect(
-                f"{self.path.absolute().as_uri()}?{how}", uri=True, timeout=faults.BUSY, isolation_level=None
+                f"{self.path.absolute().as_uri()}?{how}",
+                uri=True,
+                timeout=faults.BUSY,
+                isolation_level=None,
             )
             try:
                 version = check(connection)
@@ -263,12 +318,15 @@ class Store:
         raise AssertionError("the second way either connects or raises")
 
     def _check_whole(self) -> None:
-        """What was written last may be beside the file still, and cannot be read where nothing can be written."""
+        """What was written last may be beside the file still, and cannot be read where nothing can
+        be written.
+        """
         beside = self.path.with_name(f"{self.path.name}-wal")
         if beside.is_file() and beside.stat().st_size:
             raise HistoryError(
-                f"history {self.path}: its latest records are in {beside.name} still, and the folder cannot be written, which "
-                "putting them together takes; copy both files to a folder that can be"
+                f"history {self.path}: its latest records are in {beside.name} still, and the"
+                " folder cannot be written, which putting them together takes; copy both files to"
+                " a folder that can be"
             )
 
     @contextmanager

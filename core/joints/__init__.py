@@ -1,4 +1,6 @@
-"""Joints: each file a composition of primitives. Every module in this folder is loaded, so a new file is a new joint type."""
+"""Joints: each file a composition of primitives. Every module in this folder is loaded, so a new
+file is a new joint type.
+"""
 
 import importlib
 import pkgutil

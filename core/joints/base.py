@@ -1,7 +1,9 @@
-"""What a joint is: two bodies, some geometry at the design position, and a composition of primitives.
+"""What a joint is: two bodies, some geometry at the design position, and a composition of
+primitives.
 
-A new joint type is one file: a frozen dataclass with its geometry as fields (declared with `position`, `direction`, ...) and the
-method `primitives`. Declaring the class registers it: case files can name it at once.
+A new joint type is one file: a frozen dataclass with its geometry as fields (declared with
+`position`, `direction`, ...) and the method `primitives`. Declaring the class registers it: case
+files can name it at once.
 """
 
 from __future__ import annotations
@@ -18,7 +20,15 @@ from typing import Any, ClassVar, Self
 from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
 from ..errors import MechanismError, Phrase
 from ..input_checks import held, plain, require_direction, require_finite, triple
-from ..primitives import Dot12, Dot20, DrivenAngle, LockedDisplacement, NamedSlide, NamedTurn, Primitive
+from ..primitives import (
+    Dot12,
+    Dot20,
+    DrivenAngle,
+    LockedDisplacement,
+    NamedSlide,
+    NamedTurn,
+    Primitive,
+)
 from ..primitives import Spherical as SphericalCondition
 
 
@@ -73,7 +83,9 @@ def length(**options: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """A body at the design position as a joint sees it: where its origin is, and arms from there."""
+    """A body at the design position as a joint sees it: where its origin is, and arms from
+    there.
+    """
 
     origin: Vec3
 
@@ -83,21 +95,28 @@ class Attachment:
 
 
 def _several(annotation: Any) -> bool:
-    """Whether a field that is annotated so holds several numbers, and is no attribute of the class."""
+    """Whether a field that is annotated so holds several numbers, and is no attribute of the
+    class.
+    """
     text = str(annotation)
-    return "ClassVar" not in text and any(each in text for each in ("tuple", "Tuple", "list", "List", "Sequence", "Vector", "Vec3"))
+    return "ClassVar" not in text and any(
+        each in text for each in ("tuple", "Tuple", "list", "List", "Sequence", "Vector", "Vec3")
+    )
 
 
 def register(registry: dict[str, Any], cls: Any) -> None:
-    """Have case files know a type by its name. The same class may be declared anew: a module loaded again, a cell run again.
+    """Have case files know a type by its name. The same class may be declared anew: a module loaded
+    again, a cell run again.
 
     Raises:
-        MechanismError: another class has the name; case files would mean this one instead, and nobody would know.
+        MechanismError: another class has the name; case files would mean this one instead, and
+            nobody would know.
     """
     known = registry.get(cls.type, cls)
     if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
         raise MechanismError(
-            f"{cls.__name__}: type = {cls.type!r} is taken by {known.__module__}.{known.__qualname__}; give it another name"
+            f"{cls.__name__}: type = {cls.type!r} is taken by"
+            f" {known.__module__}.{known.__qualname__}; give it another name"
         )
     registry[cls.type] = cls
 
@@ -109,11 +128,12 @@ class Joint(ABC):
     Attributes:
         type: the name in case files.
         freedoms: the relative motions the joint leaves, as drivers name them.
-        symmetric: both bodies may change places; not so where geometry belongs to one of them (a line, a plane, a hinge).
+        symmetric: both bodies may change places; not so where geometry belongs to one of them (a
+            line, a plane, a hinge).
 
     Raises:
-        MechanismError: a number is not finite, a direction is zero, or a shape is wrong; or, where a class is declared, another has
-            its type.
+        MechanismError: a number is not finite, a direction is zero, or a shape is wrong; or, where
+            a class is declared, another has its type.
     """
 
     type: ClassVar[str]
@@ -131,25 +151,36 @@ class Joint(ABC):
             default = cls.__dict__.get(name)
             if _several(said) and "kind" not in getattr(default, "metadata", {}):
                 raise MechanismError(
-                    f"{cls.__name__}: {name} holds several numbers, and it is not said which; declare it as "
-                    f"{name}: ... = position(), direction(), positions() or directions()"
+                    f"{cls.__name__}: {name} holds several numbers, and it is not said which;"
+                    f" declare it as {name}: ... = position(), direction(), positions() or"
+                    " directions()"
                 )
         if "type" in cls.__dict__:
             register(Joint.registry, cls)
 
     def __post_init__(self) -> None:
         if self.i == self.j:
-            raise MechanismError(f"{self}: joins {self.i!r} with itself; a joint needs two different bodies")
+            raise MechanismError(
+                f"{self}: joins {self.i!r} with itself; a joint needs two different bodies"
+            )
         for each in fields(self):
-            if each.metadata.get("kind") and each.default is MISSING and getattr(self, each.name) is None:
-                raise MechanismError(f"{self}: {each.name} is None, expected {each.metadata['kind'].value}")
+            if (
+                each.metadata.get("kind")
+                and each.default is MISSING
+                and getattr(self, each.name) is None
+            ):
+                raise MechanismError(
+                    f"{self}: {each.name} is None, expected {each.metadata['kind'].value}"
+                )
         for name, kind, value in self.geometry():
             who, expected = f"{self}: {name}", kind.value
             if kind is Kind.LENGTH:
                 value = plain(value)
                 parts = [(value,)]
             elif kind.pair:
-                value = parts = tuple(triple(who, numbers, expected) for numbers in held(who, value, 2, expected))
+                value = parts = tuple(
+                    triple(who, numbers, expected) for numbers in held(who, value, 2, expected)
+                )
             else:
                 value = triple(who, value, expected)
                 parts = [value]
@@ -169,15 +200,28 @@ class Joint(ABC):
 
     def geometry(self) -> Sequence[tuple[str, Kind, Any]]:
         """Return name, kind and value of every geometry field that is given."""
-        found = [(each.name, each.metadata.get("kind"), getattr(self, each.name)) for each in fields(self)]
-        return [(name, kind, value) for name, kind, value in found if kind is not None and value is not None]
+        found = [
+            (each.name, each.metadata.get("kind"), getattr(self, each.name))
+            for each in fields(self)
+        ]
+        return [
+            (name, kind, value)
+            for name, kind, value in found
+            if kind is not None and value is not None
+        ]
 
     def parts(self, body: str | None = None) -> Sequence[tuple[str, Kind, Any]]:
-        """Return the same of every single one, of a pair as "points.0" and "points.1"; only what is on the body if one is named."""
+        """Return the same of every single one, of a pair as "points.0" and "points.1"; only what is
+        on the body if one is named.
+        """
         found = list[tuple[str, Kind, Any]]()
         for name, kind, value in self.geometry():
             if kind.pair:
-                found += [(f"{name}.{k}", kind.single, value[k]) for k in range(2) if body in (None, self.bodies[k])]
+                found += [
+                    (f"{name}.{k}", kind.single, value[k])
+                    for k in range(2)
+                    if body in (None, self.bodies[k])
+                ]
             else:
                 found.append((name, kind, value))
         return found
@@ -187,9 +231,17 @@ class Joint(ABC):
         return [value for _, kind, value in self.parts(body) if kind is Kind.POSITION]
 
     def mapped(self, ways: Mapping[Kind, Callable[[Any], Any]]) -> dict[str, Any]:
-        """Return its geometry fields, each point, direction or length sent through the way for its kind, where there is one."""
-        given = [(name, kind.pair, ways[kind.single], value) for name, kind, value in self.geometry() if kind.single in ways]
-        return {name: tuple(map(way, value)) if pair else way(value) for name, pair, way, value in given}
+        """Return its geometry fields, each point, direction or length sent through the way for its
+        kind, where there is one.
+        """
+        given = [
+            (name, kind.pair, ways[kind.single], value)
+            for name, kind, value in self.geometry()
+            if kind.single in ways
+        ]
+        return {
+            name: tuple(map(way, value)) if pair else way(value) for name, pair, way, value in given
+        }
 
     def reversed(self) -> Self:
         """Return the same joint seen from its second body: i and j exchanged, and so every pair."""
@@ -202,7 +254,9 @@ class Joint(ABC):
         return self.changed(**self.mapped({Kind.POSITION: times, Kind.LENGTH: times}))
 
     def changed(self, **values: Any) -> Self:
-        """Return the joint with other fields, not checked again: as good as this one, or of numbers that are known only later."""
+        """Return the joint with other fields, not checked again: as good as this one, or of numbers
+        that are known only later.
+        """
         other = copy(self)
         for name, value in values.items():
             object.__setattr__(other, name, value)
@@ -210,7 +264,9 @@ class Joint(ABC):
 
     @property
     def notes(self) -> Sequence[str | Phrase]:
-        """What a reader of results should know of its geometry: where it can be meant, and yet be a mistake."""
+        """What a reader of results should know of its geometry: where it can be meant, and yet be a
+        mistake.
+        """
         return ()
 
     @property
@@ -226,16 +282,20 @@ class Joint(ABC):
 
 @dataclass(frozen=True)
 class AxialJoint(Joint):
-    """A joint about or along an axis through a point, both common to the two bodies; its freedoms can be driven and coupled.
+    """A joint about or along an axis through a point, both common to the two bodies; its freedoms
+    can be driven and coupled.
 
-    Its coordinates are the rotation about and the displacement along the axis of body j relative to body i, zero at design.
+    Its coordinates are the rotation about and the displacement along the axis of body j relative to
+    body i, zero at design.
     """
 
     point: tuple[float, float, float] = position()
     axis: tuple[float, float, float] = direction()
 
     def measured(self, freedom: str, i: Attachment, j: Attachment) -> Primitive:
-        """Return the primitive that ties one of its coordinates, "rotation" or "translation", to a drive."""
+        """Return the primitive that ties one of its coordinates, "rotation" or "translation", to a
+        drive.
+        """
         P, h = vec(self.point), unit(self.axis)
         if freedom == "rotation":
             return DrivenAngle(h)
@@ -244,9 +304,15 @@ class AxialJoint(Joint):
         return LockedDisplacement(h, i.arm(P) - j.arm(P))
 
     def mixed(self, i: Attachment, j: Attachment) -> Sequence[tuple[Primitive, str]]:
-        """Return the joint with its coordinates named: TraX and RotX of formulation section 4, and the coordinate each takes."""
+        """Return the joint with its coordinates named: TraX and RotX of formulation section 4, and
+        the coordinate each takes.
+        """
         P, h = vec(self.point), unit(self.axis)
-        slide = NamedSlide(i.arm(P), j.arm(P), h=h) if "translation" in self.freedoms else SphericalCondition(i.arm(P), j.arm(P))
+        slide = (
+            NamedSlide(i.arm(P), j.arm(P), h=h)
+            if "translation" in self.freedoms
+            else SphericalCondition(i.arm(P), j.arm(P))
+        )
         turn = NamedTurn(h) if "rotation" in self.freedoms else Dot12()
         return (slide, "translation"), (turn, "rotation")
 
@@ -257,7 +323,9 @@ class AxialJoint(Joint):
 
     @property
     def relations(self) -> Sequence[Mapping[str, float]]:
-        """Linear relations between its own coordinates [m, rad]: coefficients by freedom, whose weighted sum stays zero."""
+        """Linear relations between its own coordinates [m, rad]: coefficients by freedom, whose
+        weighted sum stays zero.
+        """
         return ()
 
 
@@ -271,8 +339,9 @@ def unit(a: Sequence[Scalar]) -> Vec3:
     return (1.0 / root(v @ v)) * v
 
 
-# Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more is a mistake in the table.
-# Within it the axes keep their design angle, as the two hinges of a simulator do.
+# Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more is
+# a mistake in the table. Within it the axes keep their design angle, as the two hinges of a
+# simulator do.
 ROUNDED_RIGHT_ANGLE = 1e-2
 
 
@@ -292,6 +361,11 @@ def triad(axis: Sequence[Scalar]) -> tuple[Vec3, Vec3, Vec3]:
     # the global axis most nearly perpendicular to h gives the best conditioned f
     nearest = X
     for e in (Y, Z):
-        nearest = vec([where_larger(nearest @ h, e @ h, new, old) for new, old in zip(e, nearest, strict=True)])
+        nearest = vec(
+            [
+                where_larger(nearest @ h, e @ h, new, old)
+                for new, old in zip(e, nearest, strict=True)
+            ]
+        )
     f = unit(tuple(cross(nearest, h)))
     return f, cross(h, f), h

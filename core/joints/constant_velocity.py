@@ -1,4 +1,6 @@
-"""Constant-velocity joint: spherical + constant velocity. 4 rows, 2 freedoms. Also known as Rzeppa or homokinetic joint."""
+"""Constant-velocity joint: spherical + constant velocity. 4 rows, 2 freedoms. Also known as Rzeppa
+or homokinetic joint.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from .base import Attachment, Joint, directions, position, triad, unit
 
 @dataclass(frozen=True)
 class ConstantVelocity(Joint):
-    """Two shafts meet in the point, along an axis each and pointing the same way on; both turn at the same rate about them."""
+    """Two shafts meet in the point, along an axis each and pointing the same way on; both turn at
+    the same rate about them.
+    """
 
     type = "constant_velocity"
     freedoms = ("bend x", "bend y")
@@ -23,10 +27,11 @@ class ConstantVelocity(Joint):
     def __post_init__(self) -> None:
         super().__post_init__()
         cosine = unit(self.axes[0]) @ unit(self.axes[1])
-        if cosine <= 0.0:  # beyond a right angle no such joint transmits, and at 180 degrees it has no zero twist
+        # beyond a right angle no such joint transmits, and at 180 degrees it has no zero twist
+        if cosine <= 0.0:
             raise MechanismError(
-                f"{self}: the shafts enclose {cosine:.3g} as cosine, expected it positive; let both axes point the same way on, "
-                "from the driving to the driven side"
+                f"{self}: the shafts enclose {cosine:.3g} as cosine, expected it positive; let both"
+                " axes point the same way on, from the driving to the driven side"
             )
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:

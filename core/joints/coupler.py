@@ -1,4 +1,6 @@
-"""What couples two joints: a linear relation between their coordinates. A new one is one file, as a new joint is."""
+"""What couples two joints: a linear relation between their coordinates. A new one is one file, as a
+new joint is.
+"""
 
 from __future__ import annotations
 
@@ -42,16 +44,26 @@ class Coupler(ABC):
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", held(f"{self}: joints", self.joints, 2, "two names"))
         if self.joints[0] == self.joints[1]:
-            raise MechanismError(f"{self}: couples {self.joints[0]!r} with itself; give two different joints")
+            raise MechanismError(
+                f"{self}: couples {self.joints[0]!r} with itself; give two different joints"
+            )
         for each in fields(self):
             if each.type in NUMBERS:
                 object.__setattr__(self, each.name, plain(getattr(self, each.name)))
-                require_finite(f"{self}: {each.name}", (getattr(self, each.name),), "a finite number other than zero")
+                require_finite(
+                    f"{self}: {each.name}",
+                    (getattr(self, each.name),),
+                    "a finite number other than zero",
+                )
         if not all(weight and math.isfinite(weight) for weight in self.coefficients):
-            given = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ("name", "joints")}
+            given = {
+                each.name: getattr(self, each.name)
+                for each in fields(self)
+                if each.name not in ("name", "joints")
+            }
             raise MechanismError(
-                f"{self}: {', '.join(f'{name} = {value}' for name, value in given.items())} would lock or lose a joint; "
-                "give a finite number other than zero"
+                f"{self}: {', '.join(f'{name} = {value}' for name, value in given.items())} would"
+                " lock or lose a joint; give a finite number other than zero"
             )
 
     def __str__(self) -> str:

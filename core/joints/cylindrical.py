@@ -20,4 +20,8 @@ class Cylindrical(AxialJoint):
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P, (f, g, h) = vec(self.point), triad(self.axis)
         # two exact dot20, not dot21: that one needs dot12 in the same joint
-        return p.Dot11(f, g, h), p.Dot20(f, i.arm(P), j.arm(P), ZERO), p.Dot20(g, i.arm(P), j.arm(P), ZERO)
+        return (
+            p.Dot11(f, g, h),
+            p.Dot20(f, i.arm(P), j.arm(P), ZERO),
+            p.Dot20(g, i.arm(P), j.arm(P), ZERO),
+        )

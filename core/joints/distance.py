@@ -1,4 +1,6 @@
-"""Distance joint: a point of each body keeps its distance. 1 row, 5 freedoms. Also known as tie rod or massless link."""
+"""Distance joint: a point of each body keeps its distance. 1 row, 5 freedoms. Also known as tie rod
+or massless link.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +13,16 @@ from ..algebra import root, vec
 from ..errors import MechanismError, Phrase
 from .base import Attachment, Joint, length, positions
 
-# A length that differs from the design distance by less, relatively, moves no output beyond its tolerance, unless one is given.
+# A length that differs from the design distance by less, relatively, moves no output beyond its
+# tolerance, unless one is given.
 NOTED = 1e-9
 
 
 @dataclass(frozen=True)
 class Distance(Joint):
-    """A rod from a point on body i to a point on body j; its length is the design distance unless given [m]."""
+    """A rod from a point on body i to a point on body j; its length is the design distance unless
+    given [m].
+    """
 
     type = "distance"
     freedoms = ()
@@ -27,7 +32,9 @@ class Distance(Joint):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.design_distance > 0.0:
-            raise MechanismError(f"{self}: the points coincide at design, expected two places; use a spherical joint")
+            raise MechanismError(
+                f"{self}: the points coincide at design, expected two places; use a spherical joint"
+            )
         if not self.rod_length > 0.0:
             raise MechanismError(
                 Phrase(

@@ -8,6 +8,10 @@ from .base import Attachment, Joint
 
 
 def gap(joint: Joint) -> float:
-    """Largest residual of a joint at the design position [m]: zero, but where lengths contradict points."""
+    """Largest residual of a joint at the design position [m]: zero, but where lengths contradict
+    points.
+    """
     here = Attachment(ZERO)
-    return max(abs(x) for each in joint.primitives(here, here) for x in each.phi(GROUND_POSE, GROUND_POSE))
+    return max(
+        abs(x) for each in joint.primitives(here, here) for x in each.phi(GROUND_POSE, GROUND_POSE)
+    )

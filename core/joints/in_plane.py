@@ -12,7 +12,9 @@ from .base import Attachment, Joint, direction, position, unit
 
 @dataclass(frozen=True)
 class InPlane(Joint):
-    """The point, fixed in body j, stays in the plane through it normal to the axis, fixed in body i."""
+    """The point, fixed in body j, stays in the plane through it normal to the axis, fixed in body
+    i.
+    """
 
     type = "in_plane"
     freedoms = ("translation x", "translation y", "rotation x", "rotation y", "rotation z")

@@ -12,7 +12,9 @@ from .base import Attachment, AxialJoint, triad, unit
 
 @dataclass(frozen=True)
 class Planar(AxialJoint):
-    """A plane of each body, through the point and normal to the axis, slides on the other's; it turns about the axis."""
+    """A plane of each body, through the point and normal to the axis, slides on the other's; it
+    turns about the axis.
+    """
 
     type = "planar"
     freedoms = ("translation x", "translation y", "rotation")
@@ -22,5 +24,6 @@ class Planar(AxialJoint):
         return p.Dot11(f, g, h), p.Dot20(h, i.arm(P), j.arm(P), ZERO)
 
     def mixed(self, i: Attachment, j: Attachment) -> Sequence[tuple[p.Primitive, str]]:
-        P, h = vec(self.point), unit(self.axis)  # its translations have no names: nothing drives them
+        # its translations have no names: nothing drives them
+        P, h = vec(self.point), unit(self.axis)
         return (p.Dot20(h, i.arm(P), j.arm(P), ZERO), ""), (p.NamedTurn(h), "rotation")

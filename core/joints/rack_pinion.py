@@ -1,4 +1,6 @@
-"""Rack and pinion: the displacement of one joint rolls off the rotation of another. 1 row between two joints."""
+"""Rack and pinion: the displacement of one joint rolls off the rotation of another. 1 row between
+two joints.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ from .coupler import Coupler
 
 @dataclass(frozen=True)
 class RackPinion(Coupler):
-    """The second joint, the rack's, moves by the radius [m] times the turn of the first, the pinion's; the sign sets the sense."""
+    """The second joint, the rack's, moves by the radius [m] times the turn of the first, the
+    pinion's; the sign sets the sense.
+    """
 
     type = "rack_pinion"
     freedoms = ("rotation", "translation")

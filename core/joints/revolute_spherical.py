@@ -13,7 +13,9 @@ from .base import Attachment, Joint, direction, positions, unit
 
 @dataclass(frozen=True)
 class RevoluteSpherical(Joint):
-    """A link from a hinge on body i, about the axis, to a ball on body j; its length is that at design."""
+    """A link from a hinge on body i, about the axis, to a ball on body j; its length is that at
+    design.
+    """
 
     type = "revolute_spherical"
     freedoms = ("turn of the link", "rotation x", "rotation y", "rotation z")
@@ -25,11 +27,14 @@ class RevoluteSpherical(Joint):
         super().__post_init__()
         if self.points[0] == self.points[1]:
             raise MechanismError(
-                f"{self}: the link has length 0, expected two different points; for a link of no length use inline"
+                f"{self}: the link has length 0, expected two different points; for a link of no"
+                " length use inline"
             )
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P_i, P_j = (vec(point) for point in self.points)
         d0 = P_j - P_i
         L = root(d0 @ d0)
-        return p.Distance(i.arm(P_i), j.arm(P_j), d0, L, L), p.Dot20(unit(self.axis), i.arm(P_i), j.arm(P_j), d0)
+        return p.Distance(i.arm(P_i), j.arm(P_j), d0, L, L), p.Dot20(
+            unit(self.axis), i.arm(P_i), j.arm(P_j), d0
+        )

@@ -12,7 +12,9 @@ from .cylindrical import Cylindrical
 
 @dataclass(frozen=True)
 class Screw(Cylindrical):
-    """Body j moves along the axis by the lead [m] in one right-handed turn; a negative lead is a left-handed thread."""
+    """Body j moves along the axis by the lead [m] in one right-handed turn; a negative lead is a
+    left-handed thread.
+    """
 
     type = "screw"
     lead: float = length()

@@ -1,4 +1,6 @@
-"""Spherical joint: a point of each body coincides, eq. (25). 3 rows, 3 freedoms. Also known as ball joint."""
+"""Spherical joint: a point of each body coincides, eq. (25). 3 rows, 3 freedoms. Also known as ball
+joint.
+"""
 
 from __future__ import annotations
 

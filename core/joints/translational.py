@@ -1,4 +1,6 @@
-"""Translational joint: dot12 + dot21, eq. (27). 5 rows, 1 freedom. Also known as prismatic joint or slider."""
+"""Translational joint: dot12 + dot21, eq. (27). 5 rows, 1 freedom. Also known as prismatic joint or
+slider.
+"""
 
 from __future__ import annotations
 

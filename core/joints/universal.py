@@ -12,7 +12,9 @@ from .base import Attachment, Joint, directions, position, require_perpendicular
 
 @dataclass(frozen=True)
 class Universal(Joint):
-    """Both bodies share the point; the first axis, on body i, stays perpendicular to the second, on body j."""
+    """Both bodies share the point; the first axis, on body i, stays perpendicular to the second, on
+    body j.
+    """
 
     type = "universal"
     freedoms = ("rotation i", "rotation j")

@@ -13,6 +13,7 @@ The modules beside this one are the main road of one mechanism:
     system              the same equations as plain matrices, for what is rare
     continuity, interpolation, thread_cache     limits, weights, and what each thread keeps
 
-The rooms hold what comes before it (`equations`, `structure`), what it turns to at singular poses (`singular`)
-and for large mechanisms (`cascade`, `sparse`), and what else is made of equations (`assembly`, `diagnosis`, `proofs`).
+The rooms hold what comes before it (`equations`, `structure`), what it turns to at singular poses
+(`singular`) and for large mechanisms (`cascade`, `sparse`), and what else is made of equations
+(`assembly`, `diagnosis`, `proofs`).
 """

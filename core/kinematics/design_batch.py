@@ -1,8 +1,10 @@
-"""Many variants of one mechanism along one path: the programs' lanes are variants, and geometry is an input.
+"""Many variants of one mechanism along one path: the programs' lanes are variants, and geometry is
+an input.
 
-All variants take the same samples, predicted each from its own poses at the samples before. Those that are not accepted somewhere
-are solved again in parts of steps, and then alone, by the march that divides steps; what that does not reach either is NaN, with
-the reason. Of many bodies tied together each variant is solved by itself.
+All variants take the same samples, predicted each from its own poses at the samples before. Those
+that are not accepted somewhere are solved again in parts of steps, and then alone, by the march
+that divides steps; what that does not reach either is NaN, with the reason. Of many bodies tied
+together each variant is solved by itself.
 """
 
 from __future__ import annotations
@@ -29,10 +31,11 @@ from .formulation.parameters import placed, places
 from .solver_selection import IRREDUCIBLE, prepare
 from .structure.driver_count import require_driven
 
-# Steps of the straight way from the design to a start away from it: a sixteenth of it is a step like those of a sweep, and a lane
-# for which it is too long is solved again alone.
+# Steps of the straight way from the design to a start away from it: a sixteenth of it is a step
+# like those of a sweep, and a lane for which it is too long is solved again alone.
 LEAD = 16
-# So many variants are solved again together in parts of steps, of which there are as many more: their table stays small.
+# So many variants are solved again together in parts of steps, of which there are as many more:
+# their table stays small.
 SOME = 32
 # Bytes of the largest blocks that are used again: glibc's own limit is twice that.
 RECYCLED = 16_000_000
@@ -40,8 +43,9 @@ RECYCLED = 16_000_000
 BY_ITSELF = "by itself, a variant may pass a singular pose; many at once do not"
 # Nor this: it would be another program, made for the geometry of one variant.
 OTHER_ROWS = (
-    "what is singular may be the {count} rows chosen at the nominal design out of {all}, and not the mechanism: solve this variant "
-    "by itself, and rows are chosen anew where these come to depend on each other; those of many at once stay"
+    "what is singular may be the {count} rows chosen at the nominal design out of {all}, and not"
+    " the mechanism: solve this variant by itself, and rows are chosen anew where these come to"
+    " depend on each other; those of many at once stay"
 )
 
 
@@ -50,7 +54,8 @@ class Variants:
     """What became of V variants at n samples, in the order of the path.
 
     Attributes:
-        kept: the kept rows of the model (`Model.rows`), shape (kept, n, V); NaN where a sample was not reached.
+        kept: the kept rows of the model (`Model.rows`), shape (kept, n, V); NaN where a sample was
+            not reached.
         solved: whether each sample of each variant was reached, shape (n, V).
         retried: how many variants were solved again.
         messages: by variant, why samples are missing; of every one that misses some.
@@ -63,9 +68,11 @@ class Variants:
 
 
 def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
-    """Solve all variants at all samples. Drivers are measured from the design position of each variant.
+    """Solve all variants at all samples. Drivers are measured from the design position of each
+    variant.
 
-    A variant's numbers depend to round-off on its own geometry only, not on which others are solved with it.
+    A variant's numbers depend to round-off on its own geometry only, not on which others are solved
+    with it.
 
     Args:
         route: of a model with varied places.
@@ -84,14 +91,22 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         for first in range(0, len(again), SOME):
             some = again[first : first + SOME]
             filled = np.resize(some, SOME)  # the executor of as many is kept
-            kept[:, :, some] = _together(route, geometry[:, filled], tol, FINER[0])[0][:, :, : len(some)]
+            kept[:, :, some] = _together(route, geometry[:, filled], tol, FINER[0])[0][
+                :, :, : len(some)
+            ]
             solved[:, some] = ~np.isnan(closure[:, some])
     messages = dict[int, str]()
     for k in failed[~solved[:, failed].all(axis=0)].tolist():
         if not closes[k]:
-            messages[k] = "does not close at its design position; check the points, axes and lengths of this variant"
+            messages[k] = (
+                "does not close at its design position; check the points, axes and lengths of this"
+                " variant"
+            )
             continue
-        found = march(replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0], given=route.begin), tol)
+        found = march(
+            replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0], given=route.begin),
+            tol,
+        )
         kept[:, :, k], solved[:, k] = found.kept[:, route.by_time], found.solved[route.by_time]
         if found.messages:
             kept_rows, others = len(model.selection.chosen), len(model.selection.dropped)
@@ -100,35 +115,61 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     for k, message in _held(route, geometry, solved).items():
         kept[:, :, k], solved[:, k], messages[k] = np.nan, False, message
     # by the worst of each variant: to judge all samples takes a twentieth of the time
-    for k in np.union1d(failed, np.flatnonzero(doubtful(worst[SIGMA], worst["closure"], tol))).tolist():
+    for k in np.union1d(
+        failed, np.flatnonzero(doubtful(worst[SIGMA], worst["closure"], tol))
+    ).tolist():
         doubted = solved[:, k] & doubtful(sigma[:, k], closure[:, k], tol)
         if not doubted.any():
             continue
-        if len(model.frame.moving) > IRREDUCIBLE:  # what is known of sigma here is an estimate, which is far too small then
+        # what is known of sigma here is an estimate, which is far too small then
+        if len(model.frame.moving) > IRREDUCIBLE:
             kept[:, :, k], solved[:, k], messages[k] = _by_itself(route, geometry[:, k], tol)
             continue
         kept[:, doubted, k], solved[doubted, k] = np.nan, False
         near = route.path.where(float(route.path.times[route.by_time][doubted.argmax()]))
-        refused = f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them uncertain, as at {near}; "
-        messages[k] = "; ".join(filter(None, [messages.get(k, ""), f"{refused}solve this variant by itself, or keep away from it"]))
+        refused = (
+            f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them"
+            f" uncertain, as at {near}; "
+        )
+        messages[k] = "; ".join(
+            filter(
+                None,
+                [
+                    messages.get(k, ""),
+                    f"{refused}solve this variant by itself, or keep away from it",
+                ],
+            )
+        )
     return Variants(
-        kept[:, route.back], solved[route.back], len(failed), {k: message for k, message in messages.items() if message}
+        kept[:, route.back],
+        solved[route.back],
+        len(failed),
+        {k: message for k, message in messages.items() if message},
     )
 
 
 def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray[np.bool_], str]:
-    """What is kept of a variant that is solved as any mechanism of its size, by time; which samples, and why others are missing."""
+    """What is kept of a variant that is solved as any mechanism of its size, by time; which
+    samples, and why others are missing.
+    """
     model, n = route.model, len(route.path.times)
     kept = np.full((model.kept, n), np.nan)
     try:
-        found = prepare(_variant(model, numbers), replace(model.request, varied=()), route.path)(tol)
+        found = prepare(_variant(model, numbers), replace(model.request, varied=()), route.path)(
+            tol
+        )
     except SolveError as error:
         return kept, np.zeros(n, dtype=np.bool_), str(error)
     for name, motion in found.points.items():
-        for label, values in zip(QUANTITIES, (motion.position, motion.velocity, motion.acceleration), strict=True):
+        for label, values in zip(
+            QUANTITIES, (motion.position, motion.velocity, motion.acceleration), strict=True
+        ):
             if values is not None:
                 kept[model.rows[f"{label} {name}"]] = values.T
-    kept[model.rows["closure"]], kept[model.rows[ITERATIONS]] = found.residual / model.frame.unit, found.iterations
+    kept[model.rows["closure"]], kept[model.rows[ITERATIONS]] = (
+        found.residual / model.frame.unit,
+        found.iterations,
+    )
     kept[:, ~found.solved] = np.nan
     return kept[:, route.by_time], found.solved[route.by_time], found.message
 
@@ -136,8 +177,9 @@ def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray
 def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int, str]:
     """Variants that cannot move, and what holds them.
 
-    At its design every variant closes. Where rows that are redundant at the nominal design hold it there, those that are solved
-    give it rates all the same, and the residuals do not tell: only where it has gone somewhere do they.
+    At its design every variant closes. Where rows that are redundant at the nominal design hold it
+    there, those that are solved give it rates all the same, and the residuals do not tell: only
+    where it has gone somewhere do they.
 
     Args:
         solved: shape (n, V), by time.
@@ -158,23 +200,31 @@ def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int,
 def _variant(model: Model, numbers: Array) -> Mechanism:
     """The mechanism with the numbers of a variant at the varied places."""
     known, given = places(model.mechanism), iter(numbers.tolist())
-    return placed(model.mechanism, {name: [next(given) for _ in known[name]] for name in model.request.varied})
+    return placed(
+        model.mechanism, {name: [next(given) for _ in known[name]] for name in model.request.varied}
+    )
 
 
-def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tuple[Array, NDArray[np.bool_], Mapping[str, Array]]:
+def _together(
+    route: Route, geometry: Array, tol: float, parts: int = 1
+) -> tuple[Array, NDArray[np.bool_], Mapping[str, Array]]:
     """Follow variants through all samples, each step in as many parts.
 
     Returns:
-        The kept rows, by time; which variants close at their design; and the worst of each by test, NaN where a sample is missing.
+        The kept rows, by time; which variants close at their design; and the worst of each by test,
+        NaN where a sample is missing.
     """
     model, count = route.model, geometry.shape[1]
     executor = model.executor(count)
     closes = model.stand(executor, geometry)
     accepted_by = accept_by(tol)
-    executor.put([model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None])
+    executor.put(
+        [model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None]
+    )
     arrived = np.ones(count, dtype=np.bool_) if route.stands else _lead(executor, route, count)
     model.depart(executor, route.origin)
-    # what lanes are predicted from, with what stands between: one stretch is copied in half the time of single slots
+    # what lanes are predicted from, with what stands between: one stretch is copied in half the
+    # time of single slots
     ahead = executor.window(range(min(model.ahead), max(model.ahead) + 1))
     start = ahead.copy()
     whole = executor.table(parts * len(route.path.times))
@@ -191,14 +241,17 @@ def _together(route: Route, geometry: Array, tol: float, parts: int = 1) -> tupl
 
 @cache
 def _recycle() -> None:
-    """Have freed blocks kept for the next ones, else the system clears every page of every table anew: that takes half as long as
-    filling it. glibc keeps them up to the size of the largest that was ever freed.
+    """Have freed blocks kept for the next ones, else the system clears every page of every table
+    anew: that takes half as long as filling it. glibc keeps them up to the size of the largest that
+    was ever freed.
     """
     np.empty(RECYCLED, dtype=np.uint8)
 
 
 def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
-    """Take lanes straight from the design to the start, where they stand afterwards; which of them arrived there."""
+    """Take lanes straight from the design to the start, where they stand afterwards; which of them
+    arrived there.
+    """
     model, last = route.model, route.path.lead_in(route.start)
     way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
     model.depart(executor, way.origin)

@@ -20,8 +20,9 @@ from .formulation.parameters import places
 from .solve import asked
 from .solver_selection import start_notes
 
-# Variants solved at once: their lanes stay in the second-level cache. Fewer where the table of their motions takes more bytes than
-# these, which costs up to a third of the time; of fewer than the least the calls around them would be felt.
+# Variants solved at once: their lanes stay in the second-level cache. Fewer where the table of
+# their motions takes more bytes than these, which costs up to a third of the time; of fewer than
+# the least the calls around them would be felt.
 MOST, LEAST, ROOM = 256, 32, 4_000_000
 
 
@@ -30,7 +31,8 @@ class Designs:
     """The motion of V designs over n samples.
 
     Attributes:
-        points: motion by point name, each array of shape (V, n, 3); NaN where a sample was not reached.
+        points: motion by point name, each array of shape (V, n, 3); NaN where a sample was not
+            reached.
         solved: whether each sample of each design was reached, shape (V, n).
         messages: by design, why samples are missing.
         notes: what is assumed of where all are followed from, as of the nominal design.
@@ -54,46 +56,78 @@ def solve_designs(
     tol: float = 1e-12,
     motions: Mapping[str, Motion] | None = None,
 ) -> Designs:
-    """Sweep one driver over values for many designs, each with its own hardpoints, directions and lengths.
+    """Sweep one driver over values for many designs, each with its own hardpoints, directions and
+    lengths.
 
-    The geometry is an input of the compiled programs, so that a design costs about a tenth of a microsecond per sample; what is
-    not varied is a constant in them. All results are held at once: `kincheck sweep` reduces them on the way.
+    The geometry is an input of the compiled programs, so that a design costs about a tenth of a
+    microsecond per sample; what is not varied is a constant in them. All results are held at once:
+    `kincheck sweep` reduces them on the way.
 
     Args:
         mechanism: the nominal design.
-        driver, values, rate, points, tol, motions: as for `solve`; drivers are measured from the design position of each design,
-            so that a point that varies can be driven by its change only.
-        geometry: what varies [m or -]: by place, named as in a case file ("joints.tie_rod.points.0", "joints.hinge.axis",
-            "points.wheel_center.position", a length), values of shape (V, 3), or (V,) of a length. Places that are one hardpoint
-            are each to be given. They are not checked as a joint checks its own: two axes of a cross may be askew.
+        driver, values, rate, points, tol, motions: as for `solve`; drivers are measured from the
+            design position of each design, so that a point that varies can be driven by its change
+            only.
+        geometry: what varies [m or -]: by place, named as in a case file
+            ("joints.tie_rod.points.0", "joints.hinge.axis", "points.wheel_center.position", a
+            length), values of shape (V, 3), or (V,) of a length. Places that are one hardpoint are
+            each to be given. They are not checked as a joint checks its own: two axes of a cross
+            may be askew.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too.
 
     Raises:
-        SolveError: there is no such place, a shape is wrong, a number is not finite, or the nominal mechanism cannot be solved.
+        SolveError: there is no such place, a shape is wrong, a number is not finite, or the nominal
+            mechanism cannot be solved.
     """
-    path, request = asked("solve_designs", mechanism, driver, values, motions or {}, rate=rate, points=points, order=order, tol=tol)
+    path, request = asked(
+        "solve_designs",
+        mechanism,
+        driver,
+        values,
+        motions or {},
+        rate=rate,
+        points=points,
+        order=order,
+        tol=tol,
+    )
     known = places(mechanism)
     if not geometry:
-        raise SolveError(f"solve_designs: geometry names no place to vary; known: {', '.join(known) or 'none'}")
+        raise SolveError(
+            f"solve_designs: geometry names no place to vary; known: {', '.join(known) or 'none'}"
+        )
     for name in path.design:
         moved = f"points.{getattr(mechanism.driver(name), 'point', '')}.position"
         if moved in geometry:
             problem = f"driver {name!r} gives the absolute position of a point that varies, {moved}"
-            raise SolveError(f"solve_designs: {problem}; drive it with relative = True, or leave the point")
+            raise SolveError(
+                f"solve_designs: {problem}; drive it with relative = True, or leave the point"
+            )
     numbers: list[Array] = []
     for place, given in geometry.items():
         if place not in known:
             raise no_such("solve_designs", "place to vary", place, [*known])
-        numbers.append(_numbers(place, real("solve_designs", place, given, "a row for each design"), len(known[place])))
+        numbers.append(
+            _numbers(
+                place,
+                real("solve_designs", place, given, "a row for each design"),
+                len(known[place]),
+            )
+        )
     counts = {found.shape[1] for found in numbers}
     if len(counts) != 1:
-        raise SolveError(f"solve_designs: found {sorted(counts)} designs for different places, expected as many of each")
+        raise SolveError(
+            f"solve_designs: found {sorted(counts)} designs for different places, expected as many"
+            " of each"
+        )
     (count,) = counts
     route = recent_route(mechanism, replace(request, varied=tuple(geometry)), path)
     rows, lanes, n = route.model.rows, np.concatenate(numbers), len(path.times)
     labels = QUANTITIES[: request.order + 1]
-    # in memory designs stand side by side, as they are solved: to turn what is found takes as long as solving it
-    motion: dict[str, dict[str, Any]] = {name: {label: np.empty((3, n, count)).T for label in labels} for name in request.points}
+    # in memory designs stand side by side, as they are solved: to turn what is found takes as long
+    # as solving it
+    motion: dict[str, dict[str, Any]] = {
+        name: {label: np.empty((3, n, count)).T for label in labels} for name in request.points
+    }
     solved, messages = np.empty((n, count), dtype=np.bool_).T, dict[int, str]()
     together = max(LEAST, min(MOST, ROOM // (8 * route.model.kept * max(1, n)) // LEAST * LEAST))
     for first in range(0, count, together):
@@ -104,7 +138,10 @@ def solve_designs(
         for name, each in motion.items():
             for label, values_of in each.items():
                 values_of[here] = part.kept[rows[f"{label} {name}"]].T
-    found = {name: PointMotion(each["position"], each.get("velocity"), each.get("acceleration")) for name, each in motion.items()}
+    found = {
+        name: PointMotion(each["position"], each.get("velocity"), each.get("acceleration"))
+        for name, each in motion.items()
+    }
     return Designs(found, solved, messages, start_notes(mechanism, request, path, tol))
 
 
@@ -112,7 +149,10 @@ def _numbers(place: str, given: Array, size: int) -> Array:
     """The numbers of a place, shape (size, V)."""
     columns = given[:, None] if size == 1 and given.ndim == 1 else given
     if columns.ndim != 2 or columns.shape[1] != size:
-        raise SolveError(f"solve_designs: {place} has shape {given.shape}, expected (designs, {size}): a row for each design")
+        raise SolveError(
+            f"solve_designs: {place} has shape {given.shape}, expected (designs, {size}): a row for"
+            " each design"
+        )
     if not np.isfinite(columns).all():
         raise SolveError(f"solve_designs: {place} is not finite everywhere; give finite numbers")
     return columns.T

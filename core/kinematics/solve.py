@@ -32,31 +32,37 @@ def solve(
 ) -> Trajectory:
     """Sweep one driver over values.
 
-    What was made ready for the last few mechanisms is kept in the process: the next call for one of them costs a fraction.
+    What was made ready for the last few mechanisms is kept in the process: the next call for one of
+    them costs a fraction.
 
     Args:
         mechanism: what to solve.
         driver: name of the driver that moves; the others hold their design value.
-        values: driver values [m or rad], in any order: measured from the design position, or the coordinate itself where the
-            driver is not relative. They are solved from the design position outwards.
-        rate: driver units per second; velocities and accelerations are per second at this constant rate.
+        values: driver values [m or rad], in any order: measured from the design position, or the
+            coordinate itself where the driver is not relative. They are solved from the design
+            position outwards.
+        rate: driver units per second; velocities and accelerations are per second at this constant
+            rate.
         points: points whose motion is wanted; all of them unless given.
         bodies: bodies whose motion is wanted, in the paper's variables.
-        order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for is not computed.
-        tol: largest accepted constraint residual, relative to the mechanism's size; positive and finite.
-        style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes), "conventional" (full
-            products), "mixed" (joint coordinates as further unknowns) or "relative" (joint coordinates of a tree as the only
-            ones); the solutions are the same.
-        motions: of further drivers, their values measured likewise, over the time in which the swept one goes from its design
-            value at the rate; the others hold. They are asked at the samples, and between them where a step is divided: what goes
-            away and comes back between two samples is not seen.
+        order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for
+            is not computed.
+        tol: largest accepted constraint residual, relative to the mechanism's size; positive and
+            finite.
+        style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes),
+            "conventional" (full products), "mixed" (joint coordinates as further unknowns) or
+            "relative" (joint coordinates of a tree as the only ones); the solutions are the same.
+        motions: of further drivers, their values measured likewise, over the time in which the
+            swept one goes from its design value at the rate; the others hold. They are asked at the
+            samples, and between them where a step is divided: what goes away and comes back between
+            two samples is not seen.
 
     Returns:
         The motion; NaN where a sample cannot be reached, and the reason in its message.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
-            argument makes no sense.
+        SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the
+            design position, or an argument makes no sense.
     """
     path, request = asked(
         "solve",
@@ -106,19 +112,26 @@ def asked(
         there = [each.name for each in known]
         for name in names:
             if name not in there:
-                require_driven(mechanism)  # a mechanism that nothing drives is the better explanation
+                # a mechanism that nothing drives is the better explanation
+                require_driven(mechanism)
                 raise no_such(who, what, name, there)
     design = {name: value for name in (driver, *motions) if (value := mechanism.design_value(name))}
     with np.errstate(over="ignore"):
         times = (values - design.get(driver, 0.0)) / rate
     if not np.isfinite(times).all():
-        raise SolveError(f"{who}: rate is {rate}: no number is the time of the values then; give a larger one")
+        raise SolveError(
+            f"{who}: rate is {rate}: no number is the time of the values then; give a larger one"
+        )
     path = Path({**as_changes(motions, design), driver: Ramp(float(rate))}, times, design)
     return path, Request(tuple(path.motions), wanted, tuple(bodies), int(order), Style(style))
 
 
-def _problem(driver: str, values: Array, motions: Mapping[str, Motion], rate: float, order: int, tol: float) -> str:
-    """What makes no sense about arguments, or nothing; told only where there is something, because telling takes its time."""
+def _problem(
+    driver: str, values: Array, motions: Mapping[str, Motion], rate: float, order: int, tol: float
+) -> str:
+    """What makes no sense about arguments, or nothing; told only where there is something, because
+    telling takes its time.
+    """
     if not finite(order) or order not in (0, 1, 2):
         return f"order is {order!r}, expected 0, 1 or 2"
     if not (finite(rate) and rate != 0.0):

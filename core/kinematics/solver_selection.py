@@ -1,12 +1,15 @@
-"""How a mechanism is solved is chosen by its size: as one program, component by component, or as one sparse system.
+"""How a mechanism is solved is chosen by its size: as one program, component by component, or as
+one sparse system.
 
-The answers are the same to round-off. One program costs least for each sample, and more to trace: it grows faster than what it ties
-together. Components share programs, so that a chain of thousands is made ready in seconds; what is irreducible and too large for
-one program is a sparse system. Measured on chains of four-bars, one program against components, both interpreted: 17 bodies 3 and
-13 us a sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and 0.2 s. Compiled, 33 bodies take
-3 and 8 us, after 6 s and 0.1. On rings of loops, one program against a sparse system: 31 bodies 21 and 180 us, made ready in 1.3
-and 0.04 s; 39 bodies 42 and 275 us, 2.2 and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and refuses
-more of what could be solved.
+The answers are the same to round-off. One program costs least for each sample, and more to trace:
+it grows faster than what it ties together. Components share programs, so that a chain of thousands
+is made ready in seconds; what is irreducible and too large for one program is a sparse system.
+Measured on chains of four-bars, one program against components, both interpreted: 17 bodies 3 and
+13 us a sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and
+0.2 s. Compiled, 33 bodies take 3 and 8 us, after 6 s and 0.1. On rings of loops, one program
+against a sparse system: 31 bodies 21 and 180 us, made ready in 1.3 and 0.04 s; 39 bodies 42 and 275
+us, 2.2 and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and refuses more
+of what could be solved.
 """
 
 from __future__ import annotations
@@ -29,8 +32,9 @@ from .formulation.constraints import Style, frames
 
 # Up to as many bodies one program is made ready in a third of a second.
 ONE_PROGRAM = 20
-# An irreducible mechanism is worth two seconds, once: as one program it is six times as fast as a sparse system. Larger rings are
-# so near to singular that the estimate of sigma leaves all their samples in doubt.
+# An irreducible mechanism is worth two seconds, once: as one program it is six times as fast as a
+# sparse system. Larger rings are so near to singular that the estimate of sigma leaves all their
+# samples in doubt.
 IRREDUCIBLE = 40
 
 Solver = Callable[[float], Trajectory]
@@ -41,7 +45,8 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """Make a mechanism ready to be solved along a path.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
+        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
+            the design position.
     """
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
         known = ours(mechanism) and path.ours
@@ -52,7 +57,9 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
 
 
 def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
-    """Say what is assumed of the start of many designs, by the nominal one; empty where the design decides it."""
+    """Say what is assumed of the start of many designs, by the nominal one; empty where the design
+    decides it.
+    """
     start = start_of(mechanism, path)
     if start.stands and not start.ambiguous:
         return []
@@ -68,7 +75,8 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     from .structure.driver_count import require_driven
 
     try:
-        parts = [] if mechanism.couplers else components(mechanism, frames(mechanism))  # couplers tie components together
+        # couplers tie components together
+        parts = [] if mechanism.couplers else components(mechanism, frames(mechanism))
     except SolveError:
         require_driven(mechanism)  # which names what can still move
         raise
@@ -86,11 +94,14 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     from .sparse.sweep import solve_sparse
 
     model = SparseModel(mechanism, compiled=request.compiled)
-    return lambda path: partial(solve_sparse, model, path, request.points, request.bodies, request.order)
+    return lambda path: partial(
+        solve_sparse, model, path, request.points, request.bodies, request.order
+    )
 
 
 class _OfThread(local):
-    """The same, and once for whoever solves one again and again. One only, and of its paths the last: they fill much of the memory.
+    """The same, and once for whoever solves one again and again. One only, and of its paths the
+    last: they fill much of the memory.
 
     Each thread has its own, for it is solved in place.
     """

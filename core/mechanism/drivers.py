@@ -1,4 +1,6 @@
-"""Drivers: what moves a mechanism. Each adds one equation  Phi(q) - c(t) = 0  per driven coordinate."""
+"""Drivers: what moves a mechanism. Each adds one equation  Phi(q) - c(t) = 0  per driven
+coordinate.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,8 @@ class PointCoordinate(Driver):
     Attributes:
         point: name of the driven point.
         direction: global direction, any length but zero [-].
-        relative: the value is the change from the design position (default), else the coordinate itself [m]; see
-            `Mechanism.design_value`.
+        relative: the value is the change from the design position (default), else the coordinate
+            itself [m]; see `Mechanism.design_value`.
     """
 
     type: ClassVar[str] = "point_coordinate"
@@ -44,7 +46,9 @@ class PointCoordinate(Driver):
 
 @dataclass(frozen=True)
 class JointDriver(Driver):
-    """Base of the drivers of a joint's own freedom: second body relative to first, zero at design."""
+    """Base of the drivers of a joint's own freedom: second body relative to first, zero at
+    design.
+    """
 
     freedom: ClassVar[str]
     joint: str
@@ -54,15 +58,17 @@ class JointDriver(Driver):
         """Raise MechanismError unless the joint has the freedom this driver drives."""
         if self.freedom not in joint.freedoms:
             raise MechanismError(
-                f"driver {self.name!r} ({self.type}): joint {joint.name!r} is {joint.type} and has no {self.freedom} "
-                f"to drive; its freedoms: {', '.join(joint.freedoms) or 'none'}",
+                f"driver {self.name!r} ({self.type}): joint {joint.name!r} is {joint.type} and has"
+                f" no {self.freedom} to drive; its freedoms: {', '.join(joint.freedoms) or 'none'}",
                 f"drivers.{self.name}.joint",
             )
 
 
 @dataclass(frozen=True)
 class JointAngle(JointDriver):
-    """Drives the rotation of a joint's second body relative to its first, about the axis by the right hand [rad]."""
+    """Drives the rotation of a joint's second body relative to its first, about the axis by the
+    right hand [rad].
+    """
 
     type: ClassVar[str] = "joint_angle"
     turns: ClassVar[bool] = True
@@ -71,7 +77,9 @@ class JointAngle(JointDriver):
 
 @dataclass(frozen=True)
 class JointDisplacement(JointDriver):
-    """Drives the displacement of a joint's second body relative to its first, along the axis [m]."""
+    """Drives the displacement of a joint's second body relative to its first, along the axis
+    [m].
+    """
 
     type: ClassVar[str] = "joint_displacement"
     freedom: ClassVar[str] = "translation"

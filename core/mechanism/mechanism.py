@@ -1,6 +1,8 @@
-"""Mechanism: bodies, points, joints and drivers as data. Validation of names and shapes, no numerics.
+"""Mechanism: bodies, points, joints and drivers as data. Validation of names and shapes, no
+numerics.
 
-All points and axes are global coordinates at the design position, SI units, as in a table of hardpoints.
+All points and axes are global coordinates at the design position, SI units, as in a table of
+hardpoints.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
 
 Vector: TypeAlias = tuple[float, float, float]
-# How far a joint between fixed bodies may be off [m]: no output is held to less, unless a case says so.
+# How far a joint between fixed bodies may be off [m]: no output is held to less, unless a case says
+# so.
 HOLDS = 1e-9
 FOUR_NUMBERS = "four numbers, e0 first"
 
@@ -47,14 +50,17 @@ class Body:
         who = f"body {self.name!r}: origin"
         object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
         require_finite(who, self.origin, Kind.POSITION.value)
-        p = held(who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS)
+        p = held(
+            who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS
+        )
         require_finite(who, p, FOUR_NUMBERS)
         length = math.sqrt(sum(e * e for e in p))
-        # Tables print Euler parameters to about four digits: a longer defect is a mistake, a shorter one rounding.
+        # Tables print Euler parameters to about four digits: a longer defect is a mistake, a
+        # shorter one rounding.
         if not abs(length - 1.0) < 1e-3:
             raise MechanismError(
-                f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected four numbers of "
-                "length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
+                f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected"
+                " four numbers of length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
             )
         object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))
 
@@ -78,12 +84,13 @@ class Mechanism:
     """A named set of bodies, joints, points and drivers.
 
     Attributes:
-        grounded: joints between two fixed bodies, as CAD exports have them. They are taken out of `joints`: they hold whatever
-            moves, and no engine has rows for them.
+        grounded: joints between two fixed bodies, as CAD exports have them. They are taken out of
+            `joints`: they hold whatever moves, and no engine has rows for them.
 
     Raises:
-        MechanismError: a name is used twice, something refers to a name that does not exist, or a joint between fixed bodies does
-            not hold at the design position, or is driven or coupled.
+        MechanismError: a name is used twice, something refers to a name that does not exist, or a
+            joint between fixed bodies does not hold at the design position, or is driven or
+            coupled.
     """
 
     name: str
@@ -100,17 +107,30 @@ class Mechanism:
             object.__setattr__(self, what, tuple(getattr(self, what)))
             _unique(what, [each.name for each in getattr(self, what)])
         if any(body.name == GROUND for body in self.bodies):
-            raise MechanismError(f"body {GROUND!r} exists by itself; give the fixed body another name or leave it out", "bodies")
+            raise MechanismError(
+                f"body {GROUND!r} exists by itself; give the fixed body another name or leave"
+                " it out",
+                "bodies",
+            )
         known = {GROUND: None} | dict.fromkeys(body.name for body in self.bodies)
         for joint in self.joints:
             for name in joint.bodies:
-                _known(f"joint {joint.name!r} ({joint.type})", "body", name, known, f"joints.{joint.name}.bodies")
+                _known(
+                    f"joint {joint.name!r} ({joint.type})",
+                    "body",
+                    name,
+                    known,
+                    f"joints.{joint.name}.bodies",
+                )
         self._leave_out_grounded()
         for point in self.points:
             _known(f"point {point.name!r}", "body", point.body, known, f"points.{point.name}.body")
         for coupler in self.couplers:
             for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
-                who, key = f"joint {coupler.name!r} ({coupler.type})", f"joints.{coupler.name}.joints"
+                who, key = (
+                    f"joint {coupler.name!r} ({coupler.type})",
+                    f"joints.{coupler.name}.joints",
+                )
                 _known(who, "joint", name, self._named["joints"], key)
                 joint = self.joint(name)
                 if freedom not in joint.freedoms:
@@ -125,8 +145,9 @@ class Mechanism:
                 _known(f"driver {driver.name!r}", "point", driver.point, self._named["points"], key)
                 if self.is_fixed(self.point(driver.point).body):
                     raise MechanismError(
-                        f"driver {driver.name!r}: point {driver.point!r} is on {self.point(driver.point).body!r}, which is "
-                        "fixed; drive a point of a moving body",
+                        f"driver {driver.name!r}: point {driver.point!r} is on"
+                        f" {self.point(driver.point).body!r}, which is fixed; drive a point of a"
+                        " moving body",
                         key,
                     )
             elif isinstance(driver, JointDriver):
@@ -141,14 +162,25 @@ class Mechanism:
         if not still:
             return
         names = {joint.name for joint in still}
-        object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint.name not in names))
-        needed = {driver.joint: f"driver {driver.name!r}" for driver in self.drivers if isinstance(driver, JointDriver)}
-        needed |= {name: f"joint {coupler.name!r} ({coupler.type})" for coupler in self.couplers for name in coupler.joints}
+        object.__setattr__(
+            self, "joints", tuple(joint for joint in self.joints if joint.name not in names)
+        )
+        needed = {
+            driver.joint: f"driver {driver.name!r}"
+            for driver in self.drivers
+            if isinstance(driver, JointDriver)
+        }
+        needed |= {
+            name: f"joint {coupler.name!r} ({coupler.type})"
+            for coupler in self.couplers
+            for name in coupler.joints
+        }
         for joint in still:
             who = f"{joint}: {joint.i!r} and {joint.j!r} are both fixed"
             if joint.name in needed:
                 raise MechanismError(
-                    f"{who}, and {needed[joint.name]} needs it to move; free one of them", f"joints.{joint.name}.bodies"
+                    f"{who}, and {needed[joint.name]} needs it to move; free one of them",
+                    f"joints.{joint.name}.bodies",
                 )
             if (off := gap(joint)) > HOLDS:
                 raise MechanismError(
@@ -181,16 +213,31 @@ class Mechanism:
         return self._named["drivers"][name]
 
     def design_value(self, name: str) -> float:
-        """The value of a driver at the design position, as its values are given: the coordinate of its point [m], or zero."""
+        """The value of a driver at the design position, as its values are given: the coordinate of
+        its point [m], or zero.
+        """
         driver = self.driver(name)
         if not isinstance(driver, PointCoordinate) or driver.relative:
             return 0.0
-        return sum((d * x for d, x in zip(unit(driver.direction), self.point(driver.point).position, strict=True)), 0.0)
+        return sum(
+            (
+                d * x
+                for d, x in zip(
+                    unit(driver.direction), self.point(driver.point).position, strict=True
+                )
+            ),
+            0.0,
+        )
 
     @cached_property
     def _named(self) -> Mapping[str, Mapping[str, Any]]:
         """What there is of each kind, by name."""
-        all_of = {"bodies": self.bodies, "joints": (*self.joints, *self.grounded), "points": self.points, "drivers": self.drivers}
+        all_of = {
+            "bodies": self.bodies,
+            "joints": (*self.joints, *self.grounded),
+            "points": self.points,
+            "drivers": self.drivers,
+        }
         return {what: {each.name: each for each in found} for what, found in all_of.items()}
 
     @property
@@ -202,7 +249,9 @@ class Mechanism:
 def _unique(what: str, names: Sequence[str]) -> None:
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
-        raise MechanismError(f"{what}: the name {min(twice)!r} is used more than once; names must be unique", what)
+        raise MechanismError(
+            f"{what}: the name {min(twice)!r} is used more than once; names must be unique", what
+        )
 
 
 def _known(who: str, what: str, name: str, known: Mapping[str, Any], key: str) -> None:

@@ -21,7 +21,9 @@ from ..input_checks import finite, held
 from ..trajectory import Array
 
 ROUNDED_TIME = 1e-12
-"""A time may lie outside a motion's span by this part of its numbers: the rounding of a time, and nothing that anybody writes."""
+"""A time may lie outside a motion's span by this part of its numbers: the rounding of a time, and
+nothing that anybody writes.
+"""
 
 
 class Measure(Enum):
@@ -94,7 +96,8 @@ class Sine(Motion):
 
 @dataclass(frozen=True)
 class Table(Motion):
-    """The natural cubic spline through values at increasing times [s]: twice differentiable, so that accelerations exist.
+    """The natural cubic spline through values at increasing times [s]: twice differentiable, so
+    that accelerations exist.
 
     Outside the table the end pieces go on.
     """
@@ -106,16 +109,20 @@ class Table(Motion):
     def __post_init__(self) -> None:
         for name in ("times", "values"):  # lists and arrays may change, motions do not
             given = getattr(self, name)
-            object.__setattr__(self, name, held(f"table motion: {name}", given, None, "as many numbers as samples"))
+            object.__setattr__(
+                self, name, held(f"table motion: {name}", given, None, "as many numbers as samples")
+            )
         if len(self.times) != len(self.values) or len(self.times) < 2:
             raise MechanismError(
-                f"table motion: {len(self.times)} times and {len(self.values)} values, expected as many of each, two or more; "
-                "give a value for each time"
+                f"table motion: {len(self.times)} times and {len(self.values)} values, expected as"
+                " many of each, two or more; give a value for each time"
             )
         if not all(map(finite, (*self.times, *self.values))):
             raise MechanismError("table motion: a time or value is not finite; give numbers")
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise MechanismError("table motion: times do not increase; sort them and remove repeats")
+            raise MechanismError(
+                "table motion: times do not increase; sort them and remove repeats"
+            )
 
     @property
     def span(self) -> tuple[float, float]:
@@ -134,7 +141,9 @@ class Table(Motion):
 
 @dataclass(frozen=True)
 class Absolute(Motion):
-    """A motion that gives a driver's absolute value, measured from the design value as all motions are on the way."""
+    """A motion that gives a driver's absolute value, measured from the design value as all motions
+    are on the way.
+    """
 
     motion: Motion
     design: float
@@ -149,14 +158,21 @@ class Absolute(Motion):
 
 
 def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:
-    """Motions of drivers, by name, as changes from their design values, which are given where they are not zero."""
-    there = {name: motion for name, motion in motions.items() if name in design and not isinstance(motion, Absolute)}
+    """Motions of drivers, by name, as changes from their design values, which are given where they
+    are not zero.
+    """
+    there = {
+        name: motion
+        for name, motion in motions.items()
+        if name in design and not isinstance(motion, Absolute)
+    }
     return {**motions, **{name: Absolute(motion, design[name]) for name, motion in there.items()}}
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The way a mechanism is driven: the motions of its drivers over time; drivers without a motion hold their design value.
+    """The way a mechanism is driven: the motions of its drivers over time; drivers without a motion
+    hold their design value.
 
     Two are equal where motions and times are, to the last bit. The times do not change.
 
@@ -182,8 +198,12 @@ class Path:
 
     @property
     def ours(self) -> bool:
-        """Whether all motions are of this module, of numbers that do not change: what is equal then means the same."""
-        motions = (each.motion if isinstance(each, Absolute) else each for each in self.motions.values())
+        """Whether all motions are of this module, of numbers that do not change: what is equal then
+        means the same.
+        """
+        motions = (
+            each.motion if isinstance(each, Absolute) else each for each in self.motions.values()
+        )
         try:
             hash(self._content)
         except TypeError:  # a number given as an array
@@ -194,20 +214,36 @@ class Path:
         """The values of the moving drivers at time t, to read."""
         values = self.drive(list(self.motions), np.array([t]))[0, :, 0]
         named = zip(self.motions, values, strict=True)
-        return ", ".join(f"{name} = {self.design.get(name, 0.0) + value:.9g}" for name, value in named)
+        return ", ".join(
+            f"{name} = {self.design.get(name, 0.0) + value:.9g}" for name, value in named
+        )
 
     def ended(self, here: float, wanted: float, last: float | None, reason: str) -> str:
-        """Says that the motion cannot be followed to a wanted time, how far it can, and the last sample reached if there is one."""
-        reached = "no sample reached on this side" if last is None else f"last reachable sample at {self.where(last)}"
+        """Says that the motion cannot be followed to a wanted time, how far it can, and the last
+        sample reached if there is one.
+        """
+        reached = (
+            "no sample reached on this side"
+            if last is None
+            else f"last reachable sample at {self.where(last)}"
+        )
         return (
-            f"cannot be followed beyond {self.where(here)} (wanted {self.where(wanted)}): {reason}; {reached}; "
-            "shorten the sweep or drive another coordinate"
+            f"cannot be followed beyond {self.where(here)} (wanted {self.where(wanted)}): {reason};"
+            f" {reached}; shorten the sweep or drive another coordinate"
         )
 
     def drive(self, names: Sequence[str], t: Array) -> Array:
-        """Value, velocity and acceleration of the named drivers at times t, shape (3, names, *t.shape)."""
+        """Value, velocity and acceleration of the named drivers at times t, shape (3, names,
+        *t.shape).
+        """
         still = (np.zeros_like(t),) * 3
-        return np.stack([np.stack(self.motions[name].at(t) if name in self.motions else still) for name in names], axis=1)
+        return np.stack(
+            [
+                np.stack(self.motions[name].at(t) if name in self.motions else still)
+                for name in names
+            ],
+            axis=1,
+        )
 
     def values(self, t: Array) -> Array:
         """Return the moving drivers' values from the design at times t, shape (drivers, n)."""
@@ -218,9 +254,14 @@ class Path:
         return all(_within(motion.span, t) for motion in self.motions.values())
 
     def lead_in(self, to: float) -> Path:
-        """Return the straight way of all drivers from the design, at time zero, to where they are at a time, at time one."""
+        """Return the straight way of all drivers from the design, at time zero, to where they are
+        at a time, at time one.
+        """
         values = self.values(np.array([to]))[:, 0].tolist()
-        return Path({name: Ramp(value) for name, value in zip(self.motions, values, strict=True)}, np.ones(1))
+        return Path(
+            {name: Ramp(value) for name, value in zip(self.motions, values, strict=True)},
+            np.ones(1),
+        )
 
 
 def _within(span: tuple[float, float], t: float) -> bool:
@@ -230,7 +271,9 @@ def _within(span: tuple[float, float], t: float) -> bool:
 
 
 def outwards(times: Array, start: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The samples after the start, those at it among them, and those before it: indices, the nearest first, equal ones in order."""
+    """The samples after the start, those at it among them, and those before it: indices, the
+    nearest first, equal ones in order.
+    """
     nearest = np.argsort(np.abs(times - start), kind="stable")
     after = times[nearest] >= start
     return nearest[after], nearest[~after]

@@ -13,7 +13,9 @@ from .mechanism import GROUND, Mechanism
 
 @dataclass(frozen=True)
 class Branch:
-    """A body of the tree: reached from its parent through a joint, or free (joint None) to move relative to the ground."""
+    """A body of the tree: reached from its parent through a joint, or free (joint None) to move
+    relative to the ground.
+    """
 
     parent: str
     child: str
@@ -22,7 +24,8 @@ class Branch:
 
 @dataclass(frozen=True)
 class SpanningTree:
-    """Branches in an order where every parent comes before its children, and the joints left over, which close the loops.
+    """Branches in an order where every parent comes before its children, and the joints left over,
+    which close the loops.
 
     Fixed bodies appear only as parents, under the name "ground".
     """
@@ -32,21 +35,25 @@ class SpanningTree:
 
 
 def spanning_tree(mechanism: Mechanism) -> SpanningTree:
-    """The tree whose joints leave the fewest coordinates: driven and coupled joints first, then those with the most rows (Prim).
+    """The tree whose joints leave the fewest coordinates: driven and coupled joints first, then
+    those with the most rows (Prim).
 
-    A joint whose axis-bound freedom is driven or coupled stays in the tree, where the freedom is a coordinate. Joints of fewer than
-    three rows (a distance) tie a body too loosely to carry it; a body that hangs on such joints only is free.
+    A joint whose axis-bound freedom is driven or coupled stays in the tree, where the freedom is a
+    coordinate. Joints of fewer than three rows (a distance) tie a body too loosely to carry it; a
+    body that hangs on such joints only is free.
     """
     named = {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
     named |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     candidates = [joint for joint in mechanism.joints if joint.rows >= 3]
-    ranks = [(joint.name not in named, -joint.rows, k) for k, joint in enumerate(candidates)]  # the least is taken first
+    # the least is taken first
+    ranks = [(joint.name not in named, -joint.rows, k) for k, joint in enumerate(candidates)]
     touching: dict[str, list[int]] = {}
     for k, joint in enumerate(candidates):
         for body in joint.bodies:
             touching.setdefault(body, []).append(k)
     placed = {GROUND} | {body.name for body in mechanism.bodies if body.fixed}
-    # a heap of the joints with one end placed, and some with both; a search through all joints for every body is quadratic
+    # a heap of the joints with one end placed, and some with both; a search through all joints for
+    # every body is quadratic
     reaching = [ranks[k] for body in placed for k in touching.get(body, ())]
     heapify(reaching)
     waiting, count = iter(mechanism.moving), len(mechanism.moving)
@@ -63,10 +70,14 @@ def spanning_tree(mechanism: Mechanism) -> SpanningTree:
         for k in touching.get(child, ()):
             heappush(reaching, ranks[k])
         branches.append(Branch(GROUND if mechanism.is_fixed(parent) else parent, child, joint))
-    return SpanningTree(tuple(branches), tuple(joint for joint in mechanism.joints if joint.name not in used))
+    return SpanningTree(
+        tuple(branches), tuple(joint for joint in mechanism.joints if joint.name not in used)
+    )
 
 
-def _next(reaching: list[tuple[bool, int, int]], candidates: Sequence[Joint], placed: Collection[str]) -> Joint | None:
+def _next(
+    reaching: list[tuple[bool, int, int]], candidates: Sequence[Joint], placed: Collection[str]
+) -> Joint | None:
     """The first joint of the heap that leads from a placed body to another."""
     while reaching:
         joint = candidates[heappop(reaching)[-1]]

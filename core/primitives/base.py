@@ -2,12 +2,14 @@
 
 Conventions of every primitive (formulation section 1, in the native row style):
 
-- The state of a body is its displacement u from the design position and the rotation q since then. Body axes are parallel
-  to the global ones at design, so a body-fixed vector a is given by its global components at design; now it is A a.
-- Unknowns per body are (dr, dpi) with dpi the virtual rotation in global axes; velocities are (v, w), accelerations
-  (vdot, wdot), all global. The paper's body-axis rows are these times A.
+- The state of a body is its displacement u from the design position and the rotation q since then.
+  Body axes are parallel to the global ones at design, so a body-fixed vector a is given by its
+  global components at design; now it is A a.
+- Unknowns per body are (dr, dpi) with dpi the virtual rotation in global axes; velocities are (v,
+  w), accelerations (vdot, wdot), all global. The paper's body-axis rows are these times A.
 - Phi = 0;  rows . velocity = nu;  rows . acceleration = gamma.
-- The ground is a body that never moves: its u, D, v and w are literal zeros and vanish from every program.
+- The ground is a body that never moves: its u, D, v and w are literal zeros and vanish from every
+  program.
 """
 
 from __future__ import annotations
@@ -76,14 +78,19 @@ class Row(NamedTuple):
 
     def along(self, body: str, twist: Twist) -> Scalar:
         """The part of row . velocity that belongs to one body, "i" or "j"."""
-        return self.ri @ twist.v + self.pi @ twist.w if body == "i" else self.rj @ twist.v + self.pj @ twist.w
+        return (
+            self.ri @ twist.v + self.pi @ twist.w
+            if body == "i"
+            else self.rj @ twist.v + self.pj @ twist.w
+        )
 
 
 @dataclass(frozen=True)
 class Drive:
     """The motion of a driver, as it enters an equation: value c and its derivatives by time.
 
-    half_cos and half_sin are those of c/2, for a driven angle; programs call no transcendental function themselves.
+    half_cos and half_sin are those of c/2, for a driven angle; programs call no transcendental
+    function themselves.
     """
 
     c: Scalar = 0.0
@@ -95,14 +102,18 @@ class Drive:
 
 @dataclass(frozen=True)
 class Primitive(ABC):
-    """One geometric condition between bodies i and j. Fields are body-fixed vectors, given by their components at design."""
+    """One geometric condition between bodies i and j. Fields are body-fixed vectors, given by their
+    components at design.
+    """
 
     n: ClassVar[int]
     """Number of equations."""
     steady: ClassVar[bool] = False
     """Whether the rows keep their directions as body i turns."""
     body_axes: ClassVar[bool] = False
-    """Whether dpi, w and wdot of rows, gamma and twists are in body axes (the paper's) rather than global ones."""
+    """Whether dpi, w and wdot of rows, gamma and twists are in body axes (the paper's) rather than
+    global ones.
+    """
 
     @abstractmethod
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
@@ -117,9 +128,13 @@ class Primitive(ABC):
         """Right-hand sides of the acceleration equations: what rows . acceleration must be."""
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        """Right-hand sides of the velocity equations; zero unless driven, and linear in the drive's rate."""
+        """Right-hand sides of the velocity equations; zero unless driven, and linear in the drive's
+        rate.
+        """
         return (0.0,) * self.n
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        """Numbers that are positive on the intended branch of the zeros of phi; empty where no zero is spurious."""
+        """Numbers that are positive on the intended branch of the zeros of phi; empty where no zero
+        is spurious.
+        """
         return ()

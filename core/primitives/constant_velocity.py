@@ -5,9 +5,11 @@ With f_i, g_i across shaft i and f_j, g_j across shaft j, the twist between the 
     phi   = f_i . g_j - g_i . f_j          the difference of two dot10
     rows, gamma                            the same difference of theirs, exact everywhere
 
-phi is -4 e0 e3 of the relative Euler parameters: besides the zero twist e3 = 0 it is zero where e0 = 0, a relative turn of 180
+phi is -4 e0 e3 of the relative Euler parameters: besides the zero twist e3 = 0 it is zero where e0
+= 0, a relative turn of 180
 degrees. The branch test is  f_i . f_j + g_i . g_j = 2 (e0^2 - e3^2):  1 + cos(bend) with zero twist, positive up to where the
-shafts are folded and both zeros meet; not positive on the other. (The trace of the relative rotation is so up to 120 degrees only.)
+shafts are folded and both zeros meet; not positive on the other. (The trace of the relative
+rotation is so up to 120 degrees only.)
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ from .dot10 import Dot10
 
 @dataclass(frozen=True)
 class ConstantVelocity(Primitive):
-    """f_i, g_i on body i and f_j, g_j on body j: across the shafts, unit, zero twist at design [-]."""
+    """f_i, g_i on body i and f_j, g_j on body j: across the shafts, unit, zero twist at design
+    [-].
+    """
 
     n = 1
     f_i: Vec3

@@ -1,7 +1,9 @@
-"""The conventional row style: products of full matrices as textbooks and DADS have them (Haug), in body axes.
+"""The conventional row style: products of full matrices as textbooks and DADS have them (Haug), in
+body axes.
 
-Every orientation condition is made of dot10 and every line condition of dot20; nothing is simplified by the geometry. Formulation
-section 2, the forms quoted there after Haug. With A_ji = A_j^T A_i:
+Every orientation condition is made of dot10 and every line condition of dot20; nothing is
+simplified by the geometry. Formulation section 2, the forms quoted there after Haug. With A_ji =
+A_j^T A_i:
 
     dot10   rows = [ 0 | -b^T A_ji skew(a) | 0 | -a^T A_ij skew(b) ]
             gamma = -b^T [ A_ji W_i W_i + W_j W_j A_ji ] a + 2 w_j^T skew(b) A_ji skew(a) w_i,      W = skew(w)
@@ -92,8 +94,12 @@ class ConventionalDot20(Dot20):
         a, A_ji = self.a, relative(i, j).T
         bent = vi.centripetal(a)
         # s^T W = -(w x s)
-        sliding = cross(vi.w, a) @ (i.A.T @ (vi.v - vj.v)) - cross(vj.w, self.s_j) @ (A_ji @ cross(vi.w, a))
-        turning = self.s_i @ bent + self.s_j @ vj.centripetal(A_ji @ a) + (i.A.T @ self._d(i, j)) @ bent
+        sliding = cross(vi.w, a) @ (i.A.T @ (vi.v - vj.v)) - cross(vj.w, self.s_j) @ (
+            A_ji @ cross(vi.w, a)
+        )
+        turning = (
+            self.s_i @ bent + self.s_j @ vj.centripetal(A_ji @ a) + (i.A.T @ self._d(i, j)) @ bent
+        )
         return (self.drive.c_tt + 2.0 * sliding - turning,)
 
 
@@ -146,6 +152,8 @@ TWINS: Mapping[type[Primitive], Callable[[Any], tuple[Primitive, ...]]] = {
     Dot20: _dot20,
     Dot21: _dot21,
     LockedDisplacement: _locked,
-    ConstantVelocity: lambda native: (ConventionalConstantVelocity(native.f_i, native.g_i, native.f_j, native.g_j),),
+    ConstantVelocity: lambda native: (
+        ConventionalConstantVelocity(native.f_i, native.g_i, native.f_j, native.g_j),
+    ),
 }
 """Native primitive -> the primitives of this style that replace it."""

@@ -6,9 +6,10 @@ With d from P_i to P_j, dd its change since design, S = A s:
     rows  = [ -d | d x S_i | d | S_j x d ] / L
     gamma = -( ddot . ddot + d . (w_j x (w_j x S_j) - w_i x (w_i x S_i)) ) / L
 
-This is the square form d . d - L^2 divided by 2 L: rows of unit scale and a residual in metres, as |d| - L has them, without a
-square root, and the difference of squares is never formed. The bare square form was rejected because its rows have the size
-of d; |d| - L because it is not smooth where the points meet.
+This is the square form d . d - L^2 divided by 2 L: rows of unit scale and a residual in metres, as
+|d| - L has them, without a square root, and the difference of squares is never formed. The bare
+square form was rejected because its rows have the size of d; |d| - L because it is not smooth where
+the points meet.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from .base import Pose, Primitive, Row, Twist
 
 @dataclass(frozen=True)
 class Distance(Primitive):
-    """Arms s_i, s_j [m]; d0 from P_i to P_j at design [m]; the length L and the design length L0 [m], both positive."""
+    """Arms s_i, s_j [m]; d0 from P_i to P_j at design [m]; the length L and the design length L0
+    [m], both positive.
+    """
 
     n = 1
     s_i: Vec3
@@ -45,4 +48,9 @@ class Distance(Primitive):
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         d, S_i, S_j = self.d0 + self.change(i, j), i.turn(self.s_i), j.turn(self.s_j)
         d_dot = vj.of(S_j) - vi.of(S_i)
-        return (-((d_dot @ d_dot + d @ (vj.centripetal(S_j) - vi.centripetal(S_i))) * (1.0 / self.length)),)
+        return (
+            -(
+                (d_dot @ d_dot + d @ (vj.centripetal(S_j) - vi.centripetal(S_i)))
+                * (1.0 / self.length)
+            ),
+        )

@@ -6,8 +6,8 @@ In global axes, with a = A_i a0, b = A_j b0 and n = a x b:
     (11)  rows  = [ 0 | n | 0 | -n ]        exact everywhere; one vector product serves both bodies
     (12)  gamma = ndot . (w_j - w_i),       ndot = (w_i x a) x b + a x (w_j x b)
 
-The printed (9)-(12) and Table 1 carry wrong indices and lost factors (formulation section 9); (12) here is the derivative of
-(11), which needs no matrix product.
+The printed (9)-(12) and Table 1 carry wrong indices and lost factors (formulation section 9); (12)
+here is the derivative of (11), which needs no matrix product.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from .base import Pose, Primitive, Row, Twist
 
 @dataclass(frozen=True)
 class Dot10(Primitive):
-    """a on body i, b on body j, unit vectors [-]; the cosine of their angle keeps its design value."""
+    """a on body i, b on body j, unit vectors [-]; the cosine of their angle keeps its design
+    value.
+    """
 
     n = 1
     a: Vec3

@@ -6,11 +6,11 @@ f, g, h are right-handed and unit; at design the frames of both bodies coincide.
     (14)  rows  = [ 0 | f_i | 0 | -f_i ], [ 0 | -g_i | 0 | g_i ]
     (16)  gamma = [ -s (g_i . w_i),  -s (f_i . w_i) ],      s = h . (w_j - w_i)
 
-(14) puts h_i for h_j in g_i x h_j = f_i and f_i x h_j = -g_i: exact where phi = 0 on the branch h_j = +h_i, and of the order of
-the misalignment off it, so Newton stays quadratic and reaches +h_i from any misalignment below 180 degrees; with the exact rows
-it fails beyond 67 degrees (90 with the update used here). h_j = -h_i also solves (13); there the rows have the wrong sign, the
-branch test names it.
-The printed (16) has three wrong signs (formulation section 9).
+(14) puts h_i for h_j in g_i x h_j = f_i and f_i x h_j = -g_i: exact where phi = 0 on the branch h_j
+= +h_i, and of the order of the misalignment off it, so Newton stays quadratic and reaches +h_i from
+any misalignment below 180 degrees; with the exact rows it fails beyond 67 degrees (90 with the
+update used here). h_j = -h_i also solves (13); there the rows have the wrong sign, the branch test
+names it. The printed (16) has three wrong signs (formulation section 9).
 """
 
 from __future__ import annotations

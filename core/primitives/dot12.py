@@ -6,11 +6,12 @@ With e the vector part of the Euler parameters of the rotation from body j to bo
     rows  = [ 0 | I | 0 | -I ]       literally constant; exact where phi = 0
     gamma = 0
 
-The paper's residual (17), B_i [g_i . h_j, h_i . f_j, f_i . g_j], agrees with this to first order and has the same rows, but it
-is also zero at seven other rotations (turns of 180 and of 120 degrees), all of them regular for exact rows. The Euler
-parameters vanish at coincidence only and are singular at an error of 180 degrees alone (formulation sections 3 and 4, RotX with
-theta = 0), so no branch test is needed. q_j = -q_i is the same rotation; it repels, and Euler parameters followed from design on do
-not come there.
+The paper's residual (17), B_i [g_i . h_j, h_i . f_j, f_i . g_j], agrees with this to first order
+and has the same rows, but it is also zero at seven other rotations (turns of 180 and of 120
+degrees), all of them regular for exact rows. The Euler parameters vanish at coincidence only and
+are singular at an error of 180 degrees alone (formulation sections 3 and 4, RotX with theta = 0),
+so no branch test is needed. q_j = -q_i is the same rotation; it repels, and Euler parameters
+followed from design on do not come there.
 """
 
 from __future__ import annotations

@@ -4,10 +4,12 @@ In global axes, with a = A_i a0, S = A s, and d from P_i to P_j:
 
     (22)  phi   = a . d - c - a0 . d0           expanded about design; c is the displacement when driven
           rows  = [ -a | a x (d + S_i) | a | S_j x a ]          exact everywhere
-          gamma = c_tt - ( (w_i x (w_i x a)) . d + 2 (w_i x a) . ddot + a . (w_j x (w_j x S_j) - w_i x (w_i x S_i)) )
+          gamma = c_tt - ( (w_i x (w_i x a)) . d + 2 (w_i x a) . ddot + a . (w_j x (w_j x S_j) - w_i
+          x (w_i x S_i)) )
 
-The printed gamma20 is garbled beyond reading (formulation section 9); this one is the second derivative of (22). r_j - r_i is
-formed from displacements before anything else, which keeps the residual exact at any distance from the global origin.
+The printed gamma20 is garbled beyond reading (formulation section 9); this one is the second
+derivative of (22). r_j - r_i is formed from displacements before anything else, which keeps the
+residual exact at any distance from the global origin.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ from .base import Drive, Pose, Primitive, Row, Twist
 
 @dataclass(frozen=True)
 class Dot20(Primitive):
-    """a on body i [-]; arms s_i, s_j to P_i and P_j [m]; d0 from P_i to P_j at design [m]; drive: displacement along a [m]."""
+    """a on body i [-]; arms s_i, s_j to P_i and P_j [m]; d0 from P_i to P_j at design [m]; drive:
+    displacement along a [m].
+    """
 
     n = 1
     a: Vec3
@@ -42,7 +46,12 @@ class Dot20(Primitive):
         return (Row(-a, cross(a, d + i.turn(self.s_i)), a, cross(j.turn(self.s_j), a)),)
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        a, d, S_i, S_j = i.turn(self.a), self.d0 + self.change(i, j), i.turn(self.s_i), j.turn(self.s_j)
+        a, d, S_i, S_j = (
+            i.turn(self.a),
+            self.d0 + self.change(i, j),
+            i.turn(self.s_i),
+            j.turn(self.s_j),
+        )
         a_dot, d_dot = cross(vi.w, a), vj.of(S_j) - vi.of(S_i)
         turning = cross(vi.w, a_dot) @ d + 2.0 * (a_dot @ d_dot)
         return (self.drive.c_tt - (turning + a @ (vj.centripetal(S_j) - vi.centripetal(S_i))),)

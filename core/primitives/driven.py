@@ -5,14 +5,16 @@ Point coordinate along the global unit vector k, with S = A_j s (body i is the g
     phi   = k . (u_j + (A_j - I) s) - c       rows = [ 0 | 0 | k | S x k ]       nu = c_t
     gamma = c_tt - k . (w_j x (w_j x S))
 
-Joint angle about h, on a joint whose axes are parallel, with the Euler parameters rho = conj(q_i) q_j of the relative rotation:
+Joint angle about h, on a joint whose axes are parallel, with the Euler parameters rho = conj(q_i)
+q_j of the relative rotation:
 
     phi   = 2 ( cos(c/2) h . vec(rho) - sin(c/2) rho_0 )  =  2 sin((theta - c)/2)
     rows  = [ 0 | -h | 0 | h ]       nu = c_t       gamma = c_tt            exact where the axes are parallel and phi = 0
 
-sin(theta - c) has a second zero at c + pi, atan2 needs unwrapping and cos(theta) - cos(c) is singular at 0 and pi; the half angle
-has none of these, because Euler parameters that are followed continuously know the turn (any number of turns, no counter). It has
-one at c + 2 pi, from which the rows lead away; where a driver at rest makes a whole turn between two samples Newton starts exactly
+sin(theta - c) has a second zero at c + pi, atan2 needs unwrapping and cos(theta) - cos(c) is
+singular at 0 and pi; the half angle has none of these, because Euler parameters that are followed
+continuously know the turn (any number of turns, no counter). It has one at c + 2 pi, from which the
+rows lead away; where a driver at rest makes a whole turn between two samples Newton starts exactly
 there, and the turn would be lost. The branch test is  cos((theta - c)/2) = cos(c/2) rho_0 + sin(c/2) h . vec(rho).
 """
 
@@ -26,7 +28,9 @@ from .base import Drive, Pose, Primitive, Row, Twist
 
 @dataclass(frozen=True)
 class DrivenCoordinate(Primitive):
-    """k: global unit direction [-]; s: arm to the point on body j [m]; drive: its displacement along k [m]."""
+    """k: global unit direction [-]; s: arm to the point on body j [m]; drive: its displacement
+    along k [m].
+    """
 
     n = 1
     k: Vec3
@@ -48,7 +52,9 @@ class DrivenCoordinate(Primitive):
 
 @dataclass(frozen=True)
 class DrivenAngle(Primitive):
-    """h: common axis of both bodies [-]; drive: angle of body j relative to body i about h [rad]."""
+    """h: common axis of both bodies [-]; drive: angle of body j relative to body i about h
+    [rad].
+    """
 
     n = 1
     h: Vec3

@@ -2,8 +2,8 @@
 
     phi   = [ u_j ; 2 vec(q_j) ]       rows = [ . | . | I_6 ]       gamma = 0
 
-Fixed bodies are normally eliminated and need no rows; these count them as the paper's Table 5 does, and check that the
-elimination changes nothing.
+Fixed bodies are normally eliminated and need no rows; these count them as the paper's Table 5 does,
+and check that the elimination changes nothing.
 """
 
 from __future__ import annotations

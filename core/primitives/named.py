@@ -1,7 +1,8 @@
 """Conditions that name a joint's own motion: RotX and TraX of the mixed formulation.  Formulation section 4.
 
-The rotation theta about h and the displacement d along h enter as a drive, prescribed or an unknown of its own. In global axes,
-with Q the rotation of theta about h as Euler parameters [cos theta/2, h sin theta/2]:
+The rotation theta about h and the displacement d along h enter as a drive, prescribed or an unknown
+of its own. In global axes, with Q the rotation of theta about h as Euler parameters [cos theta/2, h
+sin theta/2]:
 
     RotX   phi   = 2 vec( q_i Q(theta) conj(q_j) )
            rows  = [ 0 | I | 0 | -I ]          nu = -h_i theta_t        gamma = -theta_t (w_i x h_i) - h_i theta_tt
@@ -9,10 +10,12 @@ with Q the rotation of theta about h as Euler parameters [cos theta/2, h sin the
            rows  = [ -I | skew(S_i + d h_i) | I | -skew(S_j) ]          nu = h_i d_t
            gamma = w_i x (w_i x (S_i + d h_i)) - w_j x (w_j x S_j) + 2 d_t (w_i x h_i) + h_i d_tt
 
-In section 4 TraX carries body j's arm by body i and theta, so that body j's rotation has no column; here body j carries it, as in
-the spherical rows, which are the same where RotX holds and need no theta.
+In section 4 TraX carries body j's arm by body i and theta, so that body j's rotation has no column;
+here body j carries it, as in the spherical rows, which are the same where RotX holds and need no
+theta.
 
-RotX has no spurious zero and no counter of turns; its rows are exact where phi = 0, and lead from any misalignment to it.
+RotX has no spurious zero and no counter of turns; its rows are exact where phi = 0, and lead from
+any misalignment to it.
 """
 
 from __future__ import annotations
@@ -56,12 +59,19 @@ class NamedSlide(Spherical):
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         slid = self.drive.c * i.turn(self.h)
-        return tuple(row._replace(pi=row.pi - cross(slid, e)) for row, e in zip(super().rows(i, j), (X, Y, Z), strict=True))
+        return tuple(
+            row._replace(pi=row.pi - cross(slid, e))
+            for row, e in zip(super().rows(i, j), (X, Y, Z), strict=True)
+        )
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return tuple(self.drive.c_t * i.turn(self.h))
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         h = i.turn(self.h)
-        slid = vi.centripetal(self.drive.c * h) + 2.0 * (self.drive.c_t * cross(vi.w, h)) + self.drive.c_tt * h
+        slid = (
+            vi.centripetal(self.drive.c * h)
+            + 2.0 * (self.drive.c_t * cross(vi.w, h))
+            + self.drive.c_tt * h
+        )
         return tuple(a + b for a, b in zip(super().gamma(i, j, vi, vj), slid, strict=True))

@@ -1,8 +1,9 @@
 """The row style of the paper: Tables 1 and 2 as corrected (formulation section 9), in body axes.
 
-Unknowns are (dr, dpi'), velocities (rdot, w'), accelerations (rddot, w'dot). Body axes are parallel to the global ones at design,
-so a body-fixed vector has the same components in every style. A_ij = A_i^T A_j, frame j -> frame i; Om = A_ij w_j - w_i. Kept to
-measure the paper's claims; the native style is these rows times A.
+Unknowns are (dr, dpi'), velocities (rdot, w'), accelerations (rddot, w'dot). Body axes are parallel
+to the global ones at design, so a body-fixed vector has the same components in every style. A_ij =
+A_i^T A_j, frame j -> frame i; Om = A_ij w_j - w_i. Kept to measure the paper's claims; the native
+style is these rows times A.
 """
 
 from __future__ import annotations
@@ -72,7 +73,9 @@ class PaperDot10(Dot10):
 
 @dataclass(frozen=True)
 class PaperDot11(Dot11):
-    """Eqs (13)-(16): rows [ 0 | f | 0 | -A_ij^T f ] and [ 0 | -g | 0 | A_ij^T g ], constant for body i."""
+    """Eqs (13)-(16): rows [ 0 | f | 0 | -A_ij^T f ] and [ 0 | -g | 0 | A_ij^T g ], constant for
+    body i.
+    """
 
     body_axes = True
 
@@ -91,19 +94,24 @@ class PaperDot11(Dot11):
 
 @dataclass(frozen=True)
 class PaperDot12(Dot12):
-    """Eqs (17)-(21): rows [ 0 | I | 0 | -A_ij ]. The residual has seven spurious rotations; the branch test is trace A_ij = 3."""
+    """Eqs (17)-(21): rows [ 0 | I | 0 | -A_ij ]. The residual has seven spurious rotations; the
+    branch test is trace A_ij = 3.
+    """
 
     steady = False
     body_axes = True
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         A_ij = relative(i, j)
-        # with the joint frame along the body axes, f, g, h = x, y, z: g_i . h_j, h_i . f_j, f_i . g_j
+        # with the joint frame along the body axes, f, g, h = x, y, z: g_i . h_j, h_i . f_j, f_i .
+        # g_j
         return A_ij.y.z, A_ij.z.x, A_ij.x.y
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         A_ij = relative(i, j)
-        return tuple(Row(ZERO, e, ZERO, -a) for e, a in zip((X, Y, Z), (A_ij.x, A_ij.y, A_ij.z), strict=True))
+        return tuple(
+            Row(ZERO, e, ZERO, -a) for e, a in zip((X, Y, Z), (A_ij.x, A_ij.y, A_ij.z), strict=True)
+        )
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         A_ij = relative(i, j)
@@ -112,7 +120,9 @@ class PaperDot12(Dot12):
 
 @dataclass(frozen=True)
 class PaperDot20(Dot20):
-    """Eq. (22) with y = A_i^T (r_j - r_i + A_j s_j): rows [ -(A_i a) | a x y | A_i a | s_j x A_ij^T a ]."""
+    """Eq. (22) with y = A_i^T (r_j - r_i + A_j s_j): rows [ -(A_i a) | a x y | A_i a | s_j x A_ij^T
+    a ].
+    """
 
     body_axes = True
 
@@ -125,18 +135,26 @@ class PaperDot20(Dot20):
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         a_G = i.A @ self.a
-        return (Row(-a_G, cross(self.a, self._y(i, j)), a_G, cross(self.s_j, relative(i, j).T @ self.a)),)
+        return (
+            Row(
+                -a_G, cross(self.a, self._y(i, j)), a_G, cross(self.s_j, relative(i, j).T @ self.a)
+            ),
+        )
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         A_ij, y = relative(i, j), self._y(i, j)
         y_t = i.A.T @ (vj.v - vi.v) + A_ij @ cross(vj.w, self.s_j)
-        turning = 2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y)) - A_ij @ vj.centripetal(self.s_j)
+        turning = (
+            2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y)) - A_ij @ vj.centripetal(self.s_j)
+        )
         return (self.drive.c_tt + self.a @ turning,)
 
 
 @dataclass(frozen=True)
 class PaperDot21(Dot21):
-    """Eq. (23), const-C, with y0 = A_i^T (r_j - r_i): rows [ -(A_i a) | a x y0 | A_i a | 0 ] for a = f, g."""
+    """Eq. (23), const-C, with y0 = A_i^T (r_j - r_i): rows [ -(A_i a) | a x y0 | A_i a | 0 ] for a
+    = f, g.
+    """
 
     body_axes = True
 
@@ -198,7 +216,9 @@ class PaperDrivenCoordinate(DrivenCoordinate):
 
 @dataclass(frozen=True)
 class PaperDrivenAngle(DrivenAngle):
-    """Rows [ 0 | -h | 0 | h ], constant: h is the same in both body frames where the axes are parallel."""
+    """Rows [ 0 | -h | 0 | h ], constant: h is the same in both body frames where the axes are
+    parallel.
+    """
 
     body_axes = True
 
@@ -243,7 +263,11 @@ def _of_same_fields(paper: type[Primitive]) -> Callable[[Primitive], tuple[Primi
     """The same fields in another class."""
 
     def twin(native: Primitive) -> tuple[Primitive, ...]:
-        return (paper(**{name: getattr(native, name) for name in (each.name for each in fields(native))}),)
+        return (
+            paper(
+                **{name: getattr(native, name) for name in (each.name for each in fields(native))}
+            ),
+        )
 
     return twin
 

@@ -1,6 +1,7 @@
 """Spherical: the points P_i and P_j coincide (3 rows).  Paper sec. 2.2.7, eq. (24).
 
-With d = d0 + u_j + A_j s_j - u_i - A_i s_i from P_i to P_j, written as the change since design so that nothing large cancels:
+With d = d0 + u_j + A_j s_j - u_i - A_i s_i from P_i to P_j, written as the change since design so
+that nothing large cancels:
 
     (24)  phi   = d0 + (u_j + (A_j - I) s_j) - (u_i + (A_i - I) s_i)
           rows  = [ -I | skew(A_i s_i) | I | -skew(A_j s_j) ]        exact everywhere

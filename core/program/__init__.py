@@ -4,7 +4,20 @@ from .elimination import Elimination
 from .numpy_executor import NumpyExecutor
 from .plan import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
 from .straight_line import Prepared, Program, program
-from .tape import NODES, Tape, Traced, absolute, before, cos, groups_behind, maximum, minimum, place_of, sin, where_larger
+from .tape import (
+    NODES,
+    Tape,
+    Traced,
+    absolute,
+    before,
+    cos,
+    groups_behind,
+    maximum,
+    minimum,
+    place_of,
+    sin,
+    where_larger,
+)
 
 __all__ = [
     "DONE",

@@ -1,7 +1,9 @@
-"""Run programs in ball arithmetic: every number is a midpoint and a radius, and what comes out contains the true result.
+"""Run programs in ball arithmetic: every number is a midpoint and a radius, and what comes out
+contains the true result.
 
-Balls are python-flint's `arb`; `arb_series` (polynomials in time with balls as coefficients) run the same way, which gives the
-derivatives by time of whatever a program computes. One lane, no layout: balls do not fit into slots of doubles.
+Balls are python-flint's `arb`; `arb_series` (polynomials in time with balls as coefficients) run
+the same way, which gives the derivatives by time of whatever a program computes. One lane, no
+layout: balls do not fit into slots of doubles.
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ def flint() -> Any:
     try:
         return importlib.import_module("flint")
     except ImportError as error:
-        raise KincheckError("proofs need python-flint, which is not installed; pip install python-flint") from error
+        raise KincheckError(
+            "proofs need python-flint, which is not installed; pip install python-flint"
+        ) from error
 
 
 @contextmanager
@@ -74,16 +78,30 @@ def _where(m: bool, p: Ball, q: Ball) -> Ball:
     return p if m else q
 
 
-_ARITHMETIC: dict[str, Any] = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": _over, "neg": operator.neg}
+_ARITHMETIC: dict[str, Any] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": _over,
+    "neg": operator.neg,
+}
 _OWN: dict[str, Any] = {name: operator.methodcaller(name) for name in ("sqrt", "sin", "cos")}
-_CHOICES: dict[str, Any] = {"abs": abs, "min": _minimum, "max": _maximum, "larger": _larger, "where": _where}
+_CHOICES: dict[str, Any] = {
+    "abs": abs,
+    "min": _minimum,
+    "max": _maximum,
+    "larger": _larger,
+    "where": _where,
+}
 _OPERATIONS: Mapping[str, Callable[..., Any]] = {**_ARITHMETIC, **_OWN, **_CHOICES}
 
 
 def evaluate(program: Program, inputs: Sequence[Ball]) -> dict[int, Ball]:
-    """The outputs of a program by slot, from its inputs by slot, at the precision of the block around it.
+    """The outputs of a program by slot, from its inputs by slot, at the precision of the block
+    around it.
 
-    A division by a ball that contains zero gives a ball that is not finite, as in the other executors.
+    A division by a ball that contains zero gives a ball that is not finite, as in the other
+    executors.
 
     Raises:
         UndecidedError: a comparison ("larger") of balls that overlap.

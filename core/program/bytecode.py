@@ -1,7 +1,9 @@
-"""Programs as tables of whole numbers, which `llvm.interpreter` goes through: nothing has to be compiled before they can be run.
+"""Programs as tables of whole numbers, which `llvm.interpreter` goes through: nothing has to be
+compiled before they can be run.
 
-A table is a list of stretches: the kind of an operation, how many bytes its rows take, and the rows: where the result goes and
-where the operands stand, in bytes from the lanes. Stretches are long: of what can be done next, all of one kind comes first.
+A table is a list of stretches: the kind of an operation, how many bytes its rows take, and the
+rows: where the result goes and where the operands stand, in bytes from the lanes. Stretches are
+long: of what can be done next, all of one kind comes first.
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ ARITY = {
     **dict.fromkeys(("+", "-", "*", "/", "min", "max", "umax", "larger", "before", "const"), 2),
     **dict.fromkeys(("fma", "fnma", "fms", "where"), 3),
 }
-"""How many numbers a row of an operation holds beside its result. Those of "const" are the two halves of a number."""
+"""How many numbers a row of an operation holds beside its result. Those of "const" are the two
+halves of a number.
+"""
 KINDS = {op: kind for kind, op in enumerate(ARITY, 1)}
 """The number of each; 0 ends a table."""
 
@@ -43,7 +47,8 @@ class Bytecode:
 def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     """A program as a table, for lanes of so many slots and of that width.
 
-    Every value has a place: the slot it goes to, where nobody reads that, or a cell, which is free again after its last reader.
+    Every value has a place: the slot it goes to, where nobody reads that, or a cell, which is free
+    again after its last reader.
     """
     program = lowered(unrolled(program))
     nodes, vector = [*program.nodes], 8 * width
@@ -55,7 +60,8 @@ def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     read = {int(node[1]) * vector for node in nodes if node[0] in ("input", "node")}
     goes = {k: at for at, k in outputs.items() if at not in read}
     operated = [operands(node) for node in nodes]
-    uses = counts(len(nodes), *operated, outputs.values())  # the places of what is put out are never free
+    # the places of what is put out are never free
+    uses = counts(len(nodes), *operated, outputs.values())
     place = [int(node[1]) * vector if node[0] == "input" else 0 for node in nodes]
     words, free, cells = list[int](), list[int](), slots
     for op, stretch in _stretches(nodes, operated):
@@ -95,7 +101,9 @@ def _bytes(op: str, stretch: Sequence[object]) -> int:
     return 4 * (1 + ARITY[op]) * len(stretch)
 
 
-def _stretches(nodes: Sequence[Node], operated: Sequence[Sequence[int]]) -> Iterator[tuple[str, Sequence[int]]]:
+def _stretches(
+    nodes: Sequence[Node], operated: Sequence[Sequence[int]]
+) -> Iterator[tuple[str, Sequence[int]]]:
     """The operations, in an order in which those of one kind stand together where they can."""
     readers: list[list[int]] = [[] for _ in nodes]
     missing = [0] * len(nodes)

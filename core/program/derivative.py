@@ -1,7 +1,8 @@
 """Derivatives of traced scalars, traced themselves: the chain rule over the operations of a tape.
 
-Zeros and ones fold as everywhere, so the program of a Jacobian holds what its entries need and nothing else. Constants of the tape
-stay operands: folded, they would be rounded to doubles, and balls are to prove something of the result.
+Zeros and ones fold as everywhere, so the program of a Jacobian holds what its entries need and
+nothing else. Constants of the tape stay operands: folded, they would be rounded to doubles, and
+balls are to prove something of the result.
 """
 
 from __future__ import annotations
@@ -36,22 +37,31 @@ def _weights(op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ..
         case "cos":
             return (-sin(a),)
         case _:
-            raise TypeError(f"operation {op!r} has a kink and no derivative; leave it out of equations to be differentiated")
+            raise TypeError(
+                f"operation {op!r} has a kink and no derivative; leave it out of equations to be"
+                " differentiated"
+            )
 
 
 def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> list[Gradient]:
     """The derivative of each value by each input; zeros are left out.
 
     Raises:
-        TypeError: a value depends on an input through an operation with a kink ("abs", "min", "max", "larger", "where").
+        TypeError: a value depends on an input through an operation with a kink ("abs", "min",
+            "max", "larger", "where").
     """
     gradients: dict[int, Gradient] = {each.number: {k: 1.0} for k, each in enumerate(inputs)}
-    for number, node in enumerate(tuple(tape.nodes)):  # the tape grows as the derivatives are traced
+    # the tape grows as the derivatives are traced
+    for number, node in enumerate(tuple(tape.nodes)):
         read = operands(node)
         if any(gradients.get(k) for k in read):
             weights = _weights(node[0], Traced(tape, number), *(Traced(tape, k) for k in read))
-            gradients[number] = _sum(zip(weights, (gradients.get(k, {}) for k in read), strict=True))
-    return [gradients.get(value.number, {}) if isinstance(value, Traced) else {} for value in values]
+            gradients[number] = _sum(
+                zip(weights, (gradients.get(k, {}) for k in read), strict=True)
+            )
+    return [
+        gradients.get(value.number, {}) if isinstance(value, Traced) else {} for value in values
+    ]
 
 
 def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:

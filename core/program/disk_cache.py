@@ -1,4 +1,6 @@
-"""What is kept on disk between processes: machine code, tables and traced programs, by all that determines them."""
+"""What is kept on disk between processes: machine code, tables and traced programs, by all that
+determines them.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,15 @@ from pathlib import Path
 DIGEST = 32
 """Bytes of the checksum at the head of what is kept."""
 MOST = 2**28
-"""Bytes that are kept, a quarter of a gigabyte: some thousands of mechanisms, of whose programs most take some 50 kilobytes."""
+"""Bytes that are kept, a quarter of a gigabyte: some thousands of mechanisms, of whose programs
+most take some 50 kilobytes.
+"""
 
 
 def folder() -> Path | None:
-    """Where it is, below XDG_CACHE_HOME where that is set; None for a user without a home, for whom nothing is kept."""
+    """Where it is, below XDG_CACHE_HOME where that is set; None for a user without a home, for whom
+    nothing is kept.
+    """
     given = os.environ.get("XDG_CACHE_HOME")
     try:
         return (Path(given) if given else Path.home() / ".cache") / "kincheck"
@@ -76,8 +82,12 @@ def _write(entry: Path, made: bytes) -> None:
 
 @cache
 def _shrink(here: Path) -> None:
-    """Leave no more than `MOST`: what was not used for longest goes. Once in a process, for it looks at every file."""
-    entries = sorted(_entries(here), key=lambda each: max(each[1].st_atime, each[1].st_mtime), reverse=True)
+    """Leave no more than `MOST`: what was not used for longest goes. Once in a process, for it
+    looks at every file.
+    """
+    entries = sorted(
+        _entries(here), key=lambda each: max(each[1].st_atime, each[1].st_mtime), reverse=True
+    )
     sizes = accumulate(status.st_size for _, status in entries)
     for (path, _), size in zip(entries, sizes, strict=True):
         if size > MOST:

@@ -1,10 +1,13 @@
-"""Gaussian elimination written into a program: the zeros and ones of the rows are used up before anything is computed.
+"""Gaussian elimination written into a program: the zeros and ones of the rows are used up before
+anything is computed.
 
-Rows and columns fall into blocks that can be solved one after the other (block-triangular form: a chain of loops costs its number
-of loops), and no pivot ties two of them. First the pivots that cost nothing in safety: literal constants of size one half and more
-(the +-I blocks of the simplified rows) and entries that are alone in their row or column (there is no other choice). What is left
-of each block is a small dense core, eliminated with partial pivoting by compare-and-select, so that every lane pivots for itself
-without a branch. A fixed pivot order without this met an exact zero pivot within one crank turn of a four-bar.
+Rows and columns fall into blocks that can be solved one after the other (block-triangular form: a
+chain of loops costs its number of loops), and no pivot ties two of them. First the pivots that cost
+nothing in safety: literal constants of size one half and more (the +-I blocks of the simplified
+rows) and entries that are alone in their row or column (there is no other choice). What is left of
+each block is a small dense core, eliminated with partial pivoting by compare-and-select, so that
+every lane pivots for itself without a branch. A fixed pivot order without this met an exact zero
+pivot within one crank turn of a four-bar.
 """
 
 from __future__ import annotations
@@ -22,7 +25,8 @@ from .tape import Traced, absolute, maximum, minimum, where_larger
 SAFE_LITERAL = 0.5
 # Larger cores are not judged by their comparison matrix.
 COMPARED = 16
-# Signs of more blocks than this are put together: as digits of a number in double precision they are exact.
+# Signs of more blocks than this are put together: as digits of a number in double precision they
+# are exact.
 DIGITS = 50
 
 
@@ -37,7 +41,9 @@ class _Pivot:
 
 @dataclass(frozen=True)
 class _CoreStep:
-    """One column of a core: exchanges (row against the pivot row, the two sizes compared) and then the multipliers."""
+    """One column of a core: exchanges (row against the pivot row, the two sizes compared) and then
+    the multipliers.
+    """
 
     exchanges: tuple[tuple[int, Scalar, Scalar], ...]
     multipliers: tuple[tuple[int, Scalar], ...]
@@ -48,7 +54,8 @@ def _sign(x: Scalar) -> Scalar:
 
 
 class Elimination:
-    """The factored matrix. `pivots` are the traced ones: where one is small the matrix is nearly singular.
+    """The factored matrix. `pivots` are the traced ones: where one is small the matrix is nearly
+    singular.
 
     Args:
         rows: the square matrix, each row a mapping column -> entry without zeros.
@@ -76,12 +83,14 @@ class Elimination:
     def sigmas(self) -> Sequence[Scalar]:
         """The same estimate of each block that is not constant, or one where all are; at most one.
 
-        It is the least stretch of the cores' upper triangles, and no more than any pivot. The smallest pivot alone may stay where
-        it is while the matrix becomes singular: two rows of small pivots, tied by a large entry. Lower triangles hold no more than
-        ones, and add little.
+        It is the least stretch of the cores' upper triangles, and no more than any pivot. The
+        smallest pivot alone may stay where it is while the matrix becomes singular: two rows of
+        small pivots, tied by a large entry. Lower triangles hold no more than ones, and add little.
         """
         found = dict[int, Scalar]()
-        sizes = [(row, absolute(x)) for row, x in self._alone] + [(core.rows[0], core.least_stretch) for core in self._cores]
+        sizes = [(row, absolute(x)) for row, x in self._alone] + [
+            (core.rows[0], core.least_stretch) for core in self._cores
+        ]
         for row, size in sizes:
             block = self._block_of_row[row]
             found[block] = minimum(found.get(block, 1.0), size)
@@ -89,9 +98,11 @@ class Elimination:
 
     @property
     def orientation(self) -> Scalar:
-        """The signs of the blocks' determinants as digits of one number; each is right in all lanes, or in none.
+        """The signs of the blocks' determinants as digits of one number; each is right in all
+        lanes, or in none.
 
-        The sign of the whole determinant would not do: two loops alike, each singular at the same pose, change it twice.
+        The sign of the whole determinant would not do: two loops alike, each singular at the same
+        pose, change it twice.
         """
         signs = list(self._signs())
         digits = [reduce(mul, signs[k::DIGITS]) for k in range(min(DIGITS, len(signs)))]
@@ -101,7 +112,9 @@ class Elimination:
         for _, x in self._alone:
             yield _sign(x)
         for core in self._cores:
-            exchanged = (where_larger(x, y, -1.0, 1.0) for step in core.steps for _, x, y in step.exchanges)
+            exchanged = (
+                where_larger(x, y, -1.0, 1.0) for step in core.steps for _, x, y in step.exchanges
+            )
             yield reduce(mul, exchanged, reduce(mul, (_sign(x) for x in core.pivots)))
 
     @property
@@ -119,7 +132,11 @@ class Elimination:
         for i, row in enumerate(entries):
             for j in row:
                 columns[j].add(i)
-        while (found := _safe_pivot(entries, rows, columns, lambda i, j: block_of_row[i] == block_of_column[j])) is not None:
+        while (
+            found := _safe_pivot(
+                entries, rows, columns, lambda i, j: block_of_row[i] == block_of_column[j]
+            )
+        ) is not None:
             i, j = found
             if isinstance(entries[i][j], Traced):
                 self.pivots.append(entries[i][j])
@@ -162,15 +179,21 @@ class Elimination:
 
 
 class _Core:
-    """A dense block of rows and columns; its other entries meet columns that are solved before it."""
+    """A dense block of rows and columns; its other entries meet columns that are solved before
+    it.
+    """
 
-    def __init__(self, entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]) -> None:
+    def __init__(
+        self, entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]
+    ) -> None:
         self.rows = list(rows)
         # columns with few entries first: fewer exchanges to decide
         self.columns = sorted(columns, key=lambda j: sum(j in entries[i] for i in rows))
         inside = set(columns)
         self.before = [[(j, x) for j, x in entries[i].items() if j not in inside] for i in rows]
-        self.matrix: list[list[Scalar]] = [[entries[i].get(j, 0.0) for j in self.columns] for i in rows]
+        self.matrix: list[list[Scalar]] = [
+            [entries[i].get(j, 0.0) for j in self.columns] for i in rows
+        ]
         self.pivots: list[Scalar] = []
         self.steps = [self._eliminate(k) for k in range(len(rows))]
         self.inverses = [1.0 / self.matrix[k][k] for k in range(len(rows))]
@@ -184,24 +207,36 @@ class _Core:
                 continue
             exchanges.append((i, x, y))
             upper, lower = matrix[k], matrix[i]
-            matrix[k] = [*upper[:k], *(where_larger(x, y, b, a) for a, b in zip(upper[k:], lower[k:], strict=True))]
-            matrix[i] = [*lower[:k], *(where_larger(x, y, a, b) for a, b in zip(upper[k:], lower[k:], strict=True))]
+            matrix[k] = [
+                *upper[:k],
+                *(where_larger(x, y, b, a) for a, b in zip(upper[k:], lower[k:], strict=True)),
+            ]
+            matrix[i] = [
+                *lower[:k],
+                *(where_larger(x, y, a, b) for a, b in zip(upper[k:], lower[k:], strict=True)),
+            ]
         if is_literal_zero(matrix[k][k]):
-            raise ZeroDivisionError("the matrix is singular whatever the pose: a column of the core is empty")
+            raise ZeroDivisionError(
+                "the matrix is singular whatever the pose: a column of the core is empty"
+            )
         self.pivots.append(matrix[k][k])
         inverse = 1.0 / matrix[k][k]
         for i in range(k + 1, size):
             if not is_literal_zero(matrix[i][k]):
                 factor = matrix[i][k] * inverse
                 multipliers.append((i, factor))
-                matrix[i] = [*matrix[i][: k + 1], *(matrix[i][c] - factor * matrix[k][c] for c in range(k + 1, size))]
+                matrix[i] = [
+                    *matrix[i][: k + 1],
+                    *(matrix[i][c] - factor * matrix[k][c] for c in range(k + 1, size)),
+                ]
         return _CoreStep(tuple(exchanges), tuple(multipliers))
 
     @property
     def least_stretch(self) -> Scalar:
-        """One over the largest column sum of the inverse of U, or of that of its comparison matrix, which is no less: it is the
-        largest that its entries allow whatever their signs (Higham, Accuracy and Stability of Numerical Algorithms, 8.3). Of a
-        large core that may be thousands of times as much.
+        """One over the largest column sum of the inverse of U, or of that of its comparison matrix,
+        which is no less: it is the largest that its entries allow whatever their signs (Higham,
+        Accuracy and Stability of Numerical Algorithms, 8.3). Of a large core that may be thousands
+        of times as much.
         """
         reach = self._column_sums() if len(self.rows) > COMPARED else self._bounds_of_column_sums()
         return 1.0 / reduce(maximum, reach)
@@ -209,7 +244,11 @@ class _Core:
     def _bounds_of_column_sums(self) -> list[Scalar]:
         reach = list[Scalar]()
         for k, inverse in enumerate(self.inverses):
-            above = (absolute(self.matrix[i][k]) * reach[i] for i in range(k) if not is_literal_zero(self.matrix[i][k]))
+            above = (
+                absolute(self.matrix[i][k]) * reach[i]
+                for i in range(k)
+                if not is_literal_zero(self.matrix[i][k])
+            )
             reach.append(sum(above, 1.0) * absolute(inverse))
         return reach
 
@@ -217,7 +256,11 @@ class _Core:
         for k, inverse in enumerate(self.inverses):
             column: dict[int, Scalar] = {k: inverse}
             for i in reversed(range(k)):
-                terms = (self.matrix[i][c] * x for c, x in column.items() if not is_literal_zero(self.matrix[i][c]))
+                terms = (
+                    self.matrix[i][c] * x
+                    for c, x in column.items()
+                    if not is_literal_zero(self.matrix[i][c])
+                )
                 value = reduce(add, terms, 0.0) * self.inverses[i]
                 if not is_literal_zero(value):
                     column[i] = -value
@@ -231,7 +274,10 @@ class _Core:
                 v[k] = v[k] - entry * x[j]
         for k, step in enumerate(self.steps):
             for i, larger, other in step.exchanges:
-                v[k], v[i] = where_larger(larger, other, v[i], v[k]), where_larger(larger, other, v[k], v[i])
+                v[k], v[i] = (
+                    where_larger(larger, other, v[i], v[k]),
+                    where_larger(larger, other, v[k], v[i]),
+                )
             for i, factor in step.multipliers:
                 v[i] = v[i] - factor * v[k]
         for k in reversed(range(len(v))):
@@ -242,7 +288,9 @@ class _Core:
             x[j] = value
 
 
-def _blocks(entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int]) -> list[tuple[list[int], list[int]]]:
+def _blocks(
+    entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int]
+) -> list[tuple[list[int], list[int]]]:
     """Rows and columns of the blocks, in an order in which each needs only those before it."""
     # by hand: scipy.sparse.csgraph would do, but takes longer to import than all else here together
     row_of = _matched({i: list(entries[i]) for i in rows})
@@ -254,7 +302,8 @@ def _blocks(entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int]) -> lis
     for _ in range(len(rows).bit_length()):  # paths of twice the length
         needs = np.minimum(needs @ needs, 1.0)
     found: dict[bytes, list[int]] = {}
-    order: list[int] = np.argsort(needs.sum(axis=1), kind="stable").tolist()  # what a block needs, needs less
+    # what a block needs, needs less
+    order: list[int] = np.argsort(needs.sum(axis=1), kind="stable").tolist()
     for k in order:
         found.setdefault((needs[k] * needs[:, k]).tobytes(), []).append(rows[k])
     return [(block, sorted(column_of[i] for i in block)) for block in found.values()]
@@ -275,7 +324,10 @@ def _matched(columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
 
     for i in columns:
         if not place(i, set()):
-            raise ZeroDivisionError("the matrix is singular whatever the pose: its rows cannot be matched with its columns")
+            raise ZeroDivisionError(
+                "the matrix is singular whatever the pose: its rows cannot be matched with its"
+                " columns"
+            )
     return row_of
 
 
@@ -292,7 +344,9 @@ def _safe_pivot(
         for j, value in entries[i].items():
             in_column = len(columns[j])
             alone = in_row == 1 or in_column == 1
-            if (alone or (not isinstance(value, Traced) and abs(value) >= SAFE_LITERAL)) and inside(i, j):
+            if (alone or (not isinstance(value, Traced) and abs(value) >= SAFE_LITERAL)) and inside(
+                i, j
+            ):
                 cost = (in_row - 1) * (in_column - 1)
                 if best is None or cost < best[0]:
                     best = (cost, i, j)

@@ -1,7 +1,9 @@
-"""Programs linked into one table (see `bytecode`): many lanes of them, and what is done in between, gone through in one call.
+"""Programs linked into one table (see `bytecode`): many lanes of them, and what is done in between,
+gone through in one call.
 
-All numbers stand in one memory of rows, a vector each. What a program reads and writes are rows of it, for every lane its own:
-nothing is gathered before and scattered after. A vector holds the same number of several cases.
+All numbers stand in one memory of rows, a vector each. What a program reads and writes are rows of
+it, for every lane its own: nothing is gathered before and scattered after. A vector holds the same
+number of several cases.
 """
 
 from __future__ import annotations
@@ -32,7 +34,9 @@ class Memory:
         """The next rows, as many as that. Raises MemoryError where a table could not name them."""
         first, self.count = self.count, self.count + count
         if self.count > MOST:
-            raise MemoryError(f"{self.count} rows of numbers are asked for, a table names {MOST} at most")
+            raise MemoryError(
+                f"{self.count} rows of numbers are asked for, a table names {MOST} at most"
+            )
         return slice(first, self.count)
 
 
@@ -43,7 +47,9 @@ class Linker:
         self._vector = 8 * width
 
     def operations(self, op: str, *rows: Rows | int) -> Words:
-        """One operation, done for each of the rows: those of results and then of operands, one after the other."""
+        """One operation, done for each of the rows: those of results and then of operands, one
+        after the other.
+        """
         every = np.broadcast_arrays(*rows)
         return self.staged(1, (op, np.zeros(len(every[0]), np.intp), every))
 
@@ -54,17 +60,26 @@ class Linker:
             parts: an operation, the stages it is done at, and rows as of `operations`.
         """
         counts = [np.bincount(stage, minlength=stages) for _, stage, _ in parts]
-        takes = [np.where(count > 0, 2 + count * (1 + ARITY[op]), 0) for count, (op, *_) in zip(counts, parts, strict=True)]
+        takes = [
+            np.where(count > 0, 2 + count * (1 + ARITY[op]), 0)
+            for count, (op, *_) in zip(counts, parts, strict=True)
+        ]
         sizes = np.stack(takes, axis=1)
         starts = (np.cumsum(sizes) - sizes.ravel()).reshape(sizes.shape)
         words = np.empty(sizes.sum(), np.uint32)
         for count, start, (op, stage, rows) in zip(counts, starts.T, parts, strict=True):
-            some, size, order = np.flatnonzero(count), 1 + ARITY[op], np.argsort(stage, kind="stable")
+            some, size, order = (
+                np.flatnonzero(count),
+                1 + ARITY[op],
+                np.argsort(stage, kind="stable"),
+            )
             words[start[some]], words[start[some] + 1] = KINDS[op], 4 * size * count[some]
             # of each row how many are before it at its stage
             before = np.arange(len(stage)) - (np.cumsum(count) - count)[stage[order]]
             at = start[stage[order]] + 2 + size * before
-            words[at[:, None] + np.arange(size)] = self._vector * np.stack(np.broadcast_arrays(*rows), axis=-1)[order]
+            words[at[:, None] + np.arange(size)] = (
+                self._vector * np.stack(np.broadcast_arrays(*rows), axis=-1)[order]
+            )
         return words
 
     def lanes(self, program: Program, slots: Rows, memory: Memory) -> Words:
@@ -78,9 +93,15 @@ class Linker:
         table = bytecode(program, count, 1)  # bytes of a vector of one are as good as any
         abreast = min(ABREAST, lanes)
         # the last group is filled up with the last lane, which gives the same once more
-        groups = np.minimum(np.arange(-(-lanes // abreast) * abreast), lanes - 1).reshape(-1, abreast)
-        cells = memory.take(table.cells * abreast).start + np.arange(table.cells * abreast).reshape(-1, 1, abreast)
-        where = self._vector * np.concatenate([slots[:, groups], np.broadcast_to(cells, (table.cells, *groups.shape))])
+        groups = np.minimum(np.arange(-(-lanes // abreast) * abreast), lanes - 1).reshape(
+            -1, abreast
+        )
+        cells = memory.take(table.cells * abreast).start + np.arange(table.cells * abreast).reshape(
+            -1, 1, abreast
+        )
+        where = self._vector * np.concatenate(
+            [slots[:, groups], np.broadcast_to(cells, (table.cells, *groups.shape))]
+        )
         found: list[Rows] = []
         words: Rows = table.words.astype(np.intp)
         at = 0
@@ -88,7 +109,8 @@ class Linker:
             op, size = _OPS[int(words[at])], int(words[at + 1]) // 4
             rows = words[at + 2 : at + 2 + size].reshape(-1, 1 + ARITY[op])
             placed = np.empty((len(groups), len(rows), abreast, rows.shape[1]), np.intp)
-            named = 1 if op == "const" else rows.shape[1]  # of a constant the operands are the number itself
+            # of a constant the operands are the number itself
+            named = 1 if op == "const" else rows.shape[1]
             placed[..., :named] = where[rows[:, :named] // 8].transpose(2, 0, 3, 1)
             placed[..., named:] = rows[:, None, named:]
             placed = placed.reshape(len(groups), -1)

@@ -1,6 +1,7 @@
 """Programs in the operations of a processor: a product and a sum are one, and rounded once.
 
-It is decided here, and not by the compiler: compiled or interpreted, a program gives the same numbers, to the last bit.
+It is decided here, and not by the compiler: compiled or interpreted, a program gives the same
+numbers, to the last bit.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ SIZES = frozenset({"abs", "umax"})
 
 
 def lowered(program: Program) -> Program:
-    """The same program, in which a product that goes into nothing but one sum or difference is part of it."""
+    """The same program, in which a product that goes into nothing but one sum or difference is part
+    of it.
+    """
     nodes = program.nodes
     operated = [operands(node) for node in nodes]
     uses = counts(len(nodes), *operated, program.outputs.values())
@@ -46,7 +49,12 @@ def lowered(program: Program) -> Program:
             sizes.add(k)
         place[k] = len(found)
         found.append(node if op in LEAVES else (op, *[place[x] for x in read]))
-    return Program(program.name, tuple(found), {slot: place[k] for slot, k in program.outputs.items()}, program.times)
+    return Program(
+        program.name,
+        tuple(found),
+        {slot: place[k] for slot, k in program.outputs.items()},
+        program.times,
+    )
 
 
 def counts(size: int, *uses: Iterable[int]) -> list[int]:
@@ -64,7 +72,13 @@ def unrolled(program: Program) -> Program:
     for k in range(1, program.times):
         first = len(nodes)
         for op, *rest in program.nodes:
-            moved = rest if op == "const" else [rest[0] + k, *rest[1:]] if op in LEAVES else [x + first for x in rest]
+            moved = (
+                rest
+                if op == "const"
+                else [rest[0] + k, *rest[1:]]
+                if op in LEAVES
+                else [x + first for x in rest]
+            )
             nodes.append((op, *moved))
         for slot, number in program.outputs.items():
             nodes.append(("umax", outputs[slot], number + first))

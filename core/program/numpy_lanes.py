@@ -124,7 +124,9 @@ class NumpyLanes:
         self.block[target] = self.block[source]
 
     def go_back(self, sample: Array) -> None:
-        """Have lanes stand where they are predicted from, and be ready to be; the sample there, shape (sampled, 1)."""
+        """Have lanes stand where they are predicted from, and be ready to be; the sample there,
+        shape (sampled, 1).
+        """
         source, target = np.array(self.plan.carried).T
         self.block[source], self.block[list(self.plan.sampled)] = self.block[target], sample
         for name in self.plan.onward:
@@ -136,7 +138,11 @@ class NumpyLanes:
 
     def _bind(self, program: Program) -> list[Call]:
         """Give every operation a register; a register is free again after its last reader."""
-        times, block, functions = program.times, self.block, {**_UFUNCS, "where": _where, "before": self._before}
+        times, block, functions = (
+            program.times,
+            self.block,
+            {**_UFUNCS, "where": _where, "before": self._before},
+        )
         shape = self.lanes if times == 1 else (times, self.lanes)
         scratch = np.empty((2, self.lanes)) if times == 1 else np.empty((2, times, self.lanes))
         last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
@@ -167,11 +173,16 @@ class NumpyLanes:
                 calls.append((functions[op], (*read, out)))
             for x in set(arguments):
                 if last[x] == k and x not in kept and program.nodes[x][0] not in LEAVES:
-                    free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
-        for node in kept:  # what stood in a slot and is put out elsewhere must survive the output that overwrites it
+                    free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(
+                        place[x]
+                    )
+        # what stood in a slot and is put out elsewhere must survive the output that overwrites it
+        for node in kept:
             if program.nodes[node][0] in ("input", "node"):
                 copy = np.empty(shape)
                 calls.append((np.copyto, (copy, place[node])))
                 place[node] = copy
         write = np.copyto if times == 1 else _largest
-        return calls + [(write, (block[slot], place[node])) for slot, node in program.outputs.items()]
+        return calls + [
+            (write, (block[slot], place[node])) for slot, node in program.outputs.items()
+        ]

@@ -32,7 +32,9 @@ class NumpyTrack:
         return self._kept
 
     def run(self) -> Sequence[int]:
-        """See `Track`. What both sides have in common is done once: a call takes longer than its numbers."""
+        """See `Track`. What both sides have in common is done once: a call takes longer than its
+        numbers.
+        """
         executor, counts = self._executor, [side.count for side in self._sides]
         if sum(counts) > executor.lanes:
             return [self.follow(k, 0, count, anew=True) for k, count in enumerate(counts)]
@@ -69,11 +71,15 @@ class NumpyTrack:
         executor, samples = self._executor, self._sides[side].samples
         plan, block, lanes = executor.plan, executor.block, executor.lanes
         extrapolates = plan.extrapolates(lanes)
-        carried, moved = (np.array(each).T for each in (plan.carried, plan.moved if extrapolates else plan.carried))
+        carried, moved = (
+            np.array(each).T
+            for each in (plan.carried, plan.moved if extrapolates else plan.carried)
+        )
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
-            # what is extrapolated begins at a multiple of the lanes: on to there as soon as a group is accepted whole
+            # what is extrapolated begins at a multiple of the lanes: on to there as soon as a group
+            # is accepted whole
             count = min(lanes - at % lanes if whole and extrapolates else lanes, stop - at)
             block[sampled, :count] = samples[:, at : at + count]
             block[sampled, count:] = samples[:, stop - 1 : stop]
@@ -97,7 +103,9 @@ class NumpyTrack:
 
     def _keep(self, side: Side, at: int, found: Array) -> None:
         plan = self._executor.plan
-        self._kept[:, side.first + side.step * np.arange(at, at + found.shape[1])] = found[list(plan.kept)]
+        self._kept[:, side.first + side.step * np.arange(at, at + found.shape[1])] = found[
+            list(plan.kept)
+        ]
         largest, smallest = np.split(self.worst, [len(plan.largest)])
         np.maximum(largest, found[list(plan.largest)].max(axis=1), out=largest)
         np.minimum(smallest, found[list(plan.smallest)].min(axis=1), out=smallest)

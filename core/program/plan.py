@@ -1,4 +1,6 @@
-"""What runs programs: lanes that programs read and write in place, and the loops over them that follow a motion."""
+"""What runs programs: lanes that programs read and write in place, and the loops over them that
+follow a motion.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from .tape import groups_behind
 Table = TypeVar("Table", bound=NDArray[Any])
 
 DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
-"""Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much the lane may be accepted."""
+"""Slots that an attempt writes: whether Newton's iteration ended, after how many, and by how much
+the lane may be accepted.
+"""
 LINE = 8
 """Numbers in a cache line."""
 
@@ -25,32 +29,41 @@ LINE = 8
 class Plan:
     """The programs of a model, and what the loops over its lanes are made of.
 
-    An attempt runs `predict`, then `newton` until the slot `residual` of every lane is below the tolerance or not finite, then the
-    programs in `after`, and at last those of a test, whose margin is positive where the lane may be accepted.
+    An attempt runs `predict`, then `newton` until the slot `residual` of every lane is below the
+    tolerance or not finite, then the programs in `after`, and at last those of a test, whose margin
+    is positive where the lane may be accepted.
 
-    Where there is a program `extrapolate` it takes the place of `predict` for lanes that follow a group that was accepted whole:
-    it goes by what stands in those lanes, and needs nothing of what `onward` puts out. Where groups are of few lanes it goes by
-    several of them, and remembers the earlier ones itself. What is carried of the last lane it may put out, too. So does `extend`,
-    for lanes that have come through `NODES` samples: it goes by what is remembered of these.
+    Where there is a program `extrapolate` it takes the place of `predict` for lanes that follow a
+    group that was accepted whole: it goes by what stands in those lanes, and needs nothing of what
+    `onward` puts out. Where groups are of few lanes it goes by several of them, and remembers the
+    earlier ones itself. What is carried of the last lane it may put out, too. So does `extend`, for
+    lanes that have come through `NODES` samples: it goes by what is remembered of these.
 
     Attributes:
         programs: by name; they share one layout of slots.
         slots: place of every scalar in a lane, by name.
         after: names of the programs that end an attempt.
-        alone, joined: names of the programs that test lanes: that know nothing of each other, or are neighbours on one way.
-        onward: names of the programs that make a solved lane ready to be predicted from; they may be in `after` too.
-        sampled: slots that are given anew at every sample; what `extrapolate` is given holds for groups that begin at a multiple
-            of their lanes.
+        alone, joined: names of the programs that test lanes: that know nothing of each other, or
+            are neighbours on one way.
+        onward: names of the programs that make a solved lane ready to be predicted from; they may
+            be in `after` too.
+        sampled: slots that are given anew at every sample; what `extrapolate` is given holds for
+            groups that begin at a multiple of their lanes.
         behind: how many groups `extrapolate` goes by.
-        remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for `extend`, and `follow` what was
-            there in all groups but the last that `extrapolate` goes by.
-        past: the slot they begin to keep them at: those of sample k are at place k modulo `NODES`, those of groups in order.
-        carried: slots of a solved lane, and the slots it is predicted from that take them over, one after the other.
-        continued: the same where those after it are not predicted by `predict`; `carried`, unless it is given.
+        remembered: slots of which `fan` keeps what was there at the last `NODES` samples, for
+            `extend`, and `follow` what was there in all groups but the last that `extrapolate` goes
+            by.
+        past: the slot they begin to keep them at: those of sample k are at place k modulo `NODES`,
+            those of groups in order.
+        carried: slots of a solved lane, and the slots it is predicted from that take them over, one
+            after the other.
+        continued: the same where those after it are not predicted by `predict`; `carried`, unless
+            it is given.
         kept: slots that are stored of every sample.
-        largest, smallest: slots of which the largest and the smallest are found: by `follow` over the samples it keeps, by `parts`
-            over the parts.
-        fixed: slots that differ from part to part of a large mechanism, and are the same in all lanes.
+        largest, smallest: slots of which the largest and the smallest are found: by `follow` over
+            the samples it keeps, by `parts` over the parts.
+        fixed: slots that differ from part to part of a large mechanism, and are the same in all
+            lanes.
         taken: slots that a part takes from what was solved before it.
         tolerance: of the residual before an iteration; that iteration is the last.
         most: iterations at most.
@@ -78,7 +91,9 @@ class Plan:
 
     @property
     def remaining(self) -> list[str]:
-        """Names of the programs that make a lane ready to be predicted from once its attempt has ended."""
+        """Names of the programs that make a lane ready to be predicted from once its attempt has
+        ended.
+        """
         return [name for name in self.onward if name not in self.after]
 
     @property
@@ -99,8 +114,12 @@ class Plan:
 
     @property
     def moved(self) -> Sequence[tuple[int, int]]:
-        """What of `carried_on` is to be copied before `extrapolate`, which puts out the rest itself."""
-        return [pair for pair in self.carried_on if pair[1] not in self.programs["extrapolate"].outputs]
+        """What of `carried_on` is to be copied before `extrapolate`, which puts out the rest
+        itself.
+        """
+        return [
+            pair for pair in self.carried_on if pair[1] not in self.programs["extrapolate"].outputs
+        ]
 
     def extrapolates(self, lanes: int) -> bool:
         """Whether groups of that many lanes are followed by extrapolation."""
@@ -108,7 +127,9 @@ class Plan:
 
 
 def shifted(past: int, remembered: Sequence[int], behind: int) -> Sequence[tuple[int, int]]:
-    """Slots of the last group and those before, and where they are remembered when it becomes one of those; see `Plan`."""
+    """Slots of the last group and those before, and where they are remembered when it becomes one
+    of those; see `Plan`.
+    """
     count = len(remembered)
     places = [*range(past, past + (behind - 1) * count), *remembered]
     return list(zip(places[count:], places, strict=False))
@@ -119,7 +140,8 @@ class Side:
     """The samples on one side of where a motion starts, outwards.
 
     Attributes:
-        samples: `Plan.sampled` of each, shape (sampled, count + margin), contiguous; the last column repeated at the end.
+        samples: `Plan.sampled` of each, shape (sampled, count + margin), contiguous; the last
+            column repeated at the end.
         count: how many there are.
         first, step: column of the first among all samples, and from each to the next: 1 or -1.
     """
@@ -132,17 +154,21 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Parts of a large mechanism that share a plan. All arrays are contiguous, and live as long as what is called with them.
+    """Parts of a large mechanism that share a plan. All arrays are contiguous, and live as long as
+    what is called with them.
 
     Attributes:
         members: which rows of `fixed` they are, in order.
         fixed: values of `Plan.fixed`, shape (all members, fixed).
-        ahead: takes those of the lanes after the last one, of the same shape: of what is carried, what that is carried from.
+        ahead: takes those of the lanes after the last one, of the same shape: of what is carried,
+            what that is carried from.
         samples: values of `Plan.sampled`, shape (sampled, room).
         taken: rows of the world that `Plan.taken` come from, shape (parts, taken).
-        world: all that has been solved, shape (rows, room); takes `Plan.kept` of a member from row `base + member * kept` on.
-        worst: takes the largest of `Plan.largest` and the smallest of `Plan.smallest`, lane by lane, of what stood there and of all
-            parts, NaN where that is among them; shape (largest and smallest, room).
+        world: all that has been solved, shape (rows, room); takes `Plan.kept` of a member from row
+            `base + member * kept` on.
+        worst: takes the largest of `Plan.largest` and the smallest of `Plan.smallest`, lane by
+            lane, of what stood there and of all parts, NaN where that is among them; shape (largest
+            and smallest, room).
     """
 
     members: NDArray[np.int64]
@@ -156,7 +182,9 @@ class Parts:
 
 
 class Executor(Protocol):
-    """A plan bound to a number of lanes. Lanes that divide by zero hold inf or nan afterwards; nothing is raised."""
+    """A plan bound to a number of lanes. Lanes that divide by zero hold inf or nan afterwards;
+    nothing is raised.
+    """
 
     @property
     def lanes(self) -> int: ...
@@ -187,7 +215,9 @@ class Executor(Protocol):
         ...
 
     def arranged(self, table: Table) -> Table:
-        """A table of slots by lanes as it would stand in memory; what fills up the last vector is as the last lane."""
+        """A table of slots by lanes as it would stand in memory; what fills up the last vector is
+        as the last lane.
+        """
         ...
 
     def run(self, name: str) -> None:
@@ -203,7 +233,9 @@ class Executor(Protocol):
         ...
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> Track:
-        """Bind the samples of one motion, n in all, and where it starts: what `Plan.carried` takes over, in that order."""
+        """Bind the samples of one motion, n in all, and where it starts: what `Plan.carried` takes
+        over, in that order.
+        """
         ...
 
     @property
@@ -221,8 +253,9 @@ class Executor(Protocol):
         Args:
             samples: `Plan.sampled`, shape (sampled, n).
             out: a table, which takes `Plan.kept`; NaN from where a lane was not accepted.
-            worst: takes the largest of `Plan.largest` and the smallest of `Plan.smallest`, lane by lane, of what stood there and of
-                all samples; NaN where a lane was not accepted. Shape (largest and smallest, room).
+            worst: takes the largest of `Plan.largest` and the smallest of `Plan.smallest`, lane by
+                lane, of what stood there and of all samples; NaN where a lane was not accepted.
+                Shape (largest and smallest, room).
             first, step: column of the first sample, and from each to the next: 1 or -1.
         """
         ...
@@ -230,11 +263,13 @@ class Executor(Protocol):
     def fold(self, table: Array, totals: Array) -> None:
         """Take numbers into totals, column by column, in the first group of lanes.
 
-        `Plan.kept` are set to what stood in the totals; then as many groups of numbers as there are slots in `Plan.taken` are read
-        at a time, and the programs in `after` run; at the end `Plan.kept` are put out.
+        `Plan.kept` are set to what stood in the totals; then as many groups of numbers as there are
+        slots in `Plan.taken` are read at a time, and the programs in `after` run; at the end
+        `Plan.kept` are put out.
 
         Args:
-            table: shape (columns, room), contiguous; what is read at a time fits into the room a whole number of times.
+            table: shape (columns, room), contiguous; what is read at a time fits into the room a
+                whole number of times.
             totals: shape (kept, columns, group), contiguous.
         """
         ...
@@ -244,7 +279,8 @@ class Executor(Protocol):
         ...
 
     def parts(self, parts: Parts) -> Callable[[int], object]:
-        """A call that attempts parts of a large mechanism, one after the other, by what stands in their arrays when it is called.
+        """A call that attempts parts of a large mechanism, one after the other, by what stands in
+        their arrays when it is called.
 
         What is called is told in how many groups; each lane is attempted alone.
         """
@@ -252,11 +288,13 @@ class Executor(Protocol):
 
 
 class Track(Protocol):
-    """A motion that an executor follows along both sides of where it starts, through samples it knows.
+    """A motion that an executor follows along both sides of where it starts, through samples it
+    knows.
 
     Attributes:
         anchors: where the motion stands on each side: what `Plan.carried` takes over, a row a side.
-        worst: the largest of `Plan.largest`, or zero, and the smallest of `Plan.smallest`, over all samples kept since `begin`.
+        worst: the largest of `Plan.largest`, or zero, and the smallest of `Plan.smallest`, over all
+            samples kept since `begin`.
     """
 
     anchors: Array
@@ -265,19 +303,23 @@ class Track(Protocol):
     def begin(self) -> Array:
         """Room for `Plan.kept` of all samples, shape (kept, n), which is filled from now on.
 
-        Hold it as long as samples are followed: it is not held here, for it may be large, and belongs to whoever asked for it.
+        Hold it as long as samples are followed: it is not held here, for it may be large, and
+        belongs to whoever asked for it.
         """
         ...
 
     def run(self) -> Sequence[int]:
-        """Follow every side from the start to its end: the first sample of each that was not accepted, or how many there are.
+        """Follow every side from the start to its end: the first sample of each that was not
+        accepted, or how many there are.
 
-        The anchor of a side that came to its end is of no use: nothing is made ready there to go on.
+        The anchor of a side that came to its end is of no use: nothing is made ready there to go
+        on.
         """
         ...
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
-        """Attempt the next samples of a side as neighbouring lanes, go on from the last one accepted, until none is.
+        """Attempt the next samples of a side as neighbouring lanes, go on from the last one
+        accepted, until none is.
 
         Args:
             at, stop: the sample that comes next, and the one before which to end.

@@ -1,7 +1,9 @@
-"""The elimination of a sparse matrix in a given order, as operations on rows of memory: every entry is a row, a vector of numbers.
+"""The elimination of a sparse matrix in a given order, as operations on rows of memory: every entry
+is a row, a vector of numbers.
 
-No pivot is chosen, so that what is done is known before any number is: whether the order serves them is to be asked afterwards, of
-the smallest pivot and the largest multiplier. Pivots of which none needs another are eliminated side by side.
+No pivot is chosen, so that what is done is known before any number is: whether the order serves
+them is to be asked afterwards, of the smallest pivot and the largest multiplier. Pivots of which
+none needs another are eliminated side by side.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from .linker import Linker, Rows, Words, numbers
 
 
 class FixedOrder:
-    """Which entries the factors L and U have; they take the place of the matrix, L below a diagonal of ones.
+    """Which entries the factors L and U have; they take the place of the matrix, L below a diagonal
+    of ones.
 
     Args:
         rows, columns: of the entries of the matrix, in the order of elimination.
@@ -36,7 +39,11 @@ class FixedOrder:
             place[i][j] = at
             holding[j].append(i)
         level, pivots = [0] * n, list[int]()
-        below, above, updates = list[tuple[int, ...]](), list[tuple[int, ...]](), list[tuple[int, ...]]()
+        below, above, updates = (
+            list[tuple[int, ...]](),
+            list[tuple[int, ...]](),
+            list[tuple[int, ...]](),
+        )
         for k in range(n):
             if k not in place[k]:
                 raise ValueError(f"pivot {k} of {n} is zero by structure")
@@ -57,9 +64,16 @@ class FixedOrder:
                         holding[j].append(i)
                         self.count += 1
                     updates.append((k, at, multiplier, entry))
-        self._level, self.pivots, self._last = np.array(level), np.array(pivots), max(level, default=0)
-        # with their pivots: entries of L and their rows, those of U and theirs, and entries and what is taken from them
-        self._below, self._above = (np.array(each, np.intp).reshape(-1, 3).T for each in (below, above))
+        self._level, self.pivots, self._last = (
+            np.array(level),
+            np.array(pivots),
+            max(level, default=0),
+        )
+        # with their pivots: entries of L and their rows, those of U and theirs, and entries and
+        # what is taken from them
+        self._below, self._above = (
+            np.array(each, np.intp).reshape(-1, 3).T for each in (below, above)
+        )
         self._updates: Rows = np.array(updates, np.intp).reshape(-1, 4).T
 
     @property
@@ -67,7 +81,9 @@ class FixedOrder:
         """Places of the entries of L among all."""
         return self._below[2]
 
-    def factor(self, link: Linker, matrix: Rows, entries: slice, inverse: slice, constants: tuple[int, int]) -> list[Words]:
+    def factor(
+        self, link: Linker, matrix: Rows, entries: slice, inverse: slice, constants: tuple[int, int]
+    ) -> list[Words]:
         """Factor a matrix.
 
         Args:
@@ -83,10 +99,24 @@ class FixedOrder:
             ("*", self._level[pivot], (at[multiplier], at[multiplier], inverses[pivot])),
             ("fnma", self._level[by], (at[updated], at[factor], at[other], at[updated])),
         )
-        return [link.operations("copy", at[: self._given], matrix), link.operations("copy", at[self._given :], zero), elimination]
+        return [
+            link.operations("copy", at[: self._given], matrix),
+            link.operations("copy", at[self._given :], zero),
+            elimination,
+        ]
 
-    def solve(self, link: Linker, entries: slice, inverse: slice, right: slice, *, transposed: bool = False) -> list[Words]:
-        """Solve for what stands in the rows `right`, in the order of elimination; or with the matrix transposed."""
+    def solve(
+        self,
+        link: Linker,
+        entries: slice,
+        inverse: slice,
+        right: slice,
+        *,
+        transposed: bool = False,
+    ) -> list[Words]:
+        """Solve for what stands in the rows `right`, in the order of elimination; or with the
+        matrix transposed.
+        """
         at, inverses = numbers(right), numbers(inverse)
 
         def less(of: tuple[Rows, Rows, Rows] | Rows) -> tuple[Rows, Rows, Rows, Rows]:
@@ -97,10 +127,18 @@ class FixedOrder:
         if transposed:  # what needs what is the other way round
             (j, i, upper), (k, below, lower) = self._above, self._below
             return [
-                link.staged(stages, ("*", self._level, (at, at, inverses)), ("fnma", self._level[i], less((i, j, upper)))),
+                link.staged(
+                    stages,
+                    ("*", self._level, (at, at, inverses)),
+                    ("fnma", self._level[i], less((i, j, upper))),
+                ),
                 link.staged(stages, ("fnma", back[below], less((below, k, lower)))),
             ]
         return [
             link.staged(stages, ("fnma", self._level[self._below[0]], less(self._below))),
-            link.staged(stages, ("*", back, (at, at, inverses)), ("fnma", back[self._above[0]], less(self._above))),
+            link.staged(
+                stages,
+                ("*", back, (at, at, inverses)),
+                ("fnma", back[self._above[0]], less(self._above)),
+            ),
         ]

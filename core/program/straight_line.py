@@ -1,4 +1,6 @@
-"""Straight-line programs: the operations of a tape that some outputs need, in an order that can be run."""
+"""Straight-line programs: the operations of a tape that some outputs need, in an order that can be
+run.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ from functools import cached_property
 from ..algebra import Scalar
 from .tape import LEAVES, Node, Tape, Traced, operands
 
-FLOPS = frozenset({"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"})
+FLOPS = frozenset(
+    {"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"}
+)
 
 
 @dataclass(frozen=True)
@@ -19,9 +23,11 @@ class Program:
 
     Attributes:
         nodes: the live operations only; operands are positions in this tuple.
-        outputs: slot -> position of the node it takes. All outputs are written after the last input was read.
-        times: it is run so often, every input one slot further each time, and of what it puts out the largest is taken; those
-            outputs are sizes, not negative. NaN is larger than any number.
+        outputs: slot -> position of the node it takes. All outputs are written after the last input
+            was read.
+        times: it is run so often, every input one slot further each time, and of what it puts out
+            the largest is taken; those outputs are sizes, not negative. NaN is larger than any
+            number.
     """
 
     name: str
@@ -32,7 +38,12 @@ class Program:
     @property
     def operations(self) -> Counter[str]:
         """How often each operation occurs."""
-        found = Counter({op: self.times * count for op, count in Counter(node[0] for node in self.nodes).items()})
+        found = Counter(
+            {
+                op: self.times * count
+                for op, count in Counter(node[0] for node in self.nodes).items()
+            }
+        )
         return found + Counter({"max": len(self.outputs) * (self.times - 1)})
 
     @cached_property
@@ -46,8 +57,16 @@ class Program:
         return {"operations": len(self.nodes), "flops": self.flops}
 
 
-def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prepared | None = None, times: int = 1) -> Program:
-    """The part of the tape that the outputs (slot -> scalar) need; what is prepared is read from its slot."""
+def program(
+    name: str,
+    tape: Tape,
+    outputs: Mapping[int, Scalar],
+    prepared: Prepared | None = None,
+    times: int = 1,
+) -> Program:
+    """The part of the tape that the outputs (slot -> scalar) need; what is prepared is read from
+    its slot.
+    """
     wanted = {slot: tape.number(value) for slot, value in outputs.items()}
     live: dict[int, Node] = {}
     waiting = list(wanted.values())
@@ -58,13 +77,15 @@ def program(name: str, tape: Tape, outputs: Mapping[int, Scalar], prepared: Prep
             waiting += operands(node)
     position = {number: k for k, number in enumerate(sorted(live))}
     nodes = tuple(
-        node if node[0] in LEAVES else (node[0], *[position[x] for x in operands(node)]) for _, node in sorted(live.items())
+        node if node[0] in LEAVES else (node[0], *[position[x] for x in operands(node)])
+        for _, node in sorted(live.items())
     )
     return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()}, times)
 
 
 class Prepared:
-    """What depends on given slots alone (the geometry): computed once by a program of its own, and kept in slots.
+    """What depends on given slots alone (the geometry): computed once by a program of its own, and
+    kept in slots.
 
     Args:
         given: the slots it may depend on.
@@ -80,7 +101,12 @@ class Prepared:
         """The node, or where it is prepared the input that reads it."""
         node = self.tape.nodes[number]
         # a decision is no number that a slot could hold: it is made anew of what is prepared
-        if not self._given or node[0] in LEAVES or node[0] == "larger" or not self._is_fixed(number):
+        if (
+            not self._given
+            or node[0] in LEAVES
+            or node[0] == "larger"
+            or not self._is_fixed(number)
+        ):
             return node
         if number not in self._kept:
             self._kept[number] = self._slot(f"prepared {len(self._kept)}")
@@ -93,12 +119,18 @@ class Prepared:
 
     def program(self) -> Program:
         """What computes all that programs have read so far."""
-        return program("prepare", self.tape, {slot: Traced(self.tape, number) for number, slot in self._kept.items()})
+        return program(
+            "prepare",
+            self.tape,
+            {slot: Traced(self.tape, number) for number, slot in self._kept.items()},
+        )
 
     def _is_fixed(self, number: int) -> bool:
         for node in self.tape.nodes[len(self._fixed) :]:
             if node[0] == "input":
                 self._fixed.append(node[1] in self._given)
             else:
-                self._fixed.append(node[0] != "node" and all(self._fixed[x] for x in operands(node)))
+                self._fixed.append(
+                    node[0] != "node" and all(self._fixed[x] for x in operands(node))
+                )
         return self._fixed[number]

@@ -1,7 +1,8 @@
 """Traced scalars: run an equation on them and the operations it needs are written down, each once.
 
-Zeros, ones and signs fold as they are written, equal operations are shared (hash consing), and a program keeps only what its
-outputs need. What a scene does not use is therefore not in its programs, without anyone deciding so.
+Zeros, ones and signs fold as they are written, equal operations are shared (hash consing), and a
+program keeps only what its outputs need. What a scene does not use is therefore not in its
+programs, without anyone deciding so.
 """
 
 from __future__ import annotations
@@ -13,16 +14,20 @@ from typing import TypeAlias, cast
 from ..algebra import Scalar
 
 Node: TypeAlias = tuple[str, *tuple[float, ...]]
-"""An operation and its operands: node numbers, or for "input" a slot, or for "const" a value; see `LEAVES`.
+"""An operation and its operands: node numbers, or for "input" a slot, or for "const" a value; see
+`LEAVES`.
 
-"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max" propagate NaN); "larger" a b is
-true where |a| > |b|; "where" m p q is p where m is true, else q; "before" x a is the x of the lane before, and a in the first lane.
+"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max"
+propagate NaN); "larger" a b is true where |a| > |b|; "where" m p q is p where m is true, else q;
+"before" x a is the x of the lane before, and a in the first lane.
 """
 LEAVES = frozenset({"input", "const", "node"})
-"""What has no operands. "node" s k is what stands in slot s of the lane that is number k of `NODES`, for all lanes alike."""
+"""What has no operands. "node" s k is what stands in slot s of the lane that is number k of
+`NODES`, for all lanes alike.
+"""
 NODES = 6
-"""Lanes that later ones may be extrapolated from, about as far from each other: of a group, or of several that follow one another
-where a group has fewer."""
+"""Lanes that later ones may be extrapolated from, about as far from each other: of a group, or of
+several that follow one another where a group has fewer."""
 
 
 class Tape:

@@ -1,4 +1,6 @@
-"""The axis of what is swept: a driver or time, its values at the samples, and which way it is drawn."""
+"""The axis of what is swept: a driver or time, its values at the samples, and which way it is
+drawn.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ from typing import Any
 
 from ..harness.record import Record
 
-SAMPLES = 500  # a figure is that many pixels wide; longer series are thinned, the worst samples always kept
+# a figure is that many pixels wide; longer series are thinned, the worst samples always kept
+SAMPLES = 500
 
 DISPLAY = {"m": ("mm", 1e3), "rad": ("°", 180 / math.pi), "s": ("s", 1.0), "rad/m": ("°/m", 180 / math.pi)}
 """Units of results, and what they are shown in: the unit and the factor."""
@@ -49,7 +52,8 @@ class Axis(Moved):
     Attributes:
         title: as written beside the outputs' figures, with the sense of the motion.
         kept: indices of the samples drawn.
-        up: 1 where it is drawn upwards against the outputs, as wheel travel is, -1 where downwards, 0 where to the right.
+        up: 1 where it is drawn upwards against the outputs, as wheel travel is, -1 where downwards,
+            0 where to the right.
         further: the drivers that move besides, or while time is swept, and how, in words.
     """
 
@@ -83,7 +87,8 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
     """The axis of what is swept.
 
     Args:
-        facts: what is known of the case: its "driver" (name, type, point and direction), its "motions" by name; may be empty.
+        facts: what is known of the case: its "driver" (name, type, point and direction), its
+            "motions" by name; may be empty.
         records: the records of one case.
         worst: samples that thinning must keep.
     """
@@ -97,9 +102,10 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
         if name != key
     ]
     name, unit, values = swept.name, swept.unit, swept.values
-    # Suspension engineers read curves against wheel travel with the travel upwards, as the wheel goes, so that left and right of
-    # the middle are in and out. So it is drawn wherever a point is driven along the global z axis; every other driver, angles,
-    # rack travel and time, lies to the right. Driven along -z, the axis runs backwards: up on paper is up on the vehicle.
+    # Suspension engineers read curves against wheel travel with the travel upwards, as the wheel
+    # goes, so that left and right of the middle are in and out. So it is drawn wherever a point is
+    # driven along the global z axis; every other driver, angles, rack travel and time, lies to the
+    # right. Driven along -z, the axis runs backwards: up on paper is up on the vehicle.
     up = _upwards(driver)
     title = f"{name} [{unit}]" if unit else name
     if up and "wheel" in driver.get("point", "") and driver.get("relative", True):

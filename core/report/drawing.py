@@ -1,6 +1,8 @@
-"""Drawings: what the page draws of a scene. Hardpoints by body, links between those of one body, rods between bodies.
+"""Drawings: what the page draws of a scene. Hardpoints by body, links between those of one body,
+rods between bodies.
 
-A body is where its frame is: hardpoints are in body coordinates, and the page puts them where the poses say.
+A body is where its frame is: hardpoints are in body coordinates, and the page puts them where the
+poses say.
 """
 
 from __future__ import annotations
@@ -28,23 +30,27 @@ MARKS = {
 }
 """How a joint is marked, by type; others get a mark that stands for any joint."""
 
-# Up to this many hardpoints every one is joined with every other, as arms are drawn; more would be a tangle, and get a hub.
+# Up to this many hardpoints every one is joined with every other, as arms are drawn; more would be
+# a tangle, and get a hub.
 ALL_JOINED = 4
-# Hardpoints of one body closer than this are one [m]: tables are given to a tenth of a millimetre at best.
+# Hardpoints of one body closer than this are one [m]: tables are given to a tenth of a millimetre
+# at best.
 SAME = 1e-6
 
 
 @dataclass
 class Drawing:
-    """What is drawn, as the page's script reads it; places are indices of `nodes`, bodies indices of `bodies`.
+    """What is drawn, as the page's script reads it; places are indices of `nodes`, bodies indices
+    of `bodies`.
 
     Attributes:
-        bodies: name, whether fixed, where the axes are drawn (body frame), and poses: origins r [m] and Euler parameters p,
-            one for each frame of the scene or one only.
+        bodies: name, whether fixed, where the axes are drawn (body frame), and poses: origins r [m]
+            and Euler parameters p, one for each frame of the scene or one only.
         nodes: body, and x, y, z in its frame [m].
         links: two nodes of one body.
         rods: two nodes of two bodies.
-        marks: node, kind of mark, axis in the body's frame or null, whether the joint is on something fixed.
+        marks: node, kind of mark, axis in the body's frame or null, whether the joint is on
+            something fixed.
         labels: two nodes, between which the text stands.
         paths: nodes whose way over the frames is drawn.
         steps: what is said of each frame.
@@ -135,11 +141,14 @@ class _Draughtsman:
         self.drawn.labels.append((a, b, text))
 
     def _body(self, number: int) -> dict[str, Any]:
-        """A body for the page; joins its hardpoints if it moves, a single one with its origin, if that was chosen."""
+        """A body for the page; joins its hardpoints if it moves, a single one with its origin, if
+        that was chosen.
+        """
         body = self.bodies[number]
         if not body.fixed:
             mine = [k for k, (other, *_) in enumerate(self.drawn.nodes) if other == number]
-            if len(mine) == 1 and any(body.origin):  # the global origin is that of bodies which were given none
+            # the global origin is that of bodies which were given none
+            if len(mine) == 1 and any(body.origin):
                 mine = sorted({*mine, self._node(body.name, body.origin)})
             self._link(number, mine)
         frame = self._frame([vec(place) for other, *place in self.drawn.nodes if other == number])
@@ -154,7 +163,9 @@ class _Draughtsman:
         self.drawn.links += [(k, len(self.drawn.nodes) - 1) for k in nodes]
 
     def _frame(self, hardpoints: Sequence[Vec3]) -> list[float]:
-        """Where a body's axes are drawn: at its origin, or amid its hardpoints if the origin is far from them."""
+        """Where a body's axes are drawn: at its origin, or amid its hardpoints if the origin is far
+        from them.
+        """
         if not hardpoints:
             return [0.0, 0.0, 0.0]
         middle = _middle(hardpoints)

@@ -1,4 +1,6 @@
-"""Figures of what a single run cannot tell: errors and times over earlier runs, and error against time at several efforts."""
+"""Figures of what a single run cannot tell: errors and times over earlier runs, and error against
+time at several efforts.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,10 @@ class Past:
     """What one engine made of a case in one run.
 
     Attributes:
-        run: what the run is called on the axis, its date for one; runs are in the order given, oldest first.
-        engine: as the report names it; one that is not in the report's own run is drawn in a style of its own.
+        run: what the run is called on the axis, its date for one; runs are in the order given,
+            oldest first.
+        engine: as the report names it; one that is not in the report's own run is drawn in a style
+            of its own.
         max_error: largest position error over all outputs [m]; None where nothing was compared.
         us_per_step: warm time of a sample [us]; None where not all samples were reached.
     """
@@ -49,15 +53,18 @@ class Effort:
 
 
 def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[str, Figure]:
-    """Error and time of each engine over the runs, on log axes; what has no value in any run is left out.
+    """Error and time of each engine over the runs, on log axes; what has no value in any run is
+    left out.
 
-    An error of zero has no place on the axis: the page draws it on a labelled floor, as in the error figures.
+    An error of zero has no place on the axis: the page draws it on a labelled floor, as in the
+    error figures.
     """
     runs = list(dict.fromkeys(each.run for each in history))
     drawn = _styles((each.engine for each in history), styles)
 
     def figure(values: Mapping[tuple[str, str], float | None]) -> Figure:
-        # a category each: a date would otherwise become a place on a calendar, and runs of one night one point
+        # a category each: a date would otherwise become a place on a calendar, and runs of one
+        # night one point
         names = [plain(run) for run in runs]
         curves = [_curve(style, names, [values.get((style.name, run)) for run in runs]) for style in drawn]
         return {
@@ -74,20 +81,26 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
 
 
 def ticked_axis(title: str, values: Sequence[float]) -> Figure:
-    """A log axis for values above zero, with ticks at 1, 2 and 5 of every decade; over many decades at 1 alone."""
+    """A log axis for values above zero, with ticks at 1, 2 and 5 of every decade; over many decades
+    at 1 alone.
+    """
     span = max(values, default=1.0) / min(values, default=1.0)
     return {"type": "log", "title": {"text": title}, "tickformat": "~g", "hoverformat": ".3~g", "dtick": "D2" if span < 1e3 else 1}
 
 
 def _decade(values: Sequence[float]) -> Figure:
-    """The range of a log axis, where values are closer than a decade: drawn as large as the page a tenth would look like a step."""
+    """The range of a log axis, where values are closer than a decade: drawn as large as the page a
+    tenth would look like a step.
+    """
     low, high = (math.log10(end(values, default=1.0)) for end in (min, max))
     middle = 0.5 * (low + high)
     return {"range": [middle - 0.5, middle + 0.5]} if high - low < 0.9 else {}
 
 
 def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> Figure:
-    """Work-precision diagram: error against time of each engine, a point for each setting, joined in the order of time."""
+    """Work-precision diagram: error against time of each engine, a point for each setting, joined
+    in the order of time.
+    """
     traces: list[Figure] = []
     for style in _styles((each.engine for each in efforts), styles):
         mine = sorted((each for each in efforts if each.engine == style.name), key=lambda each: each.us_per_sample)
@@ -113,7 +126,9 @@ def _floored(figure: Figure) -> Figure:
 
 
 def _styles(engines: Iterable[str], styles: Mapping[str, Style]) -> list[Style]:
-    """A style for each engine: the page's, or one after those for an engine the page's run did not have."""
+    """A style for each engine: the page's, or one after those for an engine the page's run did not
+    have.
+    """
     drawn: list[Style] = []
     for name in dict.fromkeys(engines):
         further = sum(style.name not in styles for style in drawn)

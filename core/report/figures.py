@@ -1,7 +1,8 @@
 """Figures of the report, as Plotly JSON: outputs against the driver, and each engine's error.
 
-The page's style sheet colours the traces, so that dark mode and print need no second set of figures. Samples at the driver's
-values refer to them by the word "driver"; the page puts the values in.
+The page's style sheet colours the traces, so that dark mode and print need no second set of
+figures. Samples at the driver's values refer to them by the word "driver"; the page puts the values
+in.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ Figure: TypeAlias = dict[str, Any]
 Values: TypeAlias = Sequence[float | None]
 
 MARKERS = 9  # per curve, staggered, so that coincident curves stay tellable
-DIGITS = 10  # one more than is told where a curve is pointed at; engines that agree in these are packed as one
+# one more than is told where a curve is pointed at; engines that agree in these are packed as one
+DIGITS = 10
 THIN = 1 / 2000  # a band narrower than this part of the curve's range is less than a pixel
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito: told apart by colour-blind readers
+# Okabe and Ito: told apart by colour-blind readers
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
 SYMBOLS = ("circle-open", "square-open", "diamond-open", "triangle-up-open", "x-thin-open", "cross-thin-open", "asterisk-open")
 
@@ -62,7 +65,8 @@ def output_figure(
     Args:
         curves: the engines and their outputs; at least one.
         truth: the reference.
-        band: what the engines were compared with, and the tolerance; drawn where it is wide enough to be seen.
+        band: what the engines were compared with, and the tolerance; drawn where it is wide enough
+            to be seen.
     """
     unit, scale = DISPLAY.get(curves[0][1].unit, (curves[0][1].unit, 1.0))
     traces: list[Figure] = []
@@ -106,9 +110,11 @@ def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
 
 
 def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Style, Values, Deviation]], standard: Values) -> Figure:
-    """Absolute error of each engine per sample on a log axis, with the tolerance and the worst sample.
+    """Absolute error of each engine per sample on a log axis, with the tolerance and the worst
+    sample.
 
-    An error of zero has no place on the axis: the page draws it on a labelled floor, `layout.meta.floor`.
+    An error of zero has no place on the axis: the page draws it on a labelled floor,
+    `layout.meta.floor`.
 
     Args:
         unit: of the errors.
@@ -151,7 +157,8 @@ def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Styl
 
 
 def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
-    """A log axis for errors, and its lowest line: the floor, on which the page draws errors of exactly zero.
+    """A log axis for errors, and its lowest line: the floor, on which the page draws errors of
+    exactly zero.
 
     Args:
         low, high: the smallest and the largest value, both above zero.

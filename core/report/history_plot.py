@@ -48,7 +48,8 @@ def page(history: History, *, title: str) -> str:
     environment = Environment(
         loader=FileSystemLoader([_HERE, _LOOK]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    cast("dict[str, Any]", environment.filters).update(number=number, known=known)  # which the macros use
+    # which the macros use
+    cast("dict[str, Any]", environment.filters).update(number=number, known=known)
     return environment.get_template("history.html").render(
         title=title,
         runs=len(history.runs),

@@ -1,4 +1,6 @@
-"""Every case against every engine, a cell each: the largest position, velocity and acceleration error, or why there is none."""
+"""Every case against every engine, a cell each: the largest position, velocity and acceleration
+error, or why there is none.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,8 @@ NOT_ASKED = "–"
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
-    """Print the signs of outputs that have a convention, a row per case and a column per engine, every message, and a count of
-    outcomes.
+    """Print the signs of outputs that have a convention, a row per case and a column per engine,
+    every message, and a count of outcomes.
     """
     console = terminal.console(file)
     print_signs(results.run, console)
@@ -37,7 +39,9 @@ def print_matrix(results: Results, file: TextIO) -> None:
 
 
 def to_markdown(results: Results) -> str:
-    """The same in Markdown: the engines with their versions, and a line for every message but those of what passed."""
+    """The same in Markdown: the engines with their versions, and a line for every message but those
+    of what passed.
+    """
     engines, rows = _laid_out(results)
     versions = {record.engine: record.version for record in results.records if record.version}
     head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]

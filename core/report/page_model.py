@@ -78,7 +78,8 @@ class CaseView:
         account: the degrees of freedom, counted as in the paper and by rank.
         scene: the mechanism to be drawn; None where the results have none.
         trends: error and time over earlier runs; empty where there is no history.
-        precision: error against time at several effort settings, by mode; empty where that was not measured.
+        precision: error against time at several effort settings, by mode; empty where that was not
+            measured.
     """
 
     name: str
@@ -102,7 +103,9 @@ class CaseView:
 
 @dataclass(frozen=True)
 class Material:
-    """What a report is made from: a run, what is known from elsewhere, by case, and further limits, each a title and a sentence."""
+    """What a report is made from: a run, what is known from elsewhere, by case, and further limits,
+    each a title and a sentence.
+    """
 
     results: Results
     history: Mapping[str, Sequence[Past]]
@@ -194,7 +197,9 @@ def _precision(anchor: str, efforts: Sequence[Effort], styles: Mapping[str, Styl
 def _standard(
     deviations: Sequence[Judged], records: Sequence[Record], references: Mapping[str, OutputSeries]
 ) -> OutputSeries | None:
-    """What one motion of one output was judged against: the reference, or the output of the engine named instead."""
+    """What one motion of one output was judged against: the reference, or the output of the engine
+    named instead.
+    """
     if not deviations:
         return None
     output, standard = deviations[0].output, deviations[0].deviation.against

@@ -19,7 +19,9 @@ def complain(lines: Iterable[str]) -> None:
 
 
 def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
-    """Collects records, and tells of them on standard error: one line that changes on a terminal, plain lines elsewhere."""
+    """Collects records, and tells of them on standard error: one line that changes on a terminal,
+    plain lines elsewhere.
+    """
     terminal = sys.stderr.isatty()
 
     def tell(record: Record, done: int, total: int) -> None:
@@ -33,7 +35,9 @@ def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
 
 
 def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
-    """Return what a required engine could not do, and which of the engines that were named are missing."""
+    """Return what a required engine could not do, and which of the engines that were named are
+    missing.
+    """
     lines = [
         f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
         if record.outcome is Outcome.UNAVAILABLE
@@ -50,13 +54,16 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
 
 
 def uncompared(results: Results) -> list[str]:
-    """Return that a run has compared nothing, and why: then no result deviates, and none is right."""
+    """Return that a run has compared nothing, and why: then no result deviates, and none is
+    right.
+    """
     counts = Counter(record.outcome for record in results.records)
     if any(outcome.judged for outcome in counts):
         return []
     if not counts[Outcome.UNJUDGED] and any(outcome.bad for outcome in counts):
         return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
-    if not counts or results.missing:  # it was stopped, or its cases cannot be read, which is said already
+    # it was stopped, or its cases cannot be read, which is said already
+    if not counts or results.missing:
         return []
     found = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
     remedy = "give the case a reference, or run another engine beside the native one"
@@ -64,7 +71,9 @@ def uncompared(results: Results) -> list[str]:
 
 
 def how_to_install(engine: str) -> str:
-    """The command that installs an engine's simulator, whose name is its own up to a hyphen, from kincheck's own metadata."""
+    """The command that installs an engine's simulator, whose name is its own up to a hyphen, from
+    kincheck's own metadata.
+    """
     import importlib.metadata  # rarely needed, and slow
 
     wanted = [

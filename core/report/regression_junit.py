@@ -1,4 +1,6 @@
-"""The report as JUnit XML: one test case per case, engine and output, failed where the run has failed or something regressed."""
+"""The report as JUnit XML: one test case per case, engine and output, failed where the run has
+failed or something regressed.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from ..history.regression.findings import (Finding, Kind, Regressions)
 def to_regression_junit(results: Results, found: Regressions) -> bytes:
     """Write what `to_junit` writes, with a failure for every regression of what had passed.
 
-    What is about a pair and not about one of its outputs (a phase lost, a time) is a test case of its own, named by its kind.
+    What is about a pair and not about one of its outputs (a phase lost, a time) is a test case of
+    its own, named by its kind.
     """
     root = ElementTree.fromstring(to_junit(results))
     tests = {(test.get("classname"), test.get("name")): test for test in root.iter("testcase")}

@@ -1,4 +1,6 @@
-"""What a report says: its headline, its findings in groups, and the versions that changed, the same in every format."""
+"""What a report says: its headline, its findings in groups, and the versions that changed, the same
+in every format.
+"""
 
 from __future__ import annotations
 
@@ -95,7 +97,9 @@ def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
 
 
 def _counted(found: Regressions, kind: Kind) -> int:
-    """How many pairs findings of a kind are about; without those of a case that could not be read, which is one fault."""
+    """How many pairs findings of a kind are about; without those of a case that could not be read,
+    which is one fault.
+    """
     return sum(case not in found.unread for case, _, _ in pairs(found, kind))
 
 
@@ -106,7 +110,9 @@ def _plural(kind: Kind, found: Regressions) -> str:
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
-    """Findings of one kind: a pair once, with the worst of its ratios; cases, then engines, that say the same together."""
+    """Findings of one kind: a pair once, with the worst of its ratios; cases, then engines, that
+    say the same together.
+    """
     by_pair: dict[tuple[str, str, str], list[Finding]] = {}
     for finding in findings:
         by_pair.setdefault((finding.case, finding.engine, finding.mode), []).append(finding)

@@ -33,7 +33,8 @@ def regressions(
 
     Args:
         reason: why there is nothing to compare with, where there is not.
-        missing_is_failure: whether a pair that an earlier run had and this one does not is a regression.
+        missing_is_failure: whether a pair that an earlier run had and this one does not is a
+            regression.
 
     Raises:
         HistoryError: the history cannot be read.

@@ -1,4 +1,6 @@
-"""The report as Markdown, for a pull request, a job's page or a mail, and as one part of the HTML report."""
+"""The report as Markdown, for a pull request, a job's page or a mail, and as one part of the HTML
+report.
+"""
 
 from __future__ import annotations
 

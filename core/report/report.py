@@ -1,4 +1,6 @@
-"""The report of a run: one HTML file that opens offline, the worst engine and its worst sample first."""
+"""The report of a run: one HTML file that opens offline, the worst engine and its worst sample
+first.
+"""
 
 from __future__ import annotations
 
@@ -52,10 +54,12 @@ def write_report(
     """Write the report as one HTML file with all scripts, styles and data inside.
 
     Args:
-        results: a run. Of `results.run`, "cases" may give each case's "source", "driver" (its name, type, point and direction)
-            and "motions" of further drivers by case name; everything else is printed as it is.
+        results: a run. Of `results.run`, "cases" may give each case's "source", "driver" (its name,
+            type, point and direction) and "motions" of further drivers by case name; everything
+            else is printed as it is.
         path: the file to write, in a folder that exists.
-        history: what the engines made of each case in earlier runs and this one, oldest first, by case name.
+        history: what the engines made of each case in earlier runs and this one, oldest first, by
+            case name.
         precision: error against time at several efforts, by case name.
         changes: a section to come first: what changed since another run.
         limits: further limits of the report, each a title and a sentence.
@@ -138,7 +142,9 @@ def _source(name: str) -> str:
 
 
 def packed(text: str) -> str:
-    """Text as base64 of its zlib stream: a third of the size, and nothing in it can end the script element that holds it."""
+    """Text as base64 of its zlib stream: a third of the size, and nothing in it can end the script
+    element that holds it.
+    """
     return base64.b64encode(zlib.compress(text.encode())).decode("ascii")
 
 
@@ -173,7 +179,9 @@ def headline(results: Results) -> str:
 
 
 def _fault(record: Record, tol: float) -> str:
-    """Return what is wrong with a record that fails, one of `FAULTS`; where several are, the first."""
+    """Return what is wrong with a record that fails, one of `FAULTS`; where several are, the
+    first.
+    """
     errors = record.errors.values()
     holds = (
         any(not each.within for each in errors),
@@ -186,7 +194,9 @@ def _fault(record: Record, tol: float) -> str:
 
 
 def _worst_of(record: Record, motion: str | None = None) -> Judged | None:
-    """The deviation of a record, of one motion or any, that is closest to its tolerance or beyond it most."""
+    """The deviation of a record, of one motion or any, that is closest to its tolerance or beyond
+    it most.
+    """
     return worst([each for each in judged([record]) if motion in (None, each.motion)])
 
 

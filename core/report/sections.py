@@ -1,4 +1,6 @@
-"""Benchmarks: figures of the program itself, shown as tables on the terminal, as JSON and as a page."""
+"""Benchmarks: figures of the program itself, shown as tables on the terminal, as JSON and as a
+page.
+"""
 
 from __future__ import annotations
 
@@ -108,11 +110,13 @@ def print_report(report: Report, file: TextIO) -> None:
 def page(report: Report) -> str:
     """The report as one HTML file, in the look of a run's."""
     here = Path(__file__).parent
-    reporting = here.parent / "reporting"  # its style sheet, macros and script, so that there is one of each
+    # its style sheet, macros and script, so that there is one of each
+    reporting = here.parent / "reporting"
     environment = Environment(
         loader=FileSystemLoader([here, reporting]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    cast("dict[str, Any]", environment.filters).update(number=number, known=known)  # which the macros use
+    # which the macros use
+    cast("dict[str, Any]", environment.filters).update(number=number, known=known)
     figures = {diagram.plot.figure: diagram.figure for section in report.sections for diagram in section.diagrams}
     shown: dict[str, str] = {}
     if figures:

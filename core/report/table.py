@@ -21,7 +21,9 @@ LENGTH = "m"
 
 
 def print_table(results: Results, file: TextIO) -> None:
-    """Print the signs of outputs that have a convention, one line per record, every message, and a count of outcomes."""
+    """Print the signs of outputs that have a convention, one line per record, every message, and a
+    count of outcomes.
+    """
     console = terminal.console(file)
     print_signs(results.run, console)
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -67,7 +69,9 @@ def print_messages(results: Results, console: Console) -> None:
 
 
 def truth(record: Record) -> str:
-    """What a record was judged by; the word for more than agreement is kept for truths from elsewhere that were met."""
+    """What a record was judged by; the word for more than agreement is kept for truths from
+    elsewhere that were met.
+    """
     said = "validated" if record.validated else unsound(record)
     return against(record.truth) + (f" ({said})" if said else "")
 
@@ -81,9 +85,11 @@ def _error(record: Record, quantity: str) -> Text:
 
 
 def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
-    """The largest error of a quantity over the outputs, and its output's unit, empty for the metre of the heads.
+    """The largest error of a quantity over the outputs, and its output's unit, empty for the metre
+    of the heads.
 
-    Out of tolerance comes first, then lengths: errors in different units are not to be compared. None where nothing was compared.
+    Out of tolerance comes first, then lengths: errors in different units are not to be compared.
+    None where nothing was compared.
     """
     found: list[tuple[Deviation, str]] = []
     for output, errors in record.errors.items():
@@ -93,7 +99,9 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
 
 
 def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
-    """Messages, and the cases they are about; a missing engine says so once, and a suspected reference in a line of its own."""
+    """Messages, and the cases they are about; a missing engine says so once, and a suspected
+    reference in a line of its own.
+    """
     said: dict[tuple[str, Outcome, str], list[str]] = {}
     for record in results.records:
         if record.message and not results.blames_reference(record):

@@ -1,4 +1,6 @@
-"""Answers for people, as text and tables, and the same for programs, as JSON: commands print the one and write the other."""
+"""Answers for people, as text and tables, and the same for programs, as JSON: commands print the
+one and write the other.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,15 @@ from rich.table import Table
 from ..harness.record import to_json
 from ..case.io.atomic_files import (to_standard_output, write)
 
-# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be broken there.
+# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be
+# broken there.
 LOG_WIDTH = 200
 
 
 class _Console(Console):
-    """One whose reader may go: what is left goes nowhere, and the command on, whose status is that of its results."""
+    """One whose reader may go: what is left goes nowhere, and the command on, whose status is that
+    of its results.
+    """
 
     def on_broken_pipe(self) -> None:
         self.quiet = True
@@ -28,12 +33,16 @@ class _Console(Console):
 
 
 def print_no_more(file: IO[str]) -> None:
-    """Let what is left for a stream go to nowhere: the interpreter would complain of it at its end."""
+    """Let what is left for a stream go to nowhere: the interpreter would complain of it at its
+    end.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), file.fileno())
 
 
 def console(file: TextIO) -> Console:
-    """Where to print text as it is: names may have square brackets or colons, which rich takes for colours and pictures."""
+    """Where to print text as it is: names may have square brackets or colons, which rich takes for
+    colours and pictures.
+    """
     return _Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False, emoji=False)
 
 
@@ -52,7 +61,8 @@ def columns(*heads: str, title: str | None = None) -> Table:
 
 
 def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> None:
-    """Write the answer as JSON to a file, or for "-" to standard output. Before it is printed: who reads that may have gone.
+    """Write the answer as JSON to a file, or for "-" to standard output. Before it is printed: who
+    reads that may have gone.
 
     Raises:
         KincheckError: the file cannot be written.

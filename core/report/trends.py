@@ -1,4 +1,6 @@
-"""Trends of a history as the report draws them: errors and times of each engine on each case, over the runs."""
+"""Trends of a history as the report draws them: errors and times of each engine on each case, over
+the runs.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def run_name(row: RunRow) -> str:
 
 
 def largest_length(entry: Entry, case: str, row: RunRow) -> float | None:
-    """The largest position error of the outputs that are lengths [m]; None where none was compared."""
+    """The largest position error of the outputs that are lengths [m]; None where none was
+    compared.
+    """
     lengths = [
         deviations.position.max_abs
         for name, deviations in entry.errors.items()

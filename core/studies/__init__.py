@@ -1,1 +1,3 @@
-"""Studies: joint checks, tolerance studies, benchmarks, stress tests, diagnosis, and the paper's own figures."""
+"""Studies: joint checks, tolerance studies, benchmarks, stress tests, diagnosis, and the paper's
+own figures.
+"""

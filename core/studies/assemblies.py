@@ -1,4 +1,6 @@
-"""The assemblies of a case at a value of its sweep, and consistent starts in any of them for the simulators."""
+"""The assemblies of a case at a value of its sweep, and consistent starts in any of them for the
+simulators.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ INTENDED = 1e-9
 
 
 class Found(msgspec.Struct, frozen=True):
-    """One assembly in a results file; see `analysis.assembly.assemblies.Assembly`. bodies: r [m] and p by name."""
+    """One assembly in a results file; see `analysis.assembly.assemblies.Assembly`. bodies: r [m]
+    and p by name.
+    """
 
     number: int
     intended: bool
@@ -36,7 +40,9 @@ class Found(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """The assemblies of a case as a file. drivers: their values [m or rad]; ranked_by: what distances are from."""
+    """The assemblies of a case as a file. drivers: their values [m or rad]; ranked_by: what
+    distances are from.
+    """
 
     schema: str
     case: str
@@ -55,7 +61,8 @@ class Survey:
 
     Attributes:
         drivers: their values at which it is assembled, as the sweep has them [m or rad].
-        way: of the bodies from the design to the intended assembly; None where there is none, with the reason.
+        way: of the bodies from the design to the intended assembly; None where there is none, with
+            the reason.
         reason: why the drive does not lead from the design to these values.
     """
 
@@ -69,7 +76,11 @@ class Survey:
     @property
     def ranked_by(self) -> str:
         """What the distances are from."""
-        return "the intended assembly, where the motion leads from the design" if self.way else "the design"
+        return (
+            "the intended assembly, where the motion leads from the design"
+            if self.way
+            else "the design"
+        )
 
     def intended(self, one: Assembly) -> bool:
         """Whether it is the assembly to which the drive leads from the design."""
@@ -99,11 +110,15 @@ def survey(case: Case, at: float | None = None, *, samples: int, seed: int) -> S
     """Look for all assemblies of a case at a value of its sweep; by default the value at design.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, the design does not close, or the value is not finite.
+        SolveError: drivers and degrees of freedom do not match, the design does not close, or the
+            value is not finite.
     """
     mechanism, value = case.mechanism, case.sweep.design if at is None else at
     if not math.isfinite(value):
-        raise SolveError(f"case {case.name!r}: the value {value} is not finite; give a value of {case.sweep.driver!r}")
+        raise SolveError(
+            f"case {case.name!r}: the value {value} is not finite; give a value of"
+            f" {case.sweep.driver!r}"
+        )
     there = replace(case.sweep, values=np.array([value]))
     names = tuple(there.path.motions)
     change = there.path.drive(names, there.path.times)[0, :, 0].tolist()
@@ -114,9 +129,18 @@ def survey(case: Case, at: float | None = None, *, samples: int, seed: int) -> S
         way, reason = None, str(error)
     estimate = {name: (motion.r[-1], motion.p[-1]) for name, motion in way.items()} if way else {}
     moved = dict(zip(names, change, strict=True))
-    found = find_assemblies(mechanism, estimate, moved, samples=samples, seed=seed, spread=None, tol=TOL)
+    found = find_assemblies(
+        mechanism, estimate, moved, samples=samples, seed=seed, spread=None, tol=TOL
+    )
     held = {driver.name: 0.0 for driver in mechanism.drivers}
-    return Survey(case, held | {name: float(v[0]) for name, v in there.moved.items()}, found, way, reason, seed)
+    return Survey(
+        case,
+        held | {name: float(v[0]) for name, v in there.moved.items()},
+        found,
+        way,
+        reason,
+        seed,
+    )
 
 
 def written(found: Survey, write: Writer, number: int) -> Mapping[str, str]:
@@ -128,23 +152,32 @@ def written(found: Survey, write: Writer, number: int) -> Mapping[str, str]:
     case, count = found.case, len(found.assemblies.found)
     if not 1 <= number <= count:
         raise KincheckError(
-            f"case {case.name!r}: there is no assembly {number}; {count} were found: give 1 to {count}, or --samples"
+            f"case {case.name!r}: there is no assembly {number}; {count} were found: give 1 to"
+            f" {count}, or --samples"
         )
     chosen = found.assemblies.found[number - 1]
     if found.way is not None and found.intended(chosen):
         return write(case.mechanism, found.way, found.drivers)
     related = [coupler.name for coupler in case.mechanism.couplers]
-    related += [each.name for each in case.mechanism.joints if isinstance(each, AxialJoint) and each.relations]
-    if related:  # their coordinates count whole turns, which poses do not tell, and no motion leads there from the design
+    related += [
+        each.name
+        for each in case.mechanism.joints
+        if isinstance(each, AxialJoint) and each.relations
+    ]
+    # their coordinates count whole turns, which poses do not tell, and no motion leads there from
+    # the design
+    if related:
         raise KincheckError(
-            f"case {case.name!r}: assembly {number} cannot be exported: {', '.join(map(repr, related))} relates turns, and how "
-            "many whole turns lead there is not known; the intended assembly can be"
+            f"case {case.name!r}: assembly {number} cannot be exported:"
+            f" {', '.join(map(repr, related))} relates turns, and how many whole turns lead there"
+            " is not known; the intended assembly can be"
         )
     return write(case.mechanism, _straight(case, chosen), found.drivers)
 
 
 def _straight(case: Case, chosen: Assembly) -> dict[str, BodyMotion]:
-    """A way from the design to an assembly on which each body turns about one axis; the loops are open in between.
+    """A way from the design to an assembly on which each body turns about one axis; the loops are
+    open in between.
 
     Writers take from it how far joints have turned, and for that only its end has to close.
     """
@@ -157,10 +190,14 @@ def _straight(case: Case, chosen: Assembly) -> dict[str, BodyMotion]:
         end = p if p @ start >= 0.0 else -p  # the short way round
         angle = 2.0 * math.asin(min(1.0, 0.5 * float(np.linalg.norm(end - start))))
         if angle > 0.0:
-            turned = (np.sin((1.0 - part) * angle) * start + np.sin(part * angle) * end) / math.sin(angle)
+            turned = (np.sin((1.0 - part) * angle) * start + np.sin(part * angle) * end) / math.sin(
+                angle
+            )
         else:
             turned = np.repeat(start[None], steps + 1, axis=0)
         turned[-1] = end
-        found[body.name] = BodyMotion(np.array(body.origin) + part * (r - np.array(body.origin)), turned, None, None)
+        found[body.name] = BodyMotion(
+            np.array(body.origin) + part * (r - np.array(body.origin)), turned, None, None
+        )
         found[body.name].r[-1] = r
     return found

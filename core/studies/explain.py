@@ -1,4 +1,6 @@
-"""What the native engine computes for a case, and what it leaves out because the case does not need it."""
+"""What the native engine computes for a case, and what it leaves out because the case does not need
+it.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ ORDERS = ("positions only", "and velocities", "and accelerations")
 
 
 def explain(case: Case) -> list[str]:
-    """Lines to read: unknowns, rows, drivers and points, used and left out, and the operations of every program.
+    """Lines to read: unknowns, rows, drivers and points, used and left out, and the operations of
+    every program.
 
     Raises:
         SolveError: the mechanism cannot be solved as described.
@@ -27,12 +30,28 @@ def explain(case: Case) -> list[str]:
     fixed = [body.name for body in mechanism.bodies if body.fixed]
     grounded = [joint.name for joint in mechanism.grounded]
     lines = [
-        f"{case.name}: {account.moving_coordinates} unknowns for {_names([body.name for body in mechanism.moving])}",
+        (
+            f"{case.name}: {account.moving_coordinates} unknowns for"
+            f" {_names([body.name for body in mechanism.moving])}"
+        ),
         f"  fixed, in no program: {_names(fixed)}",
-        *([f"  joints between fixed bodies, which hold at the design: left out: {_names(grounded)}"] if grounded else []),
-        f"  rows solved {len(models[-1].selection.chosen)}, redundant and only checked: {_names(account.redundant_rows)}",
+        *(
+            [
+                "  joints between fixed bodies, which hold at the design: left out:"
+                f" {_names(grounded)}"
+            ]
+            if grounded
+            else []
+        ),
+        (
+            f"  rows solved {len(models[-1].selection.chosen)}, redundant and only checked:"
+            f" {_names(account.redundant_rows)}"
+        ),
         f"  drivers moving: {_names(moving)}; held, constants: {_names(held)}",
-        f"  points computed: {_names(case.points)}; not read by an output, not computed: {_names(unread)}",
+        (
+            f"  points computed: {_names(case.points)}; not read by an output, not computed:"
+            f" {_names(unread)}"
+        ),
     ]
     lines += [f"  {name:18} {_flops(model)}" for name, model in zip(ORDERS, models, strict=True)]
     return lines
@@ -41,7 +60,10 @@ def explain(case: Case) -> list[str]:
 def _flops(model: Model) -> str:
     """Operations of one sample: of each Newton iteration, and once at the end."""
     newton, outputs = (model.programs[name].flops for name in ("newton", "outputs"))
-    return f"{newton} operations an iteration, outputs {outputs} once: {newton + outputs} with one iteration"
+    return (
+        f"{newton} operations an iteration, outputs {outputs} once: {newton + outputs} with one"
+        " iteration"
+    )
 
 
 def _names(names: Sequence[str]) -> str:

@@ -1,7 +1,9 @@
-"""Proving a case: every output at every sample, to as many digits as are asked for, and how far the native engine is from it.
+"""Proving a case: every output at every sample, to as many digits as are asked for, and how far the
+native engine is from it.
 
-The native solution of each sample is proved to lie near exactly one solution of the case's equations (`analysis.proofs.enclosure`).
-That is a statement about the equations that kincheck has made of the description: as a truth it is an in_house_oracle.
+The native solution of each sample is proved to lie near exactly one solution of the case's
+equations (`analysis.proofs.enclosure`). That is a statement about the equations that kincheck has
+made of the description: as a truth it is an in_house_oracle.
 """
 
 from __future__ import annotations
@@ -26,19 +28,23 @@ from ..trajectory import Array
 from ..version import VERSION
 
 NUMBERS: Mapping[str, Reading] = {"double": as_double, "decimal": as_decimal}
-"""How the numbers of a case are understood: as the doubles that engines are given, or as the decimals that print them."""
+"""How the numbers of a case are understood: as the doubles that engines are given, or as the
+decimals that print them.
+"""
 
-# Bits beyond the digits asked for: Newton's iteration ends 40 above the precision, the rest is for poses that are nearly singular.
+# Bits beyond the digits asked for: Newton's iteration ends 40 above the precision, the rest is for
+# poses that are nearly singular.
 GUARD_BITS = 100
 # Digits printed beyond those asked for, so that printing does not use up the bound.
 SPARE_DIGITS = 2
 
 NOTE = (
-    "Krawczyk's test in ball arithmetic: the equations `rows`, or all but those that a sample has `left_out`, have exactly one "
-    "solution in the box of radius `alone` around it, the native pose is in that box, and all printed numbers are within "
-    "10^-digits of those of the solution. The numbers of the mechanism and the swept values are taken exactly as `numbers` says, "
-    "directions and lengths made of them in ball arithmetic. Motions of further drivers, directions of outputs and the pi in the "
-    "lead of a screw are their doubles."
+    "Krawczyk's test in ball arithmetic: the equations `rows`, or all but those that a sample has"
+    " `left_out`, have exactly one solution in the box of radius `alone` around it, the native pose"
+    " is in that box, and all printed numbers are within 10^-digits of those of the solution. The"
+    " numbers of the mechanism and the swept values are taken exactly as `numbers` says, directions"
+    " and lengths made of them in ball arithmetic. Motions of further drivers, directions of"
+    " outputs and the pi in the lead of a screw are their doubles."
 )
 
 Column = Sequence[Ball | None]
@@ -47,12 +53,13 @@ Column = Sequence[Ball | None]
 
 @dataclass(frozen=True)
 class NativeError:
-    """How far the native engine is from a proved output: position, velocity and acceleration, the largest over the samples.
+    """How far the native engine is from a proved output: position, velocity and acceleration, the
+    largest over the samples.
 
     Attributes:
         largest: [SI]; None where there is no such derivative.
-        ulps: the same in units in the last place of the largest value that any output of that unit takes: an output may itself be
-            zero throughout, by symmetry.
+        ulps: the same in units in the last place of the largest value that any output of that unit
+            takes: an output may itself be zero throughout, by symmetry.
     """
 
     output: str
@@ -61,7 +68,9 @@ class NativeError:
     ulps: Sequence[float | None]
 
 
-def prove_case(case: Case, *, digits: int, numbers: str, tol: float) -> tuple[Reference, list[NativeError]]:
+def prove_case(
+    case: Case, *, digits: int, numbers: str, tol: float
+) -> tuple[Reference, list[NativeError]]:
     """Prove the samples of a case, and measure the native engine by them.
 
     Args:
@@ -74,7 +83,15 @@ def prove_case(case: Case, *, digits: int, numbers: str, tol: float) -> tuple[Re
         KincheckError: python-flint is not installed.
     """
     bits = math.ceil(digits * math.log2(10.0)) + GUARD_BITS
-    found = prove(case.mechanism, case.sweep.path, case.points, _drives(case, numbers), NUMBERS[numbers], bits, tol)
+    found = prove(
+        case.mechanism,
+        case.sweep.path,
+        case.points,
+        _drives(case, numbers),
+        NUMBERS[numbers],
+        bits,
+        tol,
+    )
     with precision(bits):
         values: dict[str, Sequence[Column]] = {}
         reasons: dict[str, str] = {}
@@ -83,9 +100,14 @@ def prove_case(case: Case, *, digits: int, numbers: str, tol: float) -> tuple[Re
                 values[output.name] = _values(case, output, found, numbers)
             except (TypeError, AttributeError) as error:
                 reasons[output.name] = f"computes what balls cannot: {error}"
-        samples = [_sample(each, k, values, digits, found.others.get(k)) for k, each in enumerate(found.samples)]
+        samples = [
+            _sample(each, k, values, digits, found.others.get(k))
+            for k, each in enumerate(found.samples)
+        ]
         outputs = {
-            output.name: _series(output, values.get(output.name), reasons.get(output.name), samples, digits)
+            output.name: _series(
+                output, values.get(output.name), reasons.get(output.name), samples, digits
+            )
             for output in case.outputs
         }
         errors = _native_errors(case, found, values)
@@ -107,16 +129,22 @@ def prove_case(case: Case, *, digits: int, numbers: str, tol: float) -> tuple[Re
 
 
 def _drives(case: Case, numbers: str) -> Drives:
-    """What the moving drivers do at the samples; the swept one exactly, others by the doubles that their motions give."""
+    """What the moving drivers do at the samples; the swept one exactly, others by the doubles that
+    their motions give.
+    """
     path, sweep, reading = case.sweep.path, case.sweep, NUMBERS[numbers]
     table = path.drive([*path.motions], path.times)
     drives: dict[str, Sequence[tuple[Fraction, Fraction, Fraction]]] = {
-        name: [(Fraction(c), Fraction(c_t), Fraction(c_tt)) for c, c_t, c_tt in table[:, k].T.tolist()]
+        name: [
+            (Fraction(c), Fraction(c_t), Fraction(c_tt)) for c, c_t, c_tt in table[:, k].T.tolist()
+        ]
         for k, name in enumerate(path.motions)
     }
     if sweep.driver in drives:
         design, rate = reading(sweep.design), reading(sweep.rate)
-        drives[sweep.driver] = [(value - design, rate, Fraction(0)) for value in _grid(sweep.values, numbers)]
+        drives[sweep.driver] = [
+            (value - design, rate, Fraction(0)) for value in _grid(sweep.values, numbers)
+        ]
     return drives
 
 
@@ -131,7 +159,9 @@ def _grid(values: Array, numbers: str) -> list[Fraction]:
 
 
 def _values(case: Case, output: Quantity, found: Proofs, numbers: str) -> Sequence[Column]:
-    """Position, velocity and acceleration of an output at the samples: its own formula, over jets of balls."""
+    """Position, velocity and acceleration of an output at the samples: its own formula, over jets
+    of balls.
+    """
     reading, still = NUMBERS[numbers], Exact.of(Fraction(0))
     proved = [k for k, each in enumerate(found.samples) if isinstance(each, Enclosure)]
     at: dict[str, Vec3] = {}
@@ -139,14 +169,26 @@ def _values(case: Case, output: Quantity, found: Proofs, numbers: str) -> Sequen
     for name in output.points:
         position = [Exact.of(reading(x)) for x in case.mechanism.point(name).position]
         motions = [each.points[name] for each in found.samples if isinstance(each, Enclosure)]
-        moved = [[[Exact(motion[order][axis]) for motion in motions] for order in range(3)] for axis in range(3)]
-        at[name] = Vec3(*(_jet([start + x for x in xs], v, a) for start, (xs, v, a) in zip(position, moved, strict=True)))
+        moved = [
+            [[Exact(motion[order][axis]) for motion in motions] for order in range(3)]
+            for axis in range(3)
+        ]
+        at[name] = Vec3(
+            *(
+                _jet([start + x for x in xs], v, a)
+                for start, (xs, v, a) in zip(position, moved, strict=True)
+            )
+        )
         design[name] = Vec3(*(_jet([x], [still], [still]) for x in position))
     columns: list[list[Ball | None]] = [[None] * len(found.samples) for _ in range(3)]
     if proved:
         jet = output.of(at, design)
         for column, values in zip(columns, (jet.x, jet.v, jet.a), strict=True):
-            for k, value in zip(proved, np.broadcast_to(np.asarray(values, dtype=object), (len(proved),)), strict=True):
+            for k, value in zip(
+                proved,
+                np.broadcast_to(np.asarray(values, dtype=object), (len(proved),)),
+                strict=True,
+            ):
                 ball = value.ball if isinstance(value, Exact) else flint().arb(float(value))
                 column[k] = ball if ball.is_finite() else None
     return columns
@@ -158,16 +200,31 @@ def _jet(*columns: Sequence[Exact]) -> Jet:
 
 
 def _sample(
-    found: Enclosure | UnprovedError, k: int, values: Mapping[str, Sequence[Column]], digits: int, others: Sequence[str] | None
+    found: Enclosure | UnprovedError,
+    k: int,
+    values: Mapping[str, Sequence[Column]],
+    digits: int,
+    others: Sequence[str] | None,
 ) -> Sample:
     """The proof, unless what it says of an output is not as sharp as was asked for."""
     if isinstance(found, UnprovedError):
         return Sample(proved=False, reason=str(found))
-    balls = {name: ball for name, columns in values.items() for column in columns if (ball := column[k]) is not None}
+    balls = {
+        name: ball
+        for name, columns in values.items()
+        for column in columns
+        if (ball := column[k]) is not None
+    }
     for name, ball in balls.items():
         if not ball.rad() < flint().arb(10) ** -(digits + SPARE_DIGITS):
             width = float(ball.rad())
-            return Sample(proved=False, reason=f"{name} is enclosed to {width:.2g} only: nearly singular pose; ask for more digits")
+            return Sample(
+                proved=False,
+                reason=(
+                    f"{name} is enclosed to {width:.2g} only: nearly singular pose; ask for more"
+                    " digits"
+                ),
+            )
     return Sample(
         proved=True,
         alone=found.alone,
@@ -180,14 +237,24 @@ def _sample(
 
 
 def _series(
-    output: Quantity, values: Sequence[Column] | None, reason: str | None, samples: Sequence[Sample], digits: int
+    output: Quantity,
+    values: Sequence[Column] | None,
+    reason: str | None,
+    samples: Sequence[Sample],
+    digits: int,
 ) -> ProvedSeries:
     printed: list[list[str | None]] = []
     radii: list[float | None] = []
     for column in values or [[None] * len(samples)] * 3:
-        known = [ball if sample.proved else None for ball, sample in zip(column, samples, strict=True)]
+        known = [
+            ball if sample.proved else None for ball, sample in zip(column, samples, strict=True)
+        ]
         texts = [None if ball is None else _printed(ball, digits) for ball in known]
-        bounds = [_upper(ball - flint().arb(text)) for ball, text in zip(known, texts, strict=True) if ball is not None]
+        bounds = [
+            _upper(ball - flint().arb(text))
+            for ball, text in zip(known, texts, strict=True)
+            if ball is not None
+        ]
         printed.append(texts)
         radii.append(max(bounds, default=None))
     if reason is None and not any(text for texts in printed for text in texts):
@@ -210,12 +277,17 @@ def _printed(ball: Ball, digits: int) -> str:
     return ball.mid().str(digits + SPARE_DIGITS + whole, radius=False)
 
 
-def _native_errors(case: Case, found: Proofs, values: Mapping[str, Sequence[Column]]) -> list[NativeError]:
+def _native_errors(
+    case: Case, found: Proofs, values: Mapping[str, Sequence[Column]]
+) -> list[NativeError]:
     outputs = [output for output in case.outputs if output.name in values]
     sizes: dict[tuple[str, int], float] = {}
     for output in outputs:
         for order, column in enumerate(values[output.name]):
-            known = [sizes.get((output.unit, order), 0.0), *(_upper(ball) for ball in column if ball is not None)]
+            known = [
+                sizes.get((output.unit, order), 0.0),
+                *(_upper(ball) for ball in column if ball is not None),
+            ]
             sizes[output.unit, order] = max(known)
     errors: list[NativeError] = []
     for output in outputs:
@@ -225,7 +297,11 @@ def _native_errors(case: Case, found: Proofs, values: Mapping[str, Sequence[Colu
         for order, given in enumerate((native.position, native.velocity, native.acceleration)):
             numbers: list[float] = [] if given is None else given.tolist()
             pairs = zip(numbers, values[output.name][order], strict=given is not None)
-            off = [_upper(flint().arb(x) - ball) for x, ball in pairs if ball is not None and math.isfinite(x)]
+            off = [
+                _upper(flint().arb(x) - ball)
+                for x, ball in pairs
+                if ball is not None and math.isfinite(x)
+            ]
             size = sizes[output.unit, order]
             largest.append(max(off, default=None))
             ulps.append(max(off) / float(np.spacing(size)) if off and size > 0.0 else None)

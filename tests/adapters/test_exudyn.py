@@ -1,4 +1,6 @@
-"""Exudyn's adapter against closed forms, a published strut solved elsewhere, and differences of its own positions."""
+"""Exudyn's adapter against closed forms, a published strut solved elsewhere, and differences of its
+own positions.
+"""
 
 import importlib
 import math
@@ -16,15 +18,24 @@ from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 pytest.importorskip("exudyn")
 
 TOL = 1e-12
-# Positions are held to 1e-14: round-off 1e-16 times the condition of these mechanisms, about 25. Velocities have ten times
-# that; accelerations rest on differences of the Jacobian (see DIFFERENCE) and have 1e-12 times the speed squared.
+# Positions are held to 1e-14: round-off 1e-16 times the condition of these mechanisms, about 25.
+# Velocities have ten times that; accelerations rest on differences of the Jacobian (see DIFFERENCE)
+# and have 1e-12 times the speed squared.
 FULL_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 def case_of(bodies, joints, points, drivers, values, rate=1.0, design=0.0):
-    """A case that sweeps the first driver and asks for all points; points: name -> (body, position)."""
+    """A case that sweeps the first driver and asks for all points; points: name -> (body,
+    position).
+    """
     places = [Point(name, body, tuple(position)) for name, (body, position) in points.items()]
-    mechanism = Mechanism("m", [body if isinstance(body, Body) else Body(body) for body in bodies], joints, places, drivers)
+    mechanism = Mechanism(
+        "m",
+        [body if isinstance(body, Body) else Body(body) for body in bodies],
+        joints,
+        places,
+        drivers,
+    )
     outputs = tuple(Output(name, name, (1.0, 0.0, 0.0), False, 1e-9, 0.0, "") for name in points)
     sweep = Sweep(drivers[0].name, np.asarray(values, dtype=float), rate, design)
     return Case("m", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
@@ -58,13 +69,23 @@ def assert_consistent(motion, dt):
     """Velocity and acceleration against eighth-order differences over uniform samples."""
     weights = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
     n = len(motion.position)
-    for values, derivative in ((motion.position, motion.velocity), (motion.velocity, motion.acceleration)):
-        found = sum(w * (values[4 + k : n - 4 + k] - values[4 - k : n - 4 - k]) for k, w in enumerate(weights, 1)) / dt
+    for values, derivative in (
+        (motion.position, motion.velocity),
+        (motion.velocity, motion.acceleration),
+    ):
+        found = (
+            sum(
+                w * (values[4 + k : n - 4 + k] - values[4 - k : n - 4 - k])
+                for k, w in enumerate(weights, 1)
+            )
+            / dt
+        )
         # differences: round-off 1e-16 / dt of values about 1, times the mechanism's amplification
         assert np.abs(found - derivative[4:-4]).max() <= 1e-10 * (1.0 + np.abs(derivative).max())
 
 
-# The strut of SAE 943745, Tables 4 and 5: stroke, x, y, vx, vy, ax, ay of the wheel centre, solved in 40 digits in two ways.
+# The strut of SAE 943745, Tables 4 and 5: stroke, x, y, vx, vy, ax, ay of the wheel centre, solved
+# in 40 digits in two ways.
 STRUT = """
 -0.08 0.97842168471408306 0.70460211685198040 -0.054481022483195316 0.24805044455095479 0.29813886646731178 -3.1424653530748702
 0.0 0.975 0.715 -0.031003511378626193 0.017471831311365218 0.30211302579786471 -2.7188261285528537
@@ -75,7 +96,12 @@ ROD = ((1.115, 0.665, 0.118), (1.14, 0.355, 0.1455))
 
 
 def strut(values, direction=(0.0, 0.0, 1.0), reverse=False, rate=1.0, design=0.0, rod_length=None):
-    bodies = [Body("rack", (1.14, 0.0, 0.1455), fixed=True), "lca", Body("knuckle", (0.975, 0.715, 0.101)), "strut"]
+    bodies = [
+        Body("rack", (1.14, 0.0, 0.1455), fixed=True),
+        "lca",
+        Body("knuckle", (0.975, 0.715, 0.101)),
+        "strut",
+    ]
     joints = [
         Revolute("pivot", "ground", "lca", (1.17, 0.353, 0.005), (1.0, 0.0, 0.0)),
         Spherical("ball", "lca", "knuckle", (0.9676, 0.66, -0.01)),
@@ -83,7 +109,11 @@ def strut(values, direction=(0.0, 0.0, 1.0), reverse=False, rate=1.0, design=0.0
         Spherical("top", "strut", "ground", (1.0, 0.55, 0.6)),
         Distance("rod", "knuckle", "rack", ROD, rod_length),
     ]
-    points = {"wheel": ("knuckle", (0.975, 0.715, 0.101)), "rod_end": ("knuckle", ROD[0]), "rack": ("rack", (1.14, 0.0, 0.1))}
+    points = {
+        "wheel": ("knuckle", (0.975, 0.715, 0.101)),
+        "rod_end": ("knuckle", ROD[0]),
+        "rack": ("rack", (1.14, 0.0, 0.1)),
+    }
     driver = PointCoordinate("stroke", "wheel", direction)
     return case_of(bodies, turned(joints, reverse), points, [driver], values, rate, design)
 
@@ -107,7 +137,9 @@ def test_strut_agrees_with_a_solution_in_40_digits(reverse, rate):
 def test_any_direction_can_be_driven():
     direction, values = np.array([0.2, -0.3, 2.0]), np.linspace(-0.05, 0.05, 201)
     points = solved(strut(0.7 + values, tuple(direction), rate=3.0, design=0.7))
-    along = (points["wheel"].position - [0.975, 0.715, 0.101]) @ direction / np.linalg.norm(direction)
+    along = (
+        (points["wheel"].position - [0.975, 0.715, 0.101]) @ direction / np.linalg.norm(direction)
+    )
     assert np.abs(along - values).max() <= 1e-14
     for motion in points.values():
         assert_consistent(motion, (values[1] - values[0]) / 3.0)
@@ -125,7 +157,11 @@ def test_unreachable_stroke_ends_with_a_message():
 
 
 def test_solving_again_gives_the_same_numbers_even_after_a_failure():
-    engine, case, far = Exudyn(), strut(np.linspace(-0.08, 0.08, 17)), strut(np.linspace(0.0, 0.6, 61))
+    engine, case, far = (
+        Exudyn(),
+        strut(np.linspace(-0.08, 0.08, 17)),
+        strut(np.linspace(0.0, 0.6, 61)),
+    )
     model = engine.build(case)
     first = engine.solve(model, case, TOL)
     assert not engine.solve(model, far, TOL).solved.all()
@@ -136,7 +172,9 @@ def test_solving_again_gives_the_same_numbers_even_after_a_failure():
 
 @pytest.mark.parametrize("reverse", [False, True])
 def test_tilted_fourbar_of_four_revolutes_over_a_turn(reverse):
-    """Crank 0.3, coupler 0.9, rocker 0.6 on a base of 1; C is where the circles about B and D meet."""
+    """Crank 0.3, coupler 0.9, rocker 0.6 on a base of 1; C is where the circles about B and D
+    meet.
+    """
     R, start = tilt(), 0.3
 
     def pins(angle):
@@ -156,7 +194,13 @@ def test_tilted_fourbar_of_four_revolutes_over_a_turn(reverse):
     ]
     points = {"B": ("crank", B), "C": ("coupler", C), "C2": ("rocker", C)}
     sign = -1.0 if reverse else 1.0
-    case = case_of(["crank", "coupler", "rocker"], turned(joints, reverse), points, [JointAngle("t", "A")], sign * FULL_TURN)
+    case = case_of(
+        ["crank", "coupler", "rocker"],
+        turned(joints, reverse),
+        points,
+        [JointAngle("t", "A")],
+        sign * FULL_TURN,
+    )
     found = solved(case)
     for name, P in zip(points, [*pins(start + FULL_TURN), pins(start + FULL_TURN)[1]], strict=True):
         assert np.abs(found[name].position - P).max() <= 1e-14
@@ -178,7 +222,9 @@ def test_rssr_over_a_turn():
         Revolute("D", "ground", "rocker", tuple(axis_x), (1.0, 0.0, 0.0)),
         Distance("rod", "crank", "rocker", (tuple(B[0]), tuple(C0))),
     ]
-    case = case_of(["crank", "rocker"], joints, {"C": ("rocker", C0)}, [JointAngle("t", "A")], FULL_TURN)
+    case = case_of(
+        ["crank", "rocker"], joints, {"C": ("rocker", C0)}, [JointAngle("t", "A")], FULL_TURN
+    )
     assert np.abs(solved(case)["C"].position - C).max() <= 1e-14
 
 
@@ -186,27 +232,45 @@ def test_rssr_over_a_turn():
 def test_angle_driven_two_and_a_half_turns(reverse):
     rate, values = 6.0, np.linspace(-np.pi, 5.0 * np.pi, 61)
     joints = turned([Revolute("A", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))], reverse)
-    P = solved(case_of(["arm"], joints, {"P": ("arm", (1.0, 0.0, 0.5))}, [JointAngle("t", "A")], values, rate))["P"]
+    P = solved(
+        case_of(
+            ["arm"], joints, {"P": ("arm", (1.0, 0.0, 0.5))}, [JointAngle("t", "A")], values, rate
+        )
+    )["P"]
     t, w, zero = (-values, -rate, 0.0 * values) if reverse else (values, rate, 0.0 * values)
     assert np.abs(P.position - np.stack([np.cos(t), np.sin(t), zero + 0.5], axis=1)).max() <= 1e-14
     assert np.abs(P.velocity - w * np.stack([-np.sin(t), np.cos(t), zero], axis=1)).max() <= 1e-13
-    assert np.abs(P.acceleration + w**2 * np.stack([np.cos(t), np.sin(t), zero], axis=1)).max() <= 1e-10
+    assert (
+        np.abs(P.acceleration + w**2 * np.stack([np.cos(t), np.sin(t), zero], axis=1)).max()
+        <= 1e-10
+    )
 
 
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize("rounding", [0.0, 8e-3])
 def test_universal_joint_turns_as_hooke_found(reverse, rounding):
-    """Shaft 1 along x, shaft 2 at angle b to it; the cross holds the angle of its arms, rounded or not."""
+    """Shaft 1 along x, shaft 2 at angle b to it; the cross holds the angle of its arms, rounded or
+    not.
+    """
     b, values = 0.6, np.linspace(0.0, 2.0 * np.pi, 721)
     first, second = np.array([0.0, 0.0, 1.0]), np.array([-math.sin(b), math.cos(b), rounding])
     joints = [
         Revolute("in", "ground", "driving", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         Revolute("out", "ground", "driven", (0.0, 0.0, 0.0), (math.cos(b), math.sin(b), 0.0)),
-        *turned([Universal("cross", "driving", "driven", (0.0, 0.0, 0.0), (tuple(first), tuple(second)))], reverse),
+        *turned(
+            [
+                Universal(
+                    "cross", "driving", "driven", (0.0, 0.0, 0.0), (tuple(first), tuple(second))
+                )
+            ],
+            reverse,
+        ),
     ]
     tip = second / np.linalg.norm(second)
     points = {"first": ("driving", first), "second": ("driven", tip)}
-    found = solved(case_of(["driving", "driven"], joints, points, [JointAngle("t", "in")], values, 6.0))
+    found = solved(
+        case_of(["driving", "driven"], joints, points, [JointAngle("t", "in")], values, 6.0)
+    )
     cosine = (found["first"].position * found["second"].position).sum(axis=1)
     assert np.abs(cosine - tip @ first).max() <= 1e-14
     for motion in found.values():
@@ -219,7 +283,9 @@ def test_universal_joint_turns_as_hooke_found(reverse, rounding):
 
 @pytest.mark.parametrize("reverse", [False, True])
 def test_displacement_of_a_cylinder_that_turns(reverse):
-    """An arm on a hinge at the origin, pushed by a cylinder hinged at D: the law of cosines gives the arm's angle."""
+    """An arm on a hinge at the origin, pushed by a cylinder hinged at D: the law of cosines gives
+    the arm's angle.
+    """
     D, arm, start = np.array([0.6, -0.2, 0.0]), 0.5, 0.9
     tip = arm * np.array([math.cos(start), math.sin(start), 0.0])
     length, base = float(np.linalg.norm(tip - D)), float(np.linalg.norm(D))
@@ -230,10 +296,17 @@ def test_displacement_of_a_cylinder_that_turns(reverse):
         Spherical("pin", "rod", "arm", tuple(tip)),
     ]
     values, rate, sign = np.linspace(-0.1, 0.1, 201), 2.0, -1.0 if reverse else 1.0
-    bodies, points = ["arm", "cylinder", "rod"], {"tip": ("rod", tip), "away": ("rod", (0.1, 0.2, 0.3))}
+    bodies, points = (
+        ["arm", "cylinder", "rod"],
+        {"tip": ("rod", tip), "away": ("rod", (0.1, 0.2, 0.3))},
+    )
     drivers = [JointDisplacement("push", "piston")]
-    found = solved(case_of(bodies, turned(joints, reverse), points, drivers, sign * values, sign * rate))
-    angle = np.arccos((arm**2 + base**2 - (length + values) ** 2) / (2.0 * arm * base)) + math.atan2(D[1], D[0])
+    found = solved(
+        case_of(bodies, turned(joints, reverse), points, drivers, sign * values, sign * rate)
+    )
+    angle = np.arccos(
+        (arm**2 + base**2 - (length + values) ** 2) / (2.0 * arm * base)
+    ) + math.atan2(D[1], D[0])
     path = arm * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     assert np.abs(found["tip"].position - path).max() <= 1e-14
     for motion in found.values():
@@ -243,7 +316,9 @@ def test_displacement_of_a_cylinder_that_turns(reverse):
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize("point", [None, (0.2, 0.5, 0.1)])
 def test_fixed_joint_and_a_driver_that_holds(reverse, point):
-    """Two arms in a row; the second angle is held, so a plate fixed to the second arm circles the first hinge."""
+    """Two arms in a row; the second angle is held, so a plate fixed to the second arm circles the
+    first hinge.
+    """
     axis = tuple(tilt()[:, 2])
     arms = [
         Revolute("first", "ground", "arm", (0.0, 0.0, 0.0), axis),
@@ -252,10 +327,16 @@ def test_fixed_joint_and_a_driver_that_holds(reverse, point):
     ]
     P, values = np.array([0.7, 0.2, 0.4]), np.linspace(-3.0, 3.0, 401)
     drivers = [JointAngle("sweep", "first"), JointAngle("hold", "second")]
-    bodies = [Body("arm"), Body("forearm", (0.1, 0.2, 0.3)), Body("plate", (0.7, 0.0, 0.1), (0.5, 0.5, -0.5, 0.5))]
+    bodies = [
+        Body("arm"),
+        Body("forearm", (0.1, 0.2, 0.3)),
+        Body("plate", (0.7, 0.0, 0.1), (0.5, 0.5, -0.5, 0.5)),
+    ]
     motion = solved(case_of(bodies, arms, {"P": ("plate", P)}, drivers, values, 2.0))["P"]
     along = axis @ P * np.array(axis)
-    circle = along + np.outer(np.cos(values), P - along) + np.outer(np.sin(values), np.cross(axis, P))
+    circle = (
+        along + np.outer(np.cos(values), P - along) + np.outer(np.sin(values), np.cross(axis, P))
+    )
     assert np.abs(motion.position - circle).max() <= 1e-14
     assert np.abs(motion.velocity - 2.0 * np.cross(axis, circle)).max() <= 1e-13
     assert np.abs(motion.acceleration + 4.0 * (circle - along)).max() <= 1e-11
@@ -268,7 +349,8 @@ def test_rod_of_another_length_than_at_design():
 
 def test_nothing_is_printed_and_no_file_is_written(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert not solve(strut(np.linspace(0.0, 0.6, 61))).solved.all()  # the failure that Exudyn is loudest about
+    # the failure that Exudyn is loudest about
+    assert not solve(strut(np.linspace(0.0, 0.6, 61))).solved.all()
     assert capfd.readouterr() == ("", "")
     assert list(Path(tmp_path).iterdir()) == []
 
@@ -285,8 +367,13 @@ class Wobble(Driver):
 def test_unknown_joints_and_drivers_are_unsupported_by_name():
     case = strut([0.0])
     ratchet = Ratchet("pawl", "ground", "knuckle", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    for change, who in (({"joints": [ratchet]}, "'pawl'"), ({"drivers": [Wobble("shaker")]}, "'shaker' (wobble)")):
-        assert who in (Exudyn().unsupported(replace(case, mechanism=replace(case.mechanism, **change))) or "")
+    for change, who in (
+        ({"joints": [ratchet]}, "'pawl'"),
+        ({"drivers": [Wobble("shaker")]}, "'shaker' (wobble)"),
+    ):
+        assert who in (
+            Exudyn().unsupported(replace(case, mechanism=replace(case.mechanism, **change))) or ""
+        )
 
 
 @pytest.mark.parametrize("error", [ImportError, RuntimeError, OSError])

@@ -1,4 +1,6 @@
-"""Every joint in Exudyn against the native engine in a closed loop; threads, gears and racks against closed forms over turns."""
+"""Every joint in Exudyn against the native engine in a closed loop; threads, gears and racks
+against closed forms over turns.
+"""
 
 import math
 from dataclasses import replace
@@ -7,7 +9,17 @@ import numpy as np
 import pytest
 from kincheck.adapters.exudyn.exudyn import Exudyn
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.joints import ConstantVelocity, Cylindrical, Distance, Gear, Joint, RackPinion, Revolute, Screw, Translational
+from kincheck.core.joints import (
+    ConstantVelocity,
+    Cylindrical,
+    Distance,
+    Gear,
+    Joint,
+    RackPinion,
+    Revolute,
+    Screw,
+    Translational,
+)
 from kincheck.core.kinematics.solve import solve
 from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
@@ -19,8 +31,8 @@ pytest.importorskip("exudyn")
 
 TOL = 1e-12
 PLACES = ((0.5, 0.1, 0.4), (-0.3, 0.2, 0.9))
-# Ends on b and on the ground. Drawn at random and chosen so that each joint's loop, held by the first of them, stays far from
-# lock-up: the smallest pivot of the native rows is 0.06.
+# Ends on b and on the ground. Drawn at random and chosen so that each joint's loop, held by the
+# first of them, stays far from lock-up: the smallest pivot of the native rows is 0.06.
 RODS = [
     ((0.0, 0.7, 0.4), (0.1, -0.1, 1.2)),
     ((0.4, -0.7, 0.1), (0.9, -0.7, 1.3)),
@@ -32,7 +44,10 @@ RODS = [
 
 def solved(mechanism, driver, values, motions=None, rate=1.0):
     """The trajectory of all points in Exudyn; every sample must be there."""
-    outputs = tuple(Output(point.name, point.name, (1.0, 0.0, 0.0), False, 1e-9, 0.0, "") for point in mechanism.points)
+    outputs = tuple(
+        Output(point.name, point.name, (1.0, 0.0, 0.0), False, 1e-9, 0.0, "")
+        for point in mechanism.points
+    )
     sweep = Sweep(driver, np.asarray(values, dtype=float), rate, motions=motions or {})
     case = Case(mechanism.name, "test", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
     assert Exudyn().unsupported(case) is None
@@ -43,9 +58,11 @@ def solved(mechanism, driver, values, motions=None, rate=1.0):
 
 
 def compare(mechanism, driver, values, motions=None):
-    """Exudyn against the native engine: both hold their residuals to 1e-12, and the smallest pivot of these loops is 0.06.
+    """Exudyn against the native engine: both hold their residuals to 1e-12, and the smallest pivot
+    of these loops is 0.06.
 
-    Accelerations rest on differences of the Jacobian besides (see DIFFERENCE of the adapter), of the same size at these speeds.
+    Accelerations rest on differences of the Jacobian besides (see DIFFERENCE of the adapter), of
+    the same size at these speeds.
     """
     truth = solve(mechanism, driver, values, motions=motions)
     assert truth.solved.all(), truth.message
@@ -58,15 +75,28 @@ def compare(mechanism, driver, values, motions=None):
 
 
 def loop(joint, rods=None):
-    """Body a swings on the ground, the joint is between a and b, and b hangs on as many rods as the joint has freedoms."""
-    ties = [Distance(f"rod {k}", "b", "ground", ends) for k, ends in enumerate(RODS[: 6 - joint.rows if rods is None else rods])]
+    """Body a swings on the ground, the joint is between a and b, and b hangs on as many rods as the
+    joint has freedoms.
+    """
+    ties = [
+        Distance(f"rod {k}", "b", "ground", ends)
+        for k, ends in enumerate(RODS[: 6 - joint.rows if rods is None else rods])
+    ]
     swing = Revolute("swing", "ground", "a", (0.2, -0.1, 0.3), (0.3, 1.0, 0.4))
     points = [Point(f"P{k}", "b", place) for k, place in enumerate(PLACES)]
-    return Mechanism(joint.type, [Body("a"), Body("b", (0.4, 0.1, 0.2))], [swing, joint, *ties], points, [JointAngle("t", "swing")])
+    return Mechanism(
+        joint.type,
+        [Body("a"), Body("b", (0.4, 0.1, 0.2))],
+        [swing, joint, *ties],
+        points,
+        [JointAngle("t", "swing")],
+    )
 
 
 def specimen(name, reverse):
-    """The example of a type between a and b, with its geometry where it is or its bodies exchanged."""
+    """The example of a type between a and b, with its geometry where it is or its bodies
+    exchanged.
+    """
     joint = replace(EXAMPLES[name](Joint.registry[name]), i="a", j="b")
     return joint.reversed() if reverse else joint
 
@@ -78,7 +108,9 @@ def test_every_joint_in_a_closed_loop(name, reverse):
 
 
 def test_constant_velocity_of_parallel_shafts_at_design():
-    joint = ConstantVelocity("joint", "a", "b", (0.3, -0.2, 0.5), ((0.2, 1.0, 0.1), (0.2, 1.0, 0.1)))
+    joint = ConstantVelocity(
+        "joint", "a", "b", (0.3, -0.2, 0.5), ((0.2, 1.0, 0.1), (0.2, 1.0, 0.1))
+    )
     compare(loop(joint), "t", np.linspace(-0.4, 0.4, 41))
 
 
@@ -93,7 +125,9 @@ DRIVEN = [
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize(("kind", "type_", "extra", "reach"), DRIVEN)
 def test_driven_coordinate_of_an_axial_joint(kind, type_, extra, reach, reverse):
-    """On a body that swings by itself, over more than a turn: 7 rad, or 0.5 m of a thread of 0.2 m."""
+    """On a body that swings by itself, over more than a turn: 7 rad, or 0.5 m of a thread of 0.2
+    m.
+    """
     joint = type_("joint", "a", "b", (0.3, -0.2, 0.5), (1.0, 2.0, -0.5), *extra)
     mechanism = loop(joint.reversed() if reverse else joint, rods=0)
     mechanism = replace(mechanism, drivers=[kind("d", "joint"), *mechanism.drivers])
@@ -104,7 +138,10 @@ def test_driven_coordinate_of_an_axial_joint(kind, type_, extra, reach, reverse)
 def test_both_coordinates_of_a_cylindrical_joint(reverse):
     joint = Cylindrical("joint", "a", "b", (0.3, -0.2, 0.5), (1.0, 2.0, -0.5))
     mechanism = loop(joint.reversed() if reverse else joint, rods=0)
-    mechanism = replace(mechanism, drivers=[JointAngle("r", "joint"), JointDisplacement("d", "joint"), *mechanism.drivers])
+    mechanism = replace(
+        mechanism,
+        drivers=[JointAngle("r", "joint"), JointDisplacement("d", "joint"), *mechanism.drivers],
+    )
     compare(mechanism, "r", np.linspace(-7.0, 7.0, 81), {"d": Sine(0.1, 0.2), "t": Sine(0.3, 0.1)})
 
 
@@ -121,7 +158,9 @@ def test_screw_over_seven_turns(lead, driver, reverse):
     }
     points = [Point("P", "nut", (0.3, 0.0, 0.1))]
     joint = screw.reversed() if reverse else screw
-    mechanism = Mechanism("screw", [Body("nut", (0.1, 0.2, 0.3))], [joint], points, [drivers[driver]])
+    mechanism = Mechanism(
+        "screw", [Body("nut", (0.1, 0.2, 0.3))], [joint], points, [drivers[driver]]
+    )
     angle, pitch = np.linspace(-14.0 * math.pi, 14.0 * math.pi, 281), lead / (2.0 * math.pi)
     # exchanged bodies measure the spindle from the nut; a point is where it is
     sense = -1.0 if reverse and driver != "point" else 1.0
@@ -135,7 +174,9 @@ def test_screw_over_seven_turns(lead, driver, reverse):
 
 
 def train(reverse=()):
-    """On a carrier that turns about z: an input wheel, twice as large an intermediate wheel, a pinion on it, and its rack."""
+    """On a carrier that turns about z: an input wheel, twice as large an intermediate wheel, a
+    pinion on it, and its rack.
+    """
     z, x = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
     joints = [
         Revolute("carrier", "ground", "frame", (0.0, 0.0, 0.0), z),
@@ -160,12 +201,20 @@ def train(reverse=()):
     )
 
 
-@pytest.mark.parametrize("reverse", [(), ("input",), ("middle", "guide"), ("input", "middle", "guide")])
+@pytest.mark.parametrize(
+    "reverse", [(), ("input",), ("middle", "guide"), ("input", "middle", "guide")]
+)
 @pytest.mark.parametrize("driver", ["in", "middle", "rack"])
 def test_gears_and_a_rack_over_turns(driver, reverse):
-    """Driven at the input, in the middle and from the rack; the carrier turns with it, which adds to all wheels alike."""
-    mechanism, sign = train(reverse), {name: -1.0 if name in reverse else 1.0 for name in ("input", "middle", "guide")}
-    angle = np.linspace(-9.0 * math.pi, 9.0 * math.pi, 361)  # of the input wheel in its carrier, at 1 rad/s
+    """Driven at the input, in the middle and from the rack; the carrier turns with it, which adds
+    to all wheels alike.
+    """
+    mechanism, sign = (
+        train(reverse),
+        {name: -1.0 if name in reverse else 1.0 for name in ("input", "middle", "guide")},
+    )
+    # of the input wheel in its carrier, at 1 rad/s
+    angle = np.linspace(-9.0 * math.pi, 9.0 * math.pi, 361)
     drivers = {
         "in": (JointAngle("d", "input"), sign["input"]),
         "middle": (JointAngle("d", "middle"), -0.5 * sign["middle"]),
@@ -177,15 +226,25 @@ def test_gears_and_a_rack_over_turns(driver, reverse):
     swing = np.stack(Sine(0.5, 0.1).at(angle))
 
     def turning(arm, turn, slide=0.0):
-        """Position, velocity, acceleration as complex numbers of arm e^(i turn) in the carrier, jets by the product rule."""
-        return arm * np.exp(1j * turn[0]) * np.stack([np.ones_like(angle), 1j * turn[1], 1j * turn[2] - turn[1] ** 2])
+        """Position, velocity, acceleration as complex numbers of arm e^(i turn) in the carrier,
+        jets by the product rule.
+        """
+        return (
+            arm
+            * np.exp(1j * turn[0])
+            * np.stack([np.ones_like(angle), 1j * turn[1], 1j * turn[2] - turn[1] ** 2])
+        )
 
     one, none = np.ones_like(angle), np.zeros_like(angle)
     wheel, double = swing + [angle, one, none], swing + [-0.5 * angle, -0.5 * one, none]
     s, s_t = 0.4 - 0.025 * angle, -0.025
     rack = turning(1.0, swing)
     rack = np.stack(
-        [rack[0] * (s - 0.05j), rack[1] * (s - 0.05j) + rack[0] * s_t, rack[2] * (s - 0.05j) + 2.0 * rack[1] * s_t],
+        [
+            rack[0] * (s - 0.05j),
+            rack[1] * (s - 0.05j) + rack[0] * s_t,
+            rack[2] * (s - 0.05j) + 2.0 * rack[1] * s_t,
+        ],
     )
     expected = {
         "wheel": turning(0.2, swing) + turning(0.1, wheel),
@@ -194,19 +253,26 @@ def test_gears_and_a_rack_over_turns(driver, reverse):
     }
     for name, motion in found.items():
         for values, true, tolerance in zip(
-            (motion.position, motion.velocity, motion.acceleration), expected[name], (1e-12, 1e-12, 1e-11), strict=True
+            (motion.position, motion.velocity, motion.acceleration),
+            expected[name],
+            (1e-12, 1e-12, 1e-11),
+            strict=True,
         ):
             # round-off of angles of 30 rad and of a rack that tells its pinion's angle by 20 rad/m
             assert np.abs(values[:, 0] + 1j * values[:, 1] - true).max() <= tolerance
 
 
 def test_couplers_agree_with_the_native_engine():
-    mechanism = replace(train(), drivers=[JointAngle("turn", "carrier"), JointDisplacement("d", "guide")])
+    mechanism = replace(
+        train(), drivers=[JointAngle("turn", "carrier"), JointDisplacement("d", "guide")]
+    )
     compare(mechanism, "d", np.linspace(-0.2, 0.2, 41), {"turn": Sine(0.5, 0.1)})
 
 
 def test_coarse_steps_of_a_fast_pinion():
-    """A crank that pushes a rack, in steps of 30 degrees: the pinion turns by up to 10 rad a step, and its speed changes."""
+    """A crank that pushes a rack, in steps of 30 degrees: the pinion turns by up to 10 rad a step,
+    and its speed changes.
+    """
     joints = [
         Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         Distance("rod", "crank", "rack", ((0.1, 0.0, 0.0), (0.5, 0.0, 0.0))),
@@ -214,11 +280,15 @@ def test_coarse_steps_of_a_fast_pinion():
         Revolute("axle", "ground", "pinion", (0.5, 0.05, 0.0), (0.0, 0.0, 1.0)),
     ]
     teeth = RackPinion("teeth", ("axle", "guide"), 0.005)
-    bodies, points = [Body(name) for name in ("crank", "rack", "pinion")], [Point("P", "pinion", (0.6, 0.05, 0.0))]
+    bodies, points = (
+        [Body(name) for name in ("crank", "rack", "pinion")],
+        [Point("P", "pinion", (0.6, 0.05, 0.0))],
+    )
     mechanism = Mechanism("m", bodies, joints, points, [JointAngle("t", "pivot")], [teeth])
     angle = np.radians(np.arange(-180.0, 181.0, 30.0))
     slide = 0.1 * np.cos(angle) + np.sqrt(0.4**2 - (0.1 * np.sin(angle)) ** 2) - 0.5
     turn = slide / 0.005
     P = solved(mechanism, "t", angle)["P"].position
-    assert np.abs(P[:, 0] - 0.5 - 0.1 * np.cos(turn)).max() <= 1e-13  # round-off of a turn of 40 rad, on 0.1 m
+    # round-off of a turn of 40 rad, on 0.1 m
+    assert np.abs(P[:, 0] - 0.5 - 0.1 * np.cos(turn)).max() <= 1e-13
     assert np.abs(P[:, 1] - 0.05 - 0.1 * np.sin(turn)).max() <= 1e-13

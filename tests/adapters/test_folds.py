@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.kinematics.formulation.acceptance_criteria import continued, continuous, regular_between
+from kincheck.core.kinematics.formulation.acceptance_criteria import (
+    continued,
+    continuous,
+    regular_between,
+)
 from kincheck.core.studies.stress.families import Family
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.planar import any_plane, slider_crank
@@ -57,7 +61,9 @@ def test_the_end_of_a_stroke_is_a_fold():
 
 
 def test_no_simulator_steps_over_a_fold():
-    """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples 15000`."""
+    """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples
+    15000`.
+    """
     engines = [installed(name) for name in SIMULATORS]
     found, _ = stress([Family.registry["folds"]], engines, samples=60, seed=0, prove=False)
     for cell in found.cells:

@@ -1,4 +1,6 @@
-"""Every joint type in MuJoCo, in its tree and closing a loop, against the native solver and closed forms."""
+"""Every joint type in MuJoCo, in its tree and closing a loop, against the native solver and closed
+forms.
+"""
 
 import math
 from dataclasses import replace
@@ -28,19 +30,29 @@ from .test_mujoco import assert_motion, solve
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
-# Position, velocity and acceleration, m and s: round-off, amplified at most a thousandfold by the mechanisms at these speeds.
+# Position, velocity and acceleration, m and s: round-off, amplified at most a thousandfold by the
+# mechanisms at these speeds.
 TOLERANCES = (1e-13, 1e-12, 1e-11)
 
 
 def assert_agrees(mechanism, driver, values, rate=1.0):
     """The motions of all points are those of the native solver; returned is MuJoCo's solution."""
-    outputs = tuple(Output(point.name, point.name, (1.0, 0.0, 0.0), False, 0.0, 0.0, "") for point in mechanism.points)
+    outputs = tuple(
+        Output(point.name, point.name, (1.0, 0.0, 0.0), False, 0.0, 0.0, "")
+        for point in mechanism.points
+    )
     sweep = Sweep(driver, np.array(values), rate)
     found = solve(Case("test", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs))
     expected = solve_natively(mechanism, driver, values, rate=rate)
     assert expected.solved.all()
     for name, motion in expected.points.items():
-        assert_motion(found.points[name], motion.position, motion.velocity, motion.acceleration, atol=TOLERANCES)
+        assert_motion(
+            found.points[name],
+            motion.position,
+            motion.velocity,
+            motion.acceleration,
+            atol=TOLERANCES,
+        )
     return found
 
 
@@ -55,20 +67,40 @@ def cut(monkeypatch, *names):
     monkeypatch.setattr(spec, "spanning_tree", tree)
 
 
-# Ends of rods on a body and on the ground, chosen so that any joint with its number of them is far from a lock-up.
+# Ends of rods on a body and on the ground, chosen so that any joint with its number of them is far
+# from a lock-up.
 ON_BODY = ((-0.4, 0.7, 0.4), (-0.3, -0.4, 1.3), (0.6, 0.6, 0.1), (0.4, -0.8, 0.7), (0.0, -0.7, 0.1))
-ON_GROUND = ((-1.4, -0.6, 0.0), (-1.9, 0.6, 1.4), (-0.7, 0.1, -0.9), (0.2, -2.7, 2.1), (-1.0, -0.9, 1.8))
+ON_GROUND = (
+    (-1.4, -0.6, 0.0),
+    (-1.9, 0.6, 1.4),
+    (-0.7, 0.1, -0.9),
+    (0.2, -2.7, 2.1),
+    (-1.0, -0.9, 1.8),
+)
 
 
 def between(joint, mirrored):
-    """A body on a driven revolute, the joint, and a second body on as many rods as the joint has freedoms."""
+    """A body on a driven revolute, the joint, and a second body on as many rods as the joint has
+    freedoms.
+    """
     joint = replace(joint, name="tested", i="a", j="b")
-    rods = [Distance(f"rod {k}", "b", "ground", (ON_BODY[k], ON_GROUND[k])) for k in range(6 - joint.rows)]
+    rods = [
+        Distance(f"rod {k}", "b", "ground", (ON_BODY[k], ON_GROUND[k]))
+        for k in range(6 - joint.rows)
+    ]
     return Mechanism(
         "tested",
         [Body("a", (0.1, 0.2, 0.3)), Body("b", (0.5, -0.1, 0.6), (0.5, 0.5, -0.5, 0.5))],
-        [Revolute("pivot", "ground", "a", (0.1, 0.0, 0.4), (0.3, 1.0, -0.4)), joint.reversed() if mirrored else joint, *rods],
-        [Point("p", "b", (0.9, 0.2, 0.4)), Point("q", "b", (0.2, -0.4, 0.9)), Point("r", "b", (0.3, 0.3, 0.0))],
+        [
+            Revolute("pivot", "ground", "a", (0.1, 0.0, 0.4), (0.3, 1.0, -0.4)),
+            joint.reversed() if mirrored else joint,
+            *rods,
+        ],
+        [
+            Point("p", "b", (0.9, 0.2, 0.4)),
+            Point("q", "b", (0.2, -0.4, 0.9)),
+            Point("r", "b", (0.3, 0.3, 0.0)),
+        ],
         [JointAngle("turn", "pivot")],
     )
 
@@ -95,7 +127,9 @@ CUTS = pytest.mark.parametrize("closing", [False, True], ids=["tree", "cut"])
 
 
 def on_screw(theta, axis, point, lead, rate):
-    """Position, velocity and acceleration of a point that turns about an axis through the origin and moves along it."""
+    """Position, velocity and acceleration of a point that turns about an axis through the origin
+    and moves along it.
+    """
     h = np.array(axis) / np.linalg.norm(axis)
     along, across = (point @ h) * h, point - (point @ h) * h
     c, s = np.cos(theta)[:, None], np.sin(theta)[:, None]
@@ -115,7 +149,9 @@ AXIS, TIP = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4])
 @pytest.mark.parametrize("lead", [0.05, -9.0])
 @pytest.mark.parametrize("kind", [JointAngle, JointDisplacement])
 def test_a_screw_driven_over_several_turns(kind, lead, mirrored, closing, monkeypatch):
-    """Both ways round, by either of its coordinates, with a lead above and below one radian a metre."""
+    """Both ways round, by either of its coordinates, with a lead above and below one radian a
+    metre.
+    """
     if closing:
         cut(monkeypatch, "thread")
     thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), AXIS, lead)
@@ -129,7 +165,11 @@ def test_a_screw_driven_over_several_turns(kind, lead, mirrored, closing, monkey
     unit = 1.0 if kind is JointAngle else lead / (2.0 * math.pi)
     found = assert_agrees(mechanism, "drive", unit * TURNS, unit * 2.0)
     sign = -1.0 if mirrored else 1.0
-    assert_motion(found.points["tip"], *on_screw(sign * TURNS, AXIS, TIP, lead, sign * 2.0), atol=(1e-12, 1e-12, 1e-11))
+    assert_motion(
+        found.points["tip"],
+        *on_screw(sign * TURNS, AXIS, TIP, lead, sign * 2.0),
+        atol=(1e-12, 1e-12, 1e-11),
+    )
     assert len(found.details["relations"]) == 1
 
 
@@ -142,7 +182,11 @@ def test_both_coordinates_of_a_cylindrical_joint_are_driven(driver, mirrored, cl
     sleeve = Cylindrical("sleeve", "ground", "rod", (0.0, 0.0, 0.0), AXIS)
     drivers = [JointAngle("turn", "sleeve"), JointDisplacement("push", "sleeve")]
     joints = [sleeve.reversed() if mirrored else sleeve]
-    assert_agrees(Mechanism("cylindrical", [Body("rod")], joints, [Point("tip", "rod", tuple(TIP))], drivers), driver, TURNS)
+    assert_agrees(
+        Mechanism("cylindrical", [Body("rod")], joints, [Point("tip", "rod", tuple(TIP))], drivers),
+        driver,
+        TURNS,
+    )
 
 
 def test_a_nut_that_a_guide_keeps_from_turning():
@@ -153,19 +197,30 @@ def test_a_nut_that_a_guide_keeps_from_turning():
         Translational("guide", "ground", "nut", (0.2, 0.0, 0.1), AXIS),
     ]
     mechanism = Mechanism(
-        "jack", [Body("shaft"), Body("nut")], joints, [Point("tip", "nut", tuple(TIP))], [JointAngle("turn", "bearing")]
+        "jack",
+        [Body("shaft"), Body("nut")],
+        joints,
+        [Point("tip", "nut", tuple(TIP))],
+        [JointAngle("turn", "bearing")],
     )
     found = assert_agrees(mechanism, "turn", TURNS)
     travel = -0.1 / (2.0 * math.pi) * np.array(AXIS) / 3.0
-    np.testing.assert_allclose(found.points["tip"].position, TIP + np.outer(TURNS, travel), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        found.points["tip"].position, TIP + np.outer(TURNS, travel), rtol=0, atol=1e-13
+    )
 
 
 @CUTS
 def test_a_train_of_gears_with_a_rack(closing, monkeypatch):
-    """A bearing that names its shaft first has the other sign of rotation. The last wheel slides too, as driven."""
+    """A bearing that names its shaft first has the other sign of rotation. The last wheel slides
+    too, as driven.
+    """
     if closing:
         cut(monkeypatch, "b", "c", "rail")
-    axis, points = (0.0, 0.0, 2.0), {"A": (0.1, 0.0, 0.0), "B": (0.6, 0.0, 0.0), "C": (1.0, 0.1, 0.0), "R": (1.0, 0.2, 0.0)}
+    axis, points = (
+        (0.0, 0.0, 2.0),
+        {"A": (0.1, 0.0, 0.0), "B": (0.6, 0.0, 0.0), "C": (1.0, 0.1, 0.0), "R": (1.0, 0.2, 0.0)},
+    )
     joints = [
         Revolute("a", "ground", "A", (0.0, 0.0, 0.0), axis),
         Revolute("b", "B", "ground", (0.4, 0.0, 0.0), axis),
@@ -179,7 +234,12 @@ def test_a_train_of_gears_with_a_rack(closing, monkeypatch):
     ]
     drivers = [JointAngle("turn", "a"), JointDisplacement("shift", "c")]
     mechanism = Mechanism(
-        "train", [Body(n) for n in points], joints, [Point(n, n, p) for n, p in points.items()], drivers, couplers
+        "train",
+        [Body(n) for n in points],
+        joints,
+        [Point(n, n, p) for n, p in points.items()],
+        drivers,
+        couplers,
     )
     found = assert_agrees(mechanism, "turn", TURNS)
     # b = a / 2 turns B by -a / 2; c = b / 3
@@ -206,16 +266,45 @@ def test_a_steering_gear(closing, monkeypatch):
     ]
     points = []
     for side in (-1.0, 1.0):
-        wheel, rod, inner, outer = f"wheel {side:g}", f"rod {side:g}", (0.2, 0.35 * side, 0.2), (0.15, 0.65 * side, 0.15)
+        wheel, rod, inner, outer = (
+            f"wheel {side:g}",
+            f"rod {side:g}",
+            (0.2, 0.35 * side, 0.2),
+            (0.15, 0.65 * side, 0.15),
+        )
         joints += [
-            Revolute(f"kingpin {side:g}", "ground", wheel, (0.0, 0.7 * side, 0.1), (-0.1, -0.2 * side, 1.0)),
-            ConstantVelocity(f"inner {side:g}", "rack", rod, inner, ((0.0, side, 0.0), tuple(np.subtract(outer, inner)))),
+            Revolute(
+                f"kingpin {side:g}",
+                "ground",
+                wheel,
+                (0.0, 0.7 * side, 0.1),
+                (-0.1, -0.2 * side, 1.0),
+            ),
+            ConstantVelocity(
+                f"inner {side:g}",
+                "rack",
+                rod,
+                inner,
+                ((0.0, side, 0.0), tuple(np.subtract(outer, inner))),
+            ),
             Spherical(f"outer {side:g}", rod, wheel, outer),
         ]
-        points += [Point(wheel, wheel, (0.1, 0.8 * side, 0.0)), Point(rod, rod, (0.2, 0.5 * side, 0.3))]
-    bodies = [Body(name) for name in dict.fromkeys(body for joint in joints for body in joint.bodies) if name != "ground"]
+        points += [
+            Point(wheel, wheel, (0.1, 0.8 * side, 0.0)),
+            Point(rod, rod, (0.2, 0.5 * side, 0.3)),
+        ]
+    bodies = [
+        Body(name)
+        for name in dict.fromkeys(body for joint in joints for body in joint.bodies)
+        if name != "ground"
+    ]
     mechanism = Mechanism(
-        "steering", bodies, joints, points, [JointAngle("turn", "column")], [RackPinion("gear", ("column", "rail"), 0.008)]
+        "steering",
+        bodies,
+        joints,
+        points,
+        [JointAngle("turn", "column")],
+        [RackPinion("gear", ("column", "rail"), 0.008)],
     )
     assert_agrees(mechanism, "turn", np.linspace(-6.0, 6.0, 25))
 
@@ -224,9 +313,12 @@ def test_a_steering_gear(closing, monkeypatch):
 @pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
 @pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
 def test_a_constant_velocity_joint_keeps_the_velocity(bend, mirrored, closing, monkeypatch):
-    """Two shafts in bearings, at an angle, over several turns: both have turned alike, which no universal joint does."""
+    """Two shafts in bearings, at an angle, over several turns: both have turned alike, which no
+    universal joint does.
+    """
     if not closing:
-        cut(monkeypatch, "out")  # else the bearings carry both shafts, and the joint between them is cut
+        # else the bearings carry both shafts, and the joint between them is cut
+        cut(monkeypatch, "out")
     k = (math.cos(bend), 0.6 * math.sin(bend), 0.8 * math.sin(bend))
     joint = ConstantVelocity("joint", "a", "b", (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), k))
     joints = [
@@ -234,7 +326,13 @@ def test_a_constant_velocity_joint_keeps_the_velocity(bend, mirrored, closing, m
         joint.reversed() if mirrored else joint,
         Revolute("out", "ground", "b", tuple(0.5 * np.array(k)), k),
     ]
-    mechanism = Mechanism("shafts", [Body("a"), Body("b")], joints, [Point("tip", "b", tuple(TIP))], [JointAngle("turn", "in")])
+    mechanism = Mechanism(
+        "shafts",
+        [Body("a"), Body("b")],
+        joints,
+        [Point("tip", "b", tuple(TIP))],
+        [JointAngle("turn", "in")],
+    )
     found = assert_agrees(mechanism, "turn", TURNS, 2.0)
     assert ("joint" in found.details["closures"]) == closing
     assert_motion(found.points["tip"], *on_screw(TURNS, k, TIP, 0.0, 2.0), atol=TOLERANCES)

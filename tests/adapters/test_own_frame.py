@@ -1,4 +1,6 @@
-"""The simulators' projections of mechanisms of any size, anywhere: they are solved in a frame of the mechanism's own."""
+"""The simulators' projections of mechanisms of any size, anywhere: they are solved in a frame of
+the mechanism's own.
+"""
 
 from dataclasses import replace
 
@@ -8,7 +10,16 @@ from kincheck import adapters
 from kincheck.adapters.native import Native
 from kincheck.adapters.shared.length_scaling import in_own_frame, own_frame
 from kincheck.adapters.shared.projection import Walk
-from kincheck.core import Body, JointAngle, Mechanism, Point, RackPinion, Revolute, Screw, Translational
+from kincheck.core import (
+    Body,
+    JointAngle,
+    Mechanism,
+    Point,
+    RackPinion,
+    Revolute,
+    Screw,
+    Translational,
+)
 from kincheck.core.joints import Kind
 
 from ..kinematics.test_equivalence import case_of, motion
@@ -21,7 +32,9 @@ Z = (0.0, 0.0, 1.0)
 
 
 def jack(radius=0.25, lead=0.125):
-    """A pinion drives a rack, and carries a nut on its thread: a coupler and a joint with a length."""
+    """A pinion drives a rack, and carries a nut on its thread: a coupler and a joint with a
+    length.
+    """
     return Mechanism(
         "jack",
         [Body("pinion"), Body("rack"), Body("nut")],
@@ -39,10 +52,21 @@ def jack(radius=0.25, lead=0.125):
 def moved(mechanism, factor, offset=(0.0, 0.0, 0.0)):
     """Of another size, then elsewhere."""
     found = placed(
-        mechanism, lambda point: tuple(float(factor * x + o) for x, o in zip(snapped(point), offset, strict=True)), factor=factor
+        mechanism,
+        lambda point: tuple(
+            float(factor * x + o) for x, o in zip(snapped(point), offset, strict=True)
+        ),
+        factor=factor,
     )
-    joints = [replace(joint, lead=factor * joint.lead) if isinstance(joint, Screw) else joint for joint in found.joints]
-    return replace(found, joints=joints, couplers=[replace(each, radius=factor * each.radius) for each in found.couplers])
+    joints = [
+        replace(joint, lead=factor * joint.lead) if isinstance(joint, Screw) else joint
+        for joint in found.joints
+    ]
+    return replace(
+        found,
+        joints=joints,
+        couplers=[replace(each, radius=factor * each.radius) for each in found.couplers],
+    )
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
@@ -52,7 +76,10 @@ def test_size_does_not_matter(engine, exponent):
     factor = 2.0**exponent
     for mechanism, values, scale in ((mcpherson(), STROKES, factor), (jack(), TURNS, 1.0)):
         # the rate is one: the drives take as much longer as they are longer
-        here, there = motion(moved(mechanism, 1.0), values, engine), motion(moved(mechanism, factor), scale * values, engine)
+        here, there = (
+            motion(moved(mechanism, 1.0), values, engine),
+            motion(moved(mechanism, factor), scale * values, engine),
+        )
         for k, (x, expected) in enumerate(zip(there, here, strict=True)):
             assert (x == factor / scale**k * expected).all()
 
@@ -62,13 +89,21 @@ def test_place_does_not_matter(engine):
     """Four thousand kilometres away: only the sum with the position rounds."""
     offset = np.array((2.0**22, -(2.0**21), 0.0))
     for mechanism, values in ((mcpherson(), STROKES), (jack(), TURNS)):
-        here, there = motion(moved(mechanism, 1.0), values, engine), motion(moved(mechanism, 1.0, offset), values, engine)
+        here, there = (
+            motion(moved(mechanism, 1.0), values, engine),
+            motion(moved(mechanism, 1.0, offset), values, engine),
+        )
         assert np.abs(there[0] - (here[0] + offset)).max() <= np.spacing(2.0**22)
         assert (there[1:] == here[1:]).all()
 
 
 def test_residuals_are_in_metres():
-    for engine in (Native(), *filter(lambda each: each.version(), map(adapters.engine, ("mujoco", "pinocchio", "exudyn")))):
+    for engine in (
+        Native(),
+        *filter(
+            lambda each: each.version(), map(adapters.engine, ("mujoco", "pinocchio", "exudyn"))
+        ),
+    ):
         residuals = list[float]()
         for factor in (1.0, 2.0**-40):
             case = case_of(moved(mcpherson(), factor), factor * STROKES)
@@ -85,7 +120,14 @@ def test_a_mechanism_in_its_own_frame_is_as_large_as_one_and_there():
     assert own_frame(own).origin == (0.0, 0.0, 0.0)
     wanted = jack()
     assert own.mechanism == wanted
-    assert 0.7 < Walk(Crank(lambda c: 1.0), case, 1e-12, frame=frame).size < 1.5  # what steps are judged by
-    assert {kind for joint in wanted.joints for _, kind, _ in joint.parts()} >= {Kind.POSITION, Kind.LENGTH, Kind.DIRECTION}
+    # what steps are judged by
+    assert 0.7 < Walk(Crank(lambda c: 1.0), case, 1e-12, frame=frame).size < 1.5
+    assert {kind for joint in wanted.joints for _, kind, _ in joint.parts()} >= {
+        Kind.POSITION,
+        Kind.LENGTH,
+        Kind.DIRECTION,
+    }
     assert (own.sweep, own.outputs) == (case.sweep, case.outputs)
-    np.testing.assert_array_equal(frame.back(np.array(frame.there((1.0, 2.0, 3.0)))), (1.0, 2.0, 3.0))
+    np.testing.assert_array_equal(
+        frame.back(np.array(frame.there((1.0, 2.0, 3.0)))), (1.0, 2.0, 3.0)
+    )

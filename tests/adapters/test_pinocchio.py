@@ -1,4 +1,6 @@
-"""The Pinocchio adapter against closed forms and an independent reference; every joint as a closure is in test_closures."""
+"""The Pinocchio adapter against closed forms and an independent reference; every joint as a closure
+is in test_closures.
+"""
 
 from __future__ import annotations
 
@@ -37,12 +39,17 @@ ENGINE = adapter.Pinocchio()
 
 def case_of(mechanism: Mechanism, values: Sequence[float] | np.ndarray, rate: float = 1.0) -> Case:
     """Sweep of the first driver, with all points wanted."""
-    outputs = tuple(Output(p.name, p.name, (1.0, 0.0, 0.0), False, 0.0, 0.0, "unused here") for p in mechanism.points)
+    outputs = tuple(
+        Output(p.name, p.name, (1.0, 0.0, 0.0), False, 0.0, 0.0, "unused here")
+        for p in mechanism.points
+    )
     sweep = Sweep(mechanism.drivers[0].name, np.asarray(values, dtype=float), rate)
     return Case(mechanism.name, "made here", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
 
 
-def solved(mechanism: Mechanism, values: Sequence[float] | np.ndarray, rate: float = 1.0) -> Trajectory:
+def solved(
+    mechanism: Mechanism, values: Sequence[float] | np.ndarray, rate: float = 1.0
+) -> Trajectory:
     case = case_of(mechanism, values, rate)
     assert ENGINE.unsupported(case) is None
     found = ENGINE.solve(ENGINE.build(case), case, TOL)
@@ -65,7 +72,13 @@ def strut() -> Mechanism:
     K, U, W = (0.97772, 0.605, 0.18), (1.0, 0.55, 0.6), (0.975, 0.715, 0.101)
     return Mechanism(
         "strut",
-        [Body("chassis", fixed=True), Body("rack", fixed=True), Body("lca"), Body("knuckle", W), Body("strut", U)],
+        [
+            Body("chassis", fixed=True),
+            Body("rack", fixed=True),
+            Body("lca"),
+            Body("knuckle", W),
+            Body("strut", U),
+        ],
         [
             Revolute("lca_pivot", "chassis", "lca", (1.17, 0.353, 0.005), (2.0, 0.0, 0.0)),
             Spherical("ball", "lca", "knuckle", (0.9676, 0.66, -0.01)),
@@ -78,13 +91,42 @@ def strut() -> Mechanism:
     )
 
 
-# sample: x, y [m], vx, vy [m/s], ax, ay [m/s^2] of the wheel centre at 1 m/s; four unknowns, extended precision, residual 1e-19
+# sample: x, y [m], vx, vy [m/s], ax, ay [m/s^2] of the wheel centre at 1 m/s; four unknowns,
+# extended precision, residual 1e-19
 STRUT = {
-    0: (0.9784216847140831, 0.7046021168519804, -0.054481022483195, 0.248050444550955, 0.29813886646731, -3.14246535307487),
-    37: (0.9766070515140639, 0.7116985944500784, -0.043656631859606, 0.137191973228145, 0.29005802468944, -2.874169716598),
+    0: (
+        0.9784216847140831,
+        0.7046021168519804,
+        -0.054481022483195,
+        0.248050444550955,
+        0.29813886646731,
+        -3.14246535307487,
+    ),
+    37: (
+        0.9766070515140639,
+        0.7116985944500784,
+        -0.043656631859606,
+        0.137191973228145,
+        0.29005802468944,
+        -2.874169716598,
+    ),
     80: (0.975, 0.715, -0.031003511378626, 0.017471831311365, 0.30211302579786, -2.71882612855285),
-    119: (0.9740271073049935, 0.71362560081833, -0.018690573418323, -0.087839818318594, 0.33260964363673, -2.70155690142503),
-    160: (0.9735541231204234, 0.7077296192455841, -0.003999789054857, -0.200645146299785, 0.38865414362756, -2.83130086954583),
+    119: (
+        0.9740271073049935,
+        0.71362560081833,
+        -0.018690573418323,
+        -0.087839818318594,
+        0.33260964363673,
+        -2.70155690142503,
+    ),
+    160: (
+        0.9735541231204234,
+        0.7077296192455841,
+        -0.003999789054857,
+        -0.200645146299785,
+        0.38865414362756,
+        -2.83130086954583,
+    ),
 }
 
 
@@ -92,7 +134,9 @@ def test_strut_agrees_with_an_independent_solution(capfd: pytest.CaptureFixture[
     found = solved(strut(), np.linspace(-0.08, 0.08, 161))
     motion = found.points["wheel_center"]
     for k, (x, y, vx, vy, ax, ay) in STRUT.items():
-        np.testing.assert_allclose(motion.position[k], [x, y, 0.101 - 0.08 + 0.001 * k], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(
+            motion.position[k], [x, y, 0.101 - 0.08 + 0.001 * k], rtol=0, atol=1e-14
+        )
         np.testing.assert_allclose(motion.velocity[k], [vx, vy, 1.0], rtol=0, atol=1e-13)
         np.testing.assert_allclose(motion.acceleration[k], [ax, ay, 0.0], rtol=0, atol=1e-12)
     assert found.details["closures"] == {
@@ -132,9 +176,14 @@ def test_four_revolutes_in_a_tilted_plane() -> None:
     line = np.array([d, 0.0]) - crank
     distance = np.linalg.norm(line, axis=1)
     # the rocker's pin, left of the line from the crank's pin to the rocker's pivot
-    angle = np.arctan2(line[:, 1], line[:, 0]) + np.arccos((b**2 + distance**2 - c**2) / (2 * b * distance))
+    angle = np.arctan2(line[:, 1], line[:, 0]) + np.arccos(
+        (b**2 + distance**2 - c**2) / (2 * b * distance)
+    )
     pin = crank + b * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    A, B, C, D = (tuple(origin + R @ np.array([*p, 0.0])) for p in (np.zeros(2), crank[0], pin[0], np.array([d, 0.0])))
+    A, B, C, D = (
+        tuple(origin + R @ np.array([*p, 0.0]))
+        for p in (np.zeros(2), crank[0], pin[0], np.array([d, 0.0]))
+    )
     n = tuple(5.0 * R[:, 2])
     mechanism = Mechanism(
         "four-bar",
@@ -192,7 +241,12 @@ def test_joint_angle_is_that_of_the_second_body(bodies: tuple[str, str]) -> None
     """Several turns about an axis that is not a unit vector."""
     hinge, P = Revolute("hinge", *bodies, HINGE, (0.4, 1.0, -0.7)), (0.5, 0.6, 0.1)
     turn = np.linspace(-7.0, 7.0, 57)
-    found = solved(Mechanism("pivot", [Body("B")], [hinge], [Point("P", "B", P)], [JointAngle("turn", "hinge")]), turn)
+    found = solved(
+        Mechanism(
+            "pivot", [Body("B")], [hinge], [Point("P", "B", P)], [JointAngle("turn", "hinge")]
+        ),
+        turn,
+    )
     sign = 1.0 if bodies[1] == "B" else -1.0
     expected = HINGE + rotation(hinge.axis, sign * turn) @ np.subtract(P, HINGE)
     np.testing.assert_allclose(found.points["P"].position, expected, rtol=0, atol=1e-14)
@@ -201,36 +255,56 @@ def test_joint_angle_is_that_of_the_second_body(bodies: tuple[str, str]) -> None
 @pytest.mark.parametrize("bodies", [(GROUND, "B"), ("B", GROUND)])
 def test_joint_displacement_is_that_of_the_second_body(bodies: tuple[str, str]) -> None:
     slide, P = Translational("slide", *bodies, HINGE, (0.4, 1.0, -0.7)), (0.5, 0.6, 0.1)
-    mechanism = Mechanism("slider", [Body("B")], [slide], [Point("P", "B", P)], [JointDisplacement("push", "slide")])
+    mechanism = Mechanism(
+        "slider", [Body("B")], [slide], [Point("P", "B", P)], [JointDisplacement("push", "slide")]
+    )
     push = np.linspace(-1.0, 1.0, 9)
     found = solved(mechanism, push, 3.0).points["P"]
     along = np.array(slide.axis) / np.linalg.norm(slide.axis) * (1.0 if bodies[1] == "B" else -1.0)
     np.testing.assert_allclose(found.position, P + push[:, None] * along, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(found.velocity, np.broadcast_to(3.0 * along, (9, 3)), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        found.velocity, np.broadcast_to(3.0 * along, (9, 3)), rtol=0, atol=1e-15
+    )
 
 
 def test_oblique_point_driver() -> None:
     """A slider pushed along another direction k moves by c / (k . axis)."""
     axis, k = np.array([0.4, 1.0, -0.7]), np.array([3.0, 2.0, 1.0])
     slide, P = Translational("slide", GROUND, "B", HINGE, tuple(axis)), (0.5, 0.6, 0.1)
-    mechanism = Mechanism("slider", [Body("B")], [slide], [Point("P", "B", P)], [PointCoordinate("push", "P", tuple(k))])
+    mechanism = Mechanism(
+        "slider",
+        [Body("B")],
+        [slide],
+        [Point("P", "B", P)],
+        [PointCoordinate("push", "P", tuple(k))],
+    )
     push = np.linspace(-0.3, 0.3, 7)
     expected = P + push[:, None] * axis / (k / np.linalg.norm(k) @ axis)
-    np.testing.assert_allclose(solved(mechanism, push).points["P"].position, expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        solved(mechanism, push).points["P"].position, expected, rtol=0, atol=1e-14
+    )
 
 
-@pytest.mark.parametrize("hold", [JointAngle("hold", "elbow"), PointCoordinate("hold", "tip", (0.0, 0.0, 1.0))])
+@pytest.mark.parametrize(
+    "hold", [JointAngle("hold", "elbow"), PointCoordinate("hold", "tip", (0.0, 0.0, 1.0))]
+)
 def test_other_drivers_hold_their_design_value(hold: Driver) -> None:
-    """Second arm about a horizontal axis: with its angle or its tip's height held, the tip describes a circle."""
+    """Second arm about a horizontal axis: with its angle or its tip's height held, the tip
+    describes a circle.
+    """
     joints = [
         Revolute("shoulder", GROUND, "upper", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         Revolute("elbow", "lower", "upper", (0.4, 0.0, 0.1), (0.0, 1.0, 0.0)),
     ]
     tip, turn = (0.7, 0.0, 0.5), np.linspace(-1.0, 2.0, 7)
     drivers = [JointAngle("turn", "shoulder"), hold]
-    mechanism = Mechanism("arm", [Body("upper"), Body("lower")], joints, [Point("tip", "lower", tip)], drivers)
+    mechanism = Mechanism(
+        "arm", [Body("upper"), Body("lower")], joints, [Point("tip", "lower", tip)], drivers
+    )
     found = solved(mechanism, turn).points["tip"]
-    np.testing.assert_allclose(found.position, rotation((0.0, 0.0, 1.0), turn) @ tip, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        found.position, rotation((0.0, 0.0, 1.0), turn) @ tip, rtol=0, atol=1e-14
+    )
 
 
 @pytest.mark.parametrize("second", [Revolute, Spherical, Universal])
@@ -238,9 +312,18 @@ def test_a_door_on_two_hinges(second: type[Joint]) -> None:
     """A tree of one freedom: of its Jacobians of one column Pinocchio makes vectors."""
     z, top = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
     how = {Revolute: (z,), Spherical: (), Universal: ((z, (1.0, 0.0, 0.0)),)}[second]
-    joints = [Revolute("lower", GROUND, "door", (0.0, 0.0, 0.0), z), second("upper", GROUND, "door", top, *how)]
+    joints = [
+        Revolute("lower", GROUND, "door", (0.0, 0.0, 0.0), z),
+        second("upper", GROUND, "door", top, *how),
+    ]
     handle, turn = (0.8, 0.0, 0.5), np.linspace(-1.0, 2.0, 7)
-    mechanism = Mechanism("door", [Body("door")], joints, [Point("handle", "door", handle)], [JointAngle("turn", "lower")])
+    mechanism = Mechanism(
+        "door",
+        [Body("door")],
+        joints,
+        [Point("handle", "door", handle)],
+        [JointAngle("turn", "lower")],
+    )
     found = solved(mechanism, turn).points["handle"]
     np.testing.assert_allclose(found.position, rotation(z, turn) @ handle, rtol=0, atol=1e-14)
 
@@ -269,7 +352,9 @@ def test_unsupported_names_the_driver_or_joint(monkeypatch: pytest.MonkeyPatch) 
 
 def test_version_is_none_where_pinocchio_does_not_import(monkeypatch: pytest.MonkeyPatch) -> None:
     assert isinstance(ENGINE.version(), str)
-    monkeypatch.setattr(adapter.importlib, "import_module", lambda name: SimpleNamespace(__version__="0.4"))
+    monkeypatch.setattr(
+        adapter.importlib, "import_module", lambda name: SimpleNamespace(__version__="0.4")
+    )
     assert ENGINE.version() is None  # another package of that name
 
     def broken(name: str) -> object:

@@ -27,7 +27,9 @@ CASE = Case(
 
 
 class Crank:
-    """A crank and a second coordinate that no output sees; it is where `hidden` says, at a driver value."""
+    """A crank and a second coordinate that no output sees; it is where `hidden` says, at a driver
+    value.
+    """
 
     def __init__(self, hidden):
         self.hidden, self.q, self.c = hidden, np.zeros(2), 0.0
@@ -58,7 +60,13 @@ class Crank:
 
     def points(self, v, a):
         c, s = np.cos(self.q[0]), np.sin(self.q[0])
-        return [(np.array([c, s, 0.0]), v[0] * np.array([-s, c, 0.0]), v[0] ** 2 * np.array([-c, -s, 0.0]))]
+        return [
+            (
+                np.array([c, s, 0.0]),
+                v[0] * np.array([-s, c, 0.0]),
+                v[0] ** 2 * np.array([-c, -s, 0.0]),
+            )
+        ]
 
 
 def test_a_steady_motion_is_followed_to_its_end():
@@ -108,7 +116,12 @@ def test_a_first_sample_whose_rates_cannot_be_met_is_told():
         def bias(self, v):
             return np.full(2, np.nan if abs(v[0]) < 1e-9 else 0.0)
 
-    case = replace(CASE, sweep=Sweep("time", np.linspace(0.0, 1.0, 3), motions={"turn": Sine(0.5, 0.1, np.pi / 2.0)}))
+    case = replace(
+        CASE,
+        sweep=Sweep(
+            "time", np.linspace(0.0, 1.0, 3), motions={"turn": Sine(0.5, 0.1, np.pi / 2.0)}
+        ),
+    )
     assert solve_by_projection(Crank(lambda c: 0.0), case, 1e-12).solved.all()
     found = solve_by_projection(Stuck(lambda c: 0.0), case, 1e-12)
     assert not found.solved.any()
@@ -119,10 +132,12 @@ def test_a_first_sample_whose_rates_cannot_be_met_is_told():
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
 def test_a_fold_between_two_samples_is_not_stepped_over(name, loops, defect):
-    """Nearly a parallelogram: beside its change points, within parts of a step, the crossed linkage goes straight on.
+    """Nearly a parallelogram: beside its change points, within parts of a step, the crossed linkage
+    goes straight on.
 
-    Between them the coupler and the rocker never are in line, and so the rocker's end stays on one side of the line between theirs.
-    Of two on one crank, both fold at once, and the determinant of all rows keeps its sign.
+    Between them the coupler and the rocker never are in line, and so the rocker's end stays on one
+    side of the line between theirs. Of two on one crank, both fold at once, and the determinant of
+    all rows keeps its sign.
     """
     engine = adapters.engine(name)
     if engine.version() is None:
@@ -133,19 +148,33 @@ def test_a_fold_between_two_samples_is_not_stepped_over(name, loops, defect):
     apart = ground - pin
     along = 0.5 * (1.0 + (coupler**2 - rocker**2) / (apart * apart).sum(axis=1))
     off = -np.sqrt(coupler**2 / (apart * apart).sum(axis=1) - along**2)
-    truth = pin + along[:, None] * apart + off[:, None] * np.column_stack([-apart[:, 1], apart[:, 0]])
+    truth = (
+        pin + along[:, None] * apart + off[:, None] * np.column_stack([-apart[:, 1], apart[:, 0]])
+    )
 
     def place(x):
         return (*map(float, x), 0.0)
 
     mechanism = Mechanism(
         "nearly a parallelogram",
-        [Body("crank"), *(Body(f"{name} {k}") for k in range(loops) for name in ("coupler", "rocker"))],
+        [
+            Body("crank"),
+            *(Body(f"{name} {k}") for k in range(loops) for name in ("coupler", "rocker")),
+        ],
         [
             Revolute("A", "ground", "crank", (0.0, 0.0, 0.0), axis),
-            *(Revolute(f"B {k}", "crank", f"coupler {k}", place(pin[0]), axis) for k in range(loops)),
-            *(Revolute(f"C {k}", f"coupler {k}", f"rocker {k}", place(truth[0]), axis) for k in range(loops)),
-            *(Revolute(f"D {k}", "ground", f"rocker {k}", place(ground), axis) for k in range(loops)),
+            *(
+                Revolute(f"B {k}", "crank", f"coupler {k}", place(pin[0]), axis)
+                for k in range(loops)
+            ),
+            *(
+                Revolute(f"C {k}", f"coupler {k}", f"rocker {k}", place(truth[0]), axis)
+                for k in range(loops)
+            ),
+            *(
+                Revolute(f"D {k}", "ground", f"rocker {k}", place(ground), axis)
+                for k in range(loops)
+            ),
         ],
         [Point("P", "coupler 0", place(truth[0]))],
         [JointAngle("turn", "A")],
@@ -186,9 +215,20 @@ class Doubled(Crank):
             2e-3,
             0.0,
             1e-12,
-            "no assembly at the design position: no pose near there closes better than to 0.001 of the mechanism's size",
+            (
+                "no assembly at the design position: no pose near there closes better than to 0.001"
+                " of the mechanism's size"
+            ),
         ),
-        (2e-15, 0.0, 1e-16, "no assembly at the design position: the residual 1e-15 is rounding, and the tolerance 1e-16 is less"),
+        (
+            2e-15,
+            0.0,
+            1e-16,
+            (
+                "no assembly at the design position: the residual 1e-15 is rounding, and the"
+                " tolerance 1e-16 is less"
+            ),
+        ),
         (0.0, 1.0, 1e-12, "at the design position the drivers cannot move"),
     ],
 )

@@ -1,4 +1,6 @@
-"""The simulators' own solvers: what they reach, what they must not hide, and that they never mix with projection."""
+"""The simulators' own solvers: what they reach, what they must not hide, and that they never mix
+with projection.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ from kincheck.core.mechanism.motions import Sine
 
 from ..support.mechanisms import mcpherson
 
-# Largest errors on the strut at 1 m/s [m, m/s, m/s^2], about three times what was measured: an order of accuracy lost is found.
+# Largest errors on the strut at 1 m/s [m, m/s, m/s^2], about three times what was measured: an
+# order of accuracy lost is found.
 STRUT = {
     "mujoco": (1e-9, 2e-6, 5e-3),
     "mujoco-default": (2e-3, 3e-2, 1.0),
@@ -68,7 +71,10 @@ def worst(found):
 def strut(samples=41):
     case = cases.load("mcpherson_strut")
     return replace(
-        case, sweep=replace(case.sweep, values=np.linspace(-0.08, 0.08, samples)), reference={}, truth=Truth.CONSENSUS_ONLY
+        case,
+        sweep=replace(case.sweep, values=np.linspace(-0.08, 0.08, samples)),
+        reference={},
+        truth=Truth.CONSENSUS_ONLY,
     )
 
 
@@ -91,16 +97,25 @@ def test_a_stroke_out_of_reach_ends_and_says_so(name):
     case = replace(case, sweep=replace(case.sweep, values=np.linspace(0.0, 0.6, 61)))
     found = record(case, simulation(name))
     assert found.outcome is Outcome.FAIL
-    assert 20 < found.solved <= 30  # the lock-up is at +0.29337 m; what has rates is torn or ends a little before
-    assert "cannot be followed to stroke = 0.2" in found.message or "cannot be followed to stroke = 0.3" in found.message
+    # the lock-up is at +0.29337 m; what has rates is torn or ends a little before
+    assert 20 < found.solved <= 30
+    assert (
+        "cannot be followed to stroke = 0.2" in found.message
+        or "cannot be followed to stroke = 0.3" in found.message
+    )
     for series in found.outputs.values():
         assert all(value is None for value in series.position[found.solved :])
 
 
-@pytest.mark.parametrize("name", ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-static"])
+@pytest.mark.parametrize(
+    "name", ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-static"]
+)
 def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
     """Two drivers, neither steady, and a planar loop of revolutes, whose rows are redundant."""
-    z, corners = (0.0, 0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0), (0.7, 0.6, 0.0), (0.9, 0.0, 0.0))
+    z, corners = (
+        (0.0, 0.0, 1.0),
+        ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0), (0.7, 0.6, 0.0), (0.9, 0.0, 0.0)),
+    )
     names = ("ground", "crank", "coupler", "rocker", "ground")
     loop = [Revolute(f"pin {k}", names[k], names[k + 1], corners[k], z) for k in range(4)]
     arm = Revolute("elbow", "coupler", "arm", corners[2], (1.0, 0.0, 0.0))
@@ -114,9 +129,12 @@ def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
     motions = {"crank": Sine(0.3, 1.0), "arm": Sine(-0.5, 2.0)}
     sweep = Sweep("time", np.linspace(-0.1, 0.3, 81), motions=motions)
     outputs = tuple(
-        Output(axis, "tip", direction, False, 1e-9, 0.0, "made up") for axis, direction in zip("xyz", np.eye(3), strict=True)
+        Output(axis, "tip", direction, False, 1e-9, 0.0, "made up")
+        for axis, direction in zip("xyz", np.eye(3), strict=True)
     )
-    found = record(Case("arm", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs), simulation(name))
+    found = record(
+        Case("arm", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs), simulation(name)
+    )
     limits = {"exudyn-static": (1e-11,), "mujoco-projecting": (1e-11,)}.get(name, (1e-5, 1e-3, 0.2))
     errors = [error for error in worst(found) if error is not None]
     assert found.solved == 81
@@ -124,7 +142,9 @@ def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
     assert all(error <= limit for error, limit in zip(errors, limits, strict=True)), errors
 
 
-@pytest.mark.parametrize("name", ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-alpha", "exudyn-static"])
+@pytest.mark.parametrize(
+    "name", ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-alpha", "exudyn-static"]
+)
 def test_more_effort_is_more_precise(name):
     efforts = simulation(name).efforts()
     assert len({str(engine.settings) for engine in efforts.values()}) == len(efforts)
@@ -134,7 +154,10 @@ def test_more_effort_is_more_precise(name):
 
 
 def test_default_constraints_of_mujoco_stay_soft_whatever_the_step():
-    coarse, *_, fine = [worst(record(strut(), engine))[0] for engine in simulation("mujoco-default").efforts().values()]
+    coarse, *_, fine = [
+        worst(record(strut(), engine))[0]
+        for engine in simulation("mujoco-default").efforts().values()
+    ]
     assert fine > 0.5 * coarse > 1e-5
 
 
@@ -162,7 +185,9 @@ def test_a_floor_says_what_was_counted(name):
 
 
 def test_pinocchio_numbers_every_subtree_without_a_gap():
-    """Else its constraintDynamics is wrong without a word: positions of this case were off by a millimetre."""
+    """Else its constraintDynamics is wrong without a word: positions of this case were off by a
+    millimetre.
+    """
     model = simulation("pinocchio").build(cases.load("mcpherson_steered")).model
     for joint, subtree in enumerate(model.subtrees):
         assert joint == 0 or [*subtree] == [*range(joint, joint + len(subtree))]
@@ -180,8 +205,13 @@ def test_jointed_moves_as_the_mechanism_does():
 
 def test_a_rod_of_another_length_stays_a_distance():
     plain = mcpherson()
-    joints = [replace(joint, length=joint.rod_length + 1e-3) if isinstance(joint, Distance) else joint for joint in plain.joints]
-    assert any(isinstance(joint, Distance) for joint in jointed(replace(plain, joints=joints)).joints)
+    joints = [
+        replace(joint, length=joint.rod_length + 1e-3) if isinstance(joint, Distance) else joint
+        for joint in plain.joints
+    ]
+    assert any(
+        isinstance(joint, Distance) for joint in jointed(replace(plain, joints=joints)).joints
+    )
     case = replace(strut(), mechanism=replace(plain, joints=joints))
     assert "tie_rod" in adapters.engine("pinocchio", "simulate").unsupported(case)
 
@@ -191,17 +221,28 @@ def test_what_a_solver_cannot_express_is_named():
     mechanism = Mechanism(
         "gears",
         [Body("one"), Body("two")],
-        [Revolute("a", "ground", "one", (0.0, 0.0, 0.0), z), Revolute("b", "ground", "two", (1.0, 0.0, 0.0), z)],
+        [
+            Revolute("a", "ground", "one", (0.0, 0.0, 0.0), z),
+            Revolute("b", "ground", "two", (1.0, 0.0, 0.0), z),
+        ],
         [Point("tip", "two", (1.5, 0.0, 0.0))],
         [JointAngle("turn", "a")],
         [Gear("mesh", ("a", "b"), ratio=-2.0)],
     )
     output = Output("x", "tip", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "made up")
-    case = Case("gears", "made up", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.linspace(0.0, 7.0, 71)), (output,))
+    case = Case(
+        "gears",
+        "made up",
+        Truth.CONSENSUS_ONLY,
+        mechanism,
+        Sweep("turn", np.linspace(0.0, 7.0, 71)),
+        (output,),
+    )
     assert "mesh" in adapters.engine("pinocchio", "simulate").unsupported(case)
     uneven = replace(case, sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
     assert "equidistant" in adapters.engine("exudyn", "simulate").unsupported(uneven)
-    assert record(case, simulation("exudyn-static")).outcome is Outcome.PASS  # two turns and more of the second gear
+    # two turns and more of the second gear
+    assert record(case, simulation("exudyn-static")).outcome is Outcome.PASS
 
 
 def simulated(tmp_path, *options):
@@ -212,11 +253,23 @@ def simulated(tmp_path, *options):
 
 def test_the_command_line_keeps_modes_apart(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(adapters, "ENGINES", {"native": "Native", "mujoco": "MuJoCo"})
-    assert simulated(tmp_path, "--mode", "simulate", "--engine", "mujoco") == (1, [("mujoco", "simulate")])
-    assert simulated(tmp_path, "--engine", "mujoco-projecting") == (0, [("mujoco-projecting", "simulate")])
+    assert simulated(tmp_path, "--mode", "simulate", "--engine", "mujoco") == (
+        1,
+        [("mujoco", "simulate")],
+    )
+    assert simulated(tmp_path, "--engine", "mujoco-projecting") == (
+        0,
+        [("mujoco-projecting", "simulate")],
+    )
     assert simulated(tmp_path) == (0, [(name, "projection") for name in adapters.ENGINES])
-    assert main.main(["run", "mcpherson_strut", "--mode", "projection", "--engine", "exudyn-static"]) == 2
-    assert "engine 'exudyn-static' has the mode 'simulate', not 'projection'" in capsys.readouterr().err
+    assert (
+        main.main(["run", "mcpherson_strut", "--mode", "projection", "--engine", "exudyn-static"])
+        == 2
+    )
+    assert (
+        "engine 'exudyn-static' has the mode 'simulate', not 'projection'"
+        in capsys.readouterr().err
+    )
     assert main.main(["list"]) == 0
     assert "exudyn-static-modified" in capsys.readouterr().out
 
@@ -225,11 +278,24 @@ def slide(values, motion=None):
     """A block on a rail, driven along it."""
     rail = Translational("rail", "ground", "block", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     mechanism = Mechanism(
-        "slide", [Body("block")], [rail], [Point("tip", "block", (1.0, 0.2, 0.0))], [JointDisplacement("x", "rail")]
+        "slide",
+        [Body("block")],
+        [rail],
+        [Point("tip", "block", (1.0, 0.2, 0.0))],
+        [JointDisplacement("x", "rail")],
     )
-    sweep = Sweep("time", np.array(values), motions={"x": motion}) if motion else Sweep("x", np.array(values))
+    sweep = (
+        Sweep("time", np.array(values), motions={"x": motion})
+        if motion
+        else Sweep("x", np.array(values))
+    )
     return Case(
-        "slide", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, (Output("x", "tip", (1.0, 0.0, 0.0), False, 1e-5, 0.0, "test"),)
+        "slide",
+        "test",
+        Truth.CONSENSUS_ONLY,
+        mechanism,
+        sweep,
+        (Output("x", "tip", (1.0, 0.0, 0.0), False, 1e-5, 0.0, "test"),),
     )
 
 
@@ -243,7 +309,9 @@ def test_sweeps_to_one_side_only_or_of_one_sample(name, values):
 
 @pytest.mark.parametrize("name", ["exudyn", "exudyn-alpha"])
 def test_a_motion_may_begin_with_an_acceleration(name):
-    """The sine of 90 degrees: 0.5 (2 pi)^2 m/s^2 at once; an integrator that begins without is off by as much."""
+    """The sine of 90 degrees: 0.5 (2 pi)^2 m/s^2 at once; an integrator that begins without is off
+    by as much.
+    """
     found = record(slide(np.linspace(0.0, 0.1, 41), Sine(0.5, 1.0, np.pi / 2.0)), simulation(name))
     assert worst(found)[2] <= 0.02 * 0.5 * (2.0 * np.pi) ** 2
 
@@ -253,9 +321,18 @@ def test_where_the_nearest_sample_cannot_be_reached_the_other_side_is(name):
     """An arm whose tip is at 0.6 m and gets to 1 m."""
     hinge = Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     lift = PointCoordinate("y", "tip", (0.0, 1.0, 0.0))
-    mechanism = Mechanism("arm", [Body("arm")], [hinge], [Point("tip", "arm", (0.8, 0.6, 0.0))], [lift])
+    mechanism = Mechanism(
+        "arm", [Body("arm")], [hinge], [Point("tip", "arm", (0.8, 0.6, 0.0))], [lift]
+    )
     output = Output("x", "tip", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "test")
-    case = Case("arm", "test", Truth.CONSENSUS_ONLY, mechanism, Sweep("y", np.array([-0.5, 0.45])), (output,))
+    case = Case(
+        "arm",
+        "test",
+        Truth.CONSENSUS_ONLY,
+        mechanism,
+        Sweep("y", np.array([-0.5, 0.45])),
+        (output,),
+    )
     found = record(case, simulation(name))
     assert (found.outcome, found.solved) == (Outcome.FAIL, 1)
     assert "cannot be followed to y = 0.45" in found.message

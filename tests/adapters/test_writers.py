@@ -1,4 +1,6 @@
-"""Written models, read by their simulators alone: they close at the design and elsewhere, and move as the mechanism does."""
+"""Written models, read by their simulators alone: they close at the design and elsewhere, and move
+as the mechanism does.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -37,18 +39,28 @@ from ..oracles import naive
 from ..support.exported import READERS, read
 from ..support.mechanisms import four_bar, mcpherson, slider_crank, swapped
 
-# Roundings of numbers of a few metres: some twenty of 2.2e-16 each, through a chain of ten bodies at most.
+# Roundings of numbers of a few metres: some twenty of 2.2e-16 each, through a chain of ten bodies
+# at most.
 ROUND_OFF = 5e-15
 
 Z = (0.0, 0.0, 1.0)
 
 
 def case(mechanism, stop):
-    return Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, Sweep(mechanism.drivers[0].name, np.array([stop])), ())
+    return Case(
+        mechanism.name,
+        "made up",
+        Truth.CONSENSUS_ONLY,
+        mechanism,
+        Sweep(mechanism.drivers[0].name, np.array([stop])),
+        (),
+    )
 
 
 def rssr():
-    """With the rod as a body that cannot spin: the cross at its end is rounded off the right angle, as tables do."""
+    """With the rod as a body that cannot spin: the cross at its end is rounded off the right angle,
+    as tables do.
+    """
     ends = ((1.0, 0.0, 0.0), (2.0, 4.9, 2.2))
     rod = np.subtract(ends[1], ends[0])
     across = np.cross(rod, (0.3, -0.2, 1.0))
@@ -63,7 +75,13 @@ def rssr():
             Revolute("input", "ground", "crank", (0.0, 0.0, 0.0), Z),
             Revolute("output", "ground", "rocker", (2.0, 1.0, 3.0), (1.0, 0.0, 0.0)),
             Spherical("ball", "crank", "rod", ends[0]),
-            Universal("cross", "rocker", "rod", ends[1], (tuple(np.round(across, 1)), tuple(np.cross(rod, across)))),
+            Universal(
+                "cross",
+                "rocker",
+                "rod",
+                ends[1],
+                (tuple(np.round(across, 1)), tuple(np.cross(rod, across))),
+            ),
         ],
         [Point("end", "rocker", ends[1])],
         [JointAngle("turn", "input")],
@@ -71,7 +89,9 @@ def rssr():
 
 
 def gear_train():
-    """Turned several times: a pinion on a screw, whose nut is kept from turning, with a rack and a further wheel."""
+    """Turned several times: a pinion on a screw, whose nut is kept from turning, with a rack and a
+    further wheel.
+    """
     return Mechanism(
         "gear_train",
         [
@@ -96,7 +116,9 @@ def gear_train():
 
 
 def shafts():
-    """Two shafts, the bearing of one of them long, joined by a constant-velocity joint that closes the loop."""
+    """Two shafts, the bearing of one of them long, joined by a constant-velocity joint that closes
+    the loop.
+    """
     across = (0.2, 0.3, 1.0)
     return Mechanism(
         "shafts",
@@ -112,14 +134,25 @@ def shafts():
 
 
 def coupled_loop():
-    """Two four-bars whose coupled joints close their loops, so that their coordinates are not those of a tree."""
+    """Two four-bars whose coupled joints close their loops, so that their coordinates are not those
+    of a tree.
+    """
     one = four_bar()
     names = {body.name: f"{body.name}_2" for body in one.bodies} | {"ground": "ground"}
-    other = [replace(joint, name=f"{joint.name}2", i=names[joint.i], j=names[joint.j]) for joint in one.joints]
+    other = [
+        replace(joint, name=f"{joint.name}2", i=names[joint.i], j=names[joint.j])
+        for joint in one.joints
+    ]
     bodies = [*one.bodies, *(replace(body, name=names[body.name]) for body in one.bodies)]
     couplers = [Gear(f"pair_{joint}", (joint, f"{joint}2"), 1.0) for joint in "ABCD"][:1]
     every = [Gear(f"again_{joint}", (joint, f"{joint}2"), 1.0) for joint in "BCD"]
-    return replace(one, name="coupled_loop", bodies=bodies, joints=[*one.joints, *other], couplers=[*couplers, *every])
+    return replace(
+        one,
+        name="coupled_loop",
+        bodies=bodies,
+        joints=[*one.joints, *other],
+        couplers=[*couplers, *every],
+    )
 
 
 CASES = {
@@ -151,7 +184,9 @@ def reading(to, name, folder, elsewhere=True):
 
 
 def assert_read(found, mechanism, path, elsewhere):
-    """It closes, is as free as it has drivers (so nothing is missing that would have to close), and is where it should be."""
+    """It closes, is as free as it has drivers (so nothing is missing that would have to close), and
+    is where it should be.
+    """
     assert np.abs(found.residuals).max(initial=0.0) <= ROUND_OFF * (10.0 if elsewhere else 1.0)
     assert found.freedom == len(mechanism.drivers)
     for body in mechanism.moving:
@@ -160,9 +195,15 @@ def assert_read(found, mechanism, path, elsewhere):
         assert np.abs(A - naive.A(path[body.name].p[-1])).max() <= 10.0 * ROUND_OFF
     for point in mechanism.points:
         expected = naive.Body(path[point.body].r[-1], path[point.body].p[-1])
-        start = naive.Body(np.array(mechanism.body(point.body).origin), np.array(mechanism.body(point.body).euler_parameters))
+        start = naive.Body(
+            np.array(mechanism.body(point.body).origin),
+            np.array(mechanism.body(point.body).euler_parameters),
+        )
         arm = start.A.T @ (np.array(point.position) - start.r)
-        assert np.abs(found.points[point.name] - (expected.r + expected.A @ arm)).max() <= 10.0 * ROUND_OFF
+        assert (
+            np.abs(found.points[point.name] - (expected.r + expected.A @ arm)).max()
+            <= 10.0 * ROUND_OFF
+        )
 
 
 @pytest.mark.parametrize("elsewhere", [False, True], ids=["design", "elsewhere"])
@@ -174,10 +215,18 @@ def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere
 
 
 def cut_elsewhere(mechanism):
-    """The tree without the joint that is probed: what it carried is free, and it closes the loop."""
+    """The tree without the joint that is probed: what it carried is free, and it closes the
+    loop.
+    """
     tree = spanning_tree(mechanism)
-    tested = [joint for joint in mechanism.joints if joint.name in ("tested", "second") and joint not in tree.cut]
-    branches = [Branch(GROUND, each.child, None) if each.joint in tested else each for each in tree.branches]
+    tested = [
+        joint
+        for joint in mechanism.joints
+        if joint.name in ("tested", "second") and joint not in tree.cut
+    ]
+    branches = [
+        Branch(GROUND, each.child, None) if each.joint in tested else each for each in tree.branches
+    ]
     return SpanningTree(tuple(branches), (*tree.cut, *tested))
 
 
@@ -198,7 +247,8 @@ def test_the_cases_move_and_count_turns():
             )
             > 0.01
         )
-    assert abs(way("gear_train", True)["nut"].r[-1, 2] - 0.3 + 1.5 / (2.0 * np.pi)) <= 1e-14  # 150 rad of 0.01 m a turn
+    # 150 rad of 0.01 m a turn
+    assert abs(way("gear_train", True)["nut"].r[-1, 2] - 0.3 + 1.5 / (2.0 * np.pi)) <= 1e-14
 
 
 @pytest.mark.parametrize("to", READERS)
@@ -206,7 +256,9 @@ def test_a_start_of_another_mechanism_is_seen(to, tmp_path):
     """The tie rod a millimetre longer than where the poses are from."""
     mechanism = mcpherson()
     rod = mechanism.joint("tie_rod")
-    longer = replace(mechanism, joints=[*mechanism.joints[:-1], replace(rod, length=rod.design_distance + 1e-3)])
+    longer = replace(
+        mechanism, joints=[*mechanism.joints[:-1], replace(rod, length=rod.design_distance + 1e-3)]
+    )
     texts = adapters.writer(to)(longer, way("mcpherson", True), {})
     found = read(to, texts, longer, tmp_path)
     assert np.abs(found.residuals).max() == pytest.approx(1e-3, abs=1e-14)
@@ -218,7 +270,12 @@ def test_a_joint_without_counterpart_is_named(to):
         pass
 
     mechanism = mcpherson()
-    mine = replace(mechanism, joints=[Mine(*vars(each).values()) if each.name == "ball" else each for each in mechanism.joints])
+    mine = replace(
+        mechanism,
+        joints=[
+            Mine(*vars(each).values()) if each.name == "ball" else each for each in mechanism.joints
+        ],
+    )
     with pytest.raises(KincheckError, match=r"joint 'ball' \(spherical\) has no counterpart in"):
         adapters.writer(to)(mine, way("mcpherson", False), {})
 
@@ -227,32 +284,48 @@ def test_names_that_a_format_keeps_or_needs_twice_are_refused():
     mechanism, path = slider_crank(), dict(way("slider_crank", False))
     world = replace(
         mechanism,
-        bodies=[replace(body, name=body.name.replace("crank", "world")) for body in mechanism.bodies],
-        joints=[replace(each, i=each.i.replace("crank", "world"), j=each.j.replace("crank", "world")) for each in mechanism.joints],
-        points=[replace(each, body=each.body.replace("crank", "world")) for each in mechanism.points],
+        bodies=[
+            replace(body, name=body.name.replace("crank", "world")) for body in mechanism.bodies
+        ],
+        joints=[
+            replace(each, i=each.i.replace("crank", "world"), j=each.j.replace("crank", "world"))
+            for each in mechanism.joints
+        ],
+        points=[
+            replace(each, body=each.body.replace("crank", "world")) for each in mechanism.points
+        ],
     )
     with pytest.raises(KincheckError, match="'world' is taken"):
         adapters.writer("mjcf")(world, path | {"world": path["crank"]}, {})
-    twice = replace(mechanism, points=[*mechanism.points, Point("rod.first", "crank", (0.0, 0.0, 0.0))])
+    twice = replace(
+        mechanism, points=[*mechanism.points, Point("rod.first", "crank", (0.0, 0.0, 0.0))]
+    )
     with pytest.raises(KincheckError, match=r"'rod\.first' is taken"):
         adapters.writer("mjcf")(twice, path, {})
 
 
 def test_a_start_that_cannot_be_reached_says_how_far_it_goes():
-    with pytest.raises(SolveError, match=r"no way from the design to stroke = 0\.5: .*beyond stroke = 0\.29"):
+    with pytest.raises(
+        SolveError, match=r"no way from the design to stroke = 0\.5: .*beyond stroke = 0\.29"
+    ):
         way_to(CASES["mcpherson"], 0.5)
 
 
 # The command
 
 
-@pytest.mark.parametrize(("to", "endings"), [("mjcf", [".xml"]), ("exudyn", [".py"]), ("urdf", [".urdf", ".constraints.json"])])
+@pytest.mark.parametrize(
+    ("to", "endings"),
+    [("mjcf", [".xml"]), ("exudyn", [".py"]), ("urdf", [".urdf", ".constraints.json"])],
+)
 def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main.main(["export", "mcpherson_strut", "--to", to, "--at", "0.03"]) == 0
     names = [f"mcpherson_strut{ending}" for ending in endings]
     assert capsys.readouterr().out.split() == names
-    texts = {ending: (tmp_path / name).read_text() for ending, name in zip(endings, names, strict=True)}
+    texts = {
+        ending: (tmp_path / name).read_text() for ending, name in zip(endings, names, strict=True)
+    }
     assert "0.03" in texts[endings[-1]]
     found = read(to, texts, replace(mcpherson(), points=(), drivers=()), tmp_path)
     assert found.bodies["knuckle"][0][2] == pytest.approx(0.131, abs=1e-15)
@@ -264,7 +337,10 @@ def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch
         (["--to", "mjfc"], "there is no format 'mjfc'; did you mean 'mjcf'?"),
         (["--to", "mjcf"], "mcpherson_strut.xml is there already"),
         (["--to", "mjcf", "--at", "nan"], "the start nan is not finite"),
-        (["--to", "mjcf", "--out", "nowhere/strut.xml"], "cannot be written (No such file or directory)"),
+        (
+            ["--to", "mjcf", "--out", "nowhere/strut.xml"],
+            "cannot be written (No such file or directory)",
+        ),
     ],
 )
 def test_what_cannot_be_exported_is_said(argv, said, tmp_path, monkeypatch, capsys):
@@ -279,4 +355,6 @@ def test_help_names_the_formats_that_there_are(capsys):
     assert tuple(FORMATS) == adapters.WRITERS
     for command in ("export", "assemblies"):
         assert main.main([command, "--help"]) == 0
-        assert "mjcf (MuJoCo), exudyn (a Python script) or urdf (Pinocchio)" in " ".join(capsys.readouterr().out.split())
+        assert "mjcf (MuJoCo), exudyn (a Python script) or urdf (Pinocchio)" in " ".join(
+            capsys.readouterr().out.split()
+        )

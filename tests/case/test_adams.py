@@ -1,8 +1,10 @@
-"""Single joints against ADAMS: recorded motion put into the joints' equations must satisfy them as far as it was printed.
+"""Single joints against ADAMS: recorded motion put into the joints' equations must satisfy them as
+far as it was printed.
 
-Positions, velocities and accelerations of a body that hangs on one joint come from elsewhere (source and licence in the data
-file). No dynamics is needed: phi, rows . v - nu and rows . a - gamma of the right joint vanish, those of a wrong one don't. The
-other body is the ground: what gamma says of two turning bodies is for test_joints and test_primitives.
+Positions, velocities and accelerations of a body that hangs on one joint come from elsewhere
+(source and licence in the data file). No dynamics is needed: phi, rows . v - nu and rows . a -
+gamma of the right joint vanish, those of a wrong one don't. The other body is the ground: what
+gamma says of two turning bodies is for test_joints and test_primitives.
 """
 
 import json
@@ -10,7 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core import Cylindrical, Distance, Revolute, RevoluteSpherical, Spherical, Translational, Universal
+from kincheck.core import (
+    Cylindrical,
+    Distance,
+    Revolute,
+    RevoluteSpherical,
+    Spherical,
+    Translational,
+    Universal,
+)
 from kincheck.core.algebra import ZERO, Quat, Vec3
 from kincheck.core.joints import Attachment
 from kincheck.core.primitives import conventional, paper
@@ -18,14 +28,17 @@ from kincheck.core.primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
 
 from ..oracles import naive
 
-CASES = json.loads((Path(__file__).parents[1] / "data" / "adams_single_joints.json").read_text(encoding="utf-8"))["cases"]
+CASES = json.loads(
+    (Path(__file__).parents[1] / "data" / "adams_single_joints.json").read_text(encoding="utf-8")
+)["cases"]
 NAMES = ("joint", "ground", "body")
 STYLES = {"native": None, "paper": paper.TWINS, "conventional": conventional.TWINS}
 
 # The data have six significant digits, trailing zeros left out.
 DIGITS = 6
-# The decks name no integrator, and ADAMS' default holds the constraints on positions alone (index 3): velocities and
-# accelerations satisfy theirs no better than it integrates. Measured, as parts of the largest of a case: 1.3e-5 and 1.1e-4.
+# The decks name no integrator, and ADAMS' default holds the constraints on positions alone (index
+# 3): velocities and accelerations satisfy theirs no better than it integrates. Measured, as parts
+# of the largest of a case: 1.3e-5 and 1.1e-4.
 INTEGRATED = {"velocity": 2e-5, "acceleration": 2e-4}
 # A wrong joint has to be wrong beyond doubt: by this many limits, in its positions already.
 BEYOND_DOUBT = 100.0
@@ -40,7 +53,9 @@ def axes(case):
 
 
 def right(case):
-    """The joint of a case: revolute, prismatic and cylindrical along z; universal with x on the ground and y on the body."""
+    """The joint of a case: revolute, prismatic and cylindrical along z; universal with x on the
+    ground and y on the body.
+    """
     if case["joint"] == "distance":
         return Distance(*NAMES, (case["ground_point"], case["body_point"]), case["length"])
     if case["joint"] == "revolute_spherical":
@@ -55,7 +70,9 @@ def right(case):
 
 
 class Replay:
-    """The motion of a case as lanes, shape (19, samples): position, Euler parameters, v, w, vdot, wdot; design is at t = 0."""
+    """The motion of a case as lanes, shape (19, samples): position, Euler parameters, v, w, vdot,
+    wdot; design is at t = 0.
+    """
 
     def __init__(self, name, style="native"):
         self.case = CASES[name]
@@ -67,7 +84,11 @@ class Replay:
     def primitives(self, joint):
         at = {"ground": Attachment(ZERO), "body": Attachment(self.origin)}
         composed = joint.primitives(at[joint.i], at[joint.j])
-        return composed if self.style is None else [twin for each in composed for twin in self.style[type(each)](each)]
+        return (
+            composed
+            if self.style is None
+            else [twin for each in composed for twin in self.style[type(each)](each)]
+        )
 
     def residuals(self, joint, numbers):
         """phi, rows . v - nu and rows . a - gamma: shape (3, rows, samples)."""
@@ -82,25 +103,50 @@ class Replay:
             here = pose.A.T if primitive.body_axes else None
             turning, rising = (w, w_t) if here is None else (here @ w, here @ w_t)
             moving = Twist(v, turning)
-            rows = [(row.ri, row.pi) if first else (row.rj, row.pj) for row in primitive.rows(*poses)]
-            gamma = primitive.gamma(*poses, *((moving, GROUND_TWIST) if first else (GROUND_TWIST, moving)))
+            rows = [
+                (row.ri, row.pi) if first else (row.rj, row.pj) for row in primitive.rows(*poses)
+            ]
+            gamma = primitive.gamma(
+                *poses, *((moving, GROUND_TWIST) if first else (GROUND_TWIST, moving))
+            )
             phi += primitive.phi(*poses)
-            phi_t += [r @ v + pi @ turning - nu for (r, pi), nu in zip(rows, primitive.nu(*poses), strict=True)]
-            phi_tt += [r @ v_t + pi @ rising - each for (r, pi), each in zip(rows, gamma, strict=True)]
-        return np.array([[np.broadcast_to(each, numbers.shape[1:]) for each in order] for order in (phi, phi_t, phi_tt)])
+            phi_t += [
+                r @ v + pi @ turning - nu
+                for (r, pi), nu in zip(rows, primitive.nu(*poses), strict=True)
+            ]
+            phi_tt += [
+                r @ v_t + pi @ rising - each for (r, pi), each in zip(rows, gamma, strict=True)
+            ]
+        return np.array(
+            [
+                [np.broadcast_to(each, numbers.shape[1:]) for each in order]
+                for order in (phi, phi_t, phi_tt)
+            ]
+        )
 
     @property
     def uncertainty(self):
-        """How far each number may be off: half a unit of its last digit, and what the integrator adds."""
+        """How far each number may be off: half a unit of its last digit, and what the integrator
+        adds.
+        """
         size = np.abs(self.numbers)
-        printed = 0.5 * 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, 1.0))) - (DIGITS - 1)) * (size > 0.0)
-        for part, share in ((VELOCITY, INTEGRATED["velocity"]), (ACCELERATION, INTEGRATED["acceleration"])):
+        printed = (
+            0.5
+            * 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, 1.0))) - (DIGITS - 1))
+            * (size > 0.0)
+        )
+        for part, share in (
+            (VELOCITY, INTEGRATED["velocity"]),
+            (ACCELERATION, INTEGRATED["acceleration"]),
+        ):
             largest = [size[part][:3].max(), size[part][3:].max()]  # of the shift and of the turn
             printed[part] += share * np.repeat(largest, 3)[:, None]
         return printed
 
     def limits(self, joint):
-        """The residuals that such numbers can leave: the changes made by each of them, summed; shape (3, rows, samples)."""
+        """The residuals that such numbers can leave: the changes made by each of them, summed;
+        shape (3, rows, samples).
+        """
         exact = self.residuals(joint, self.numbers)
         changes = np.zeros_like(exact)
         for k, off in enumerate(self.uncertainty):
@@ -123,9 +169,13 @@ def test_recorded_motion_satisfies_the_joint(name, style):
 
 
 @pytest.mark.parametrize("style", STYLES)
-@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case["joint"] != "revolute_spherical"])
+@pytest.mark.parametrize(
+    "name", [name for name, case in CASES.items() if case["joint"] != "revolute_spherical"]
+)
 def test_the_joint_seen_from_the_body(name, style):
-    """With the body as the first one; a revolute-spherical joint would be another, with its hinge on the body."""
+    """With the body as the first one; a revolute-spherical joint would be another, with its hinge
+    on the body.
+    """
     replay = Replay(name, style)
     assert replay.worst(right(replay.case).reversed()) == pytest.approx([0.0, 0.0, 0.0], abs=1.0)
 
@@ -134,7 +184,10 @@ def wrong_joints(case):
     """Joints of the same type with other axes or points, and of types that leave less."""
     if case["joint"] in ("distance", "revolute_spherical"):
         ends = (case["ground_point"], case["body_point"])
-        yield "its points exchanged", type(right(case))(*NAMES, ends[::-1], *([case["axis"]] if "axis" in case else []))
+        yield (
+            "its points exchanged",
+            type(right(case))(*NAMES, ends[::-1], *([case["axis"]] if "axis" in case else [])),
+        )
         yield "a ball at its end", Spherical(*NAMES, ends[1])
         if case["joint"] == "distance":
             yield "a millimetre longer", Distance(*NAMES, ends, case["length"] + 1e-3)
@@ -163,7 +216,8 @@ def wrong_joints(case):
 
 
 BLIND = {
-    # the swing is about the joint frame's y, or about one of the two axes: what allows that is right here
+    # the swing is about the joint frame's y, or about one of the two axes: what allows that is
+    # right here
     "Spherical_Case01": {"a revolute along y", "a universal along xy", "a universal along yz"},
     "Universal_Case01": {"its axes exchanged", "a revolute along x"},
     "Universal_Case02": {"its axes exchanged", "a revolute along y"},

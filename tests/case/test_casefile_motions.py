@@ -1,4 +1,6 @@
-"""Case files with couplers and motions: in the units of the file, and what a table of them covers."""
+"""Case files with couplers and motions: in the units of the file, and what a table of them
+covers.
+"""
 
 from pathlib import Path
 
@@ -81,19 +83,27 @@ steps = 9
 
 
 def test_couplers_and_joints_without_geometry(tmp_path: Path):
-    """A steering column turns a pinion by a gear, that moves a rack, and lifts a nut by a thread."""
+    """A steering column turns a pinion by a gear, that moves a rack, and lifts a nut by a
+    thread.
+    """
     case = load_case(write(tmp_path, COUPLED))
     assert case.mechanism.couplers == (
         Gear("mesh", ("column_axle", "pinion_axle"), -2.0),
         RackPinion("rolls", ("pinion_axle", "guide"), -0.02),
     )
-    assert case.mechanism.joint("thread") == Screw("thread", "column", "nut", (0.0, 0.0, 0.1), (0.0, 0.0, 1.0), 0.006)
+    assert case.mechanism.joint("thread") == Screw(
+        "thread", "column", "nut", (0.0, 0.0, 0.1), (0.0, 0.0, 1.0), 0.006
+    )
     assert case.mechanism.joint("upright") == OrientationLock("upright", "ground", "nut")
     found = Native().solve(Native().build(case), case, 1e-12)
     assert found.solved.all()
     turn = case.sweep.values
-    assert found.points["rack_end"].position[:, 0] == pytest.approx(0.16 - 0.02 * turn / -2.0, abs=1e-14)
-    assert found.points["nut"].position[:, 2] == pytest.approx(0.1 - 0.006 * turn / (2.0 * np.pi), abs=1e-14)
+    assert found.points["rack_end"].position[:, 0] == pytest.approx(
+        0.16 - 0.02 * turn / -2.0, abs=1e-14
+    )
+    assert found.points["nut"].position[:, 2] == pytest.approx(
+        0.1 - 0.006 * turn / (2.0 * np.pi), abs=1e-14
+    )
 
 
 MOTION = """[drivers.turn.motion]
@@ -124,7 +134,11 @@ def test_motions_are_in_the_units_of_the_file(tmp_path: Path):
     sweep = COUPLED[COUPLED.index("[sweep]") :]
     text = edited((sweep, MOTION + "start = 0\nstop = 1.5\nsteps = 4\n"), base=COUPLED)
     case = load_case(write(tmp_path, text))
-    assert (case.sweep.driver, case.sweep.rate, case.sweep.values.tolist()) == ("time", 1.0, [0.0, 0.5, 1.0, 1.5])
+    assert (case.sweep.driver, case.sweep.rate, case.sweep.values.tolist()) == (
+        "time",
+        1.0,
+        [0.0, 0.5, 1.0, 1.5],
+    )
     turn, shift, hang = case.sweep.motions.values()
     assert turn == Sine(np.radians(90.0), 2.0, np.radians(45.0))
     assert shift == Ramp(0.003)
@@ -139,6 +153,9 @@ def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path: Path
     """2.1 m at 0.7 m/s take 3.0000000000000004 s, more than the table has."""
     motion = MOTION[MOTION.index("[drivers.hang]") :].replace("[0, 1.5]", "[-3, 3]")
     push = edited(
-        ("[sweep]\n", motion.replace("rack_end", "tip")), ("= -0.1", "= -2.1"), ("stop = 0.1", "stop = 2.1"), ("= 2.0", "= 0.7")
+        ("[sweep]\n", motion.replace("rack_end", "tip")),
+        ("= -0.1", "= -2.1"),
+        ("stop = 0.1", "stop = 2.1"),
+        ("= 2.0", "= 0.7"),
     )
     assert load_case(write(tmp_path, push)).sweep.path.times[-1] > 3.0

@@ -48,7 +48,11 @@ def test_every_type_is_printed(capsys):
 
 
 def test_every_key_is_printed():
-    for registry, keys in ((Joint.registry | Coupler.registry, joint_keys), (DRIVERS, driver_keys), (Motion.registry, motion_keys)):
+    for registry, keys in (
+        (Joint.registry | Coupler.registry, joint_keys),
+        (DRIVERS, driver_keys),
+        (Motion.registry, motion_keys),
+    ):
         for name, cls in registry.items():
             for key in set(keys(cls).__struct_fields__) - {"type", "bodies", "joints", "motion"}:
                 assert key in lines()[name]
@@ -64,17 +68,31 @@ def test_every_type_says_what_it_does(own_joint_types):
         for name, cls in registry.items():
             if cls.__module__.startswith("kincheck."):
                 assert found[name].endswith(f"  {cls.__doc__.splitlines()[0]}")
-    assert found["revolute"].endswith("  Both bodies share the point and the axis and turn about it.")
-    assert found[Mute.type].endswith("rotation z")  # not the signature that a dataclass has for a text
+    assert found["revolute"].endswith(
+        "  Both bodies share the point and the axis and turn about it."
+    )
+    # not the signature that a dataclass has for a text
+    assert found[Mute.type].endswith("rotation z")
 
 
 def test_rows_and_freedoms():
-    ours = {name: cls for name, cls in Joint.registry.items() if cls.__module__.startswith("kincheck.")}
+    ours = {
+        name: cls for name, cls in Joint.registry.items() if cls.__module__.startswith("kincheck.")
+    }
     assert {name: rows_of(cls) for name, cls in ours.items()} == ROWS
     for name, rows in ROWS.items():
         assert f"  {rows} row" in lines()[name]
         assert f"  {6 - rows} free" in lines()[name]
-    assert lines()["gear"].split()[:8] == ["gear", "ratio", "1", "row", "couples", "rotation", "and", "rotation"]
+    assert lines()["gear"].split()[:8] == [
+        "gear",
+        "ratio",
+        "1",
+        "row",
+        "couples",
+        "rotation",
+        "and",
+        "rotation",
+    ]
     assert "points, (length)" in lines()["distance"]
 
 
@@ -100,8 +118,17 @@ def test_every_key_of_a_file_is_in_the_reference_that_is_printed(capsys):
     """Read off the structures that take them; what is optional stands in brackets."""
     assert main.main(["list", "--schema"]) == 0
     said = capsys.readouterr().out
-    structures = [each for room in (schema, variation_file) for each in vars(room).values() if isinstance(each, type)]
-    keys = [each for each in structures if issubclass(each, msgspec.Struct) and each is not msgspec.Struct]
+    structures = [
+        each
+        for room in (schema, variation_file)
+        for each in vars(room).values()
+        if isinstance(each, type)
+    ]
+    keys = [
+        each
+        for each in structures
+        if issubclass(each, msgspec.Struct) and each is not msgspec.Struct
+    ]
     assert len(keys) >= 8
     for name in [name for each in keys for name in msgspec.structs.fields(each)]:
         assert re.search(rf"[\[( ]{name.encode_name}\b", said), name.encode_name

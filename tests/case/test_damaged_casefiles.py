@@ -20,11 +20,15 @@ ANYTHING = st.recursive(
     | st.floats()
     | st.text(max_size=8)
     | st.sampled_from(["ground", "revolute", "slider"]),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=3)
+    ),
     max_leaves=8,
 )
 
-FUZZ = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(
+    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 def read_or_refuse(file: Path) -> None:
@@ -39,30 +43,51 @@ def read_or_refuse(file: Path) -> None:
 
 
 @FUZZ
-@given(data=st.binary(max_size=60) | st.text(max_size=60).map(lambda text: text.encode(errors="surrogatepass")))
+@given(
+    data=st.binary(max_size=60)
+    | st.text(max_size=60).map(lambda text: text.encode(errors="surrogatepass"))
+)
 def test_garbage(tmp_path: Path, data: bytes):
     for name in ("case.toml", "case.json", "case"):
         read_or_refuse(write(tmp_path, data, name))
 
 
 @FUZZ
-@given(cut=st.integers(0, len(BASE + INLINE)), length=st.integers(0, 12), instead=st.text(max_size=4))
+@given(
+    cut=st.integers(0, len(BASE + INLINE)), length=st.integers(0, 12), instead=st.text(max_size=4)
+)
 def test_damaged_text(tmp_path: Path, cut: int, length: int, instead: str):
     text = BASE + INLINE
-    read_or_refuse(write(tmp_path, (text[:cut] + instead + text[cut + length :]).encode(errors="surrogatepass")))
+    read_or_refuse(
+        write(
+            tmp_path, (text[:cut] + instead + text[cut + length :]).encode(errors="surrogatepass")
+        )
+    )
 
 
 def places(value: object, path: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
-    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    return [path] * bool(path) + [place for key, each in inside for place in places(each, (*path, key))]
+    inside = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
+    return [path] * bool(path) + [
+        place for key, each in inside for place in places(each, (*path, key))
+    ]
 
 
-PLACES = [(text, place) for text in (BASE + INLINE, DRIVEN) for place in places(tomllib.loads(text))]
+PLACES = [
+    (text, place) for text in (BASE + INLINE, DRIVEN) for place in places(tomllib.loads(text))
+]
 
 
 @FUZZ
 @given(place=st.sampled_from(PLACES), value=ANYTHING)
-def test_wrong_values_anywhere(tmp_path: Path, place: tuple[str, tuple[object, ...]], value: object):
+def test_wrong_values_anywhere(
+    tmp_path: Path, place: tuple[str, tuple[object, ...]], value: object
+):
     text, place = place
     document = tomllib.loads(text)
     *way, last = place
@@ -77,7 +102,9 @@ def test_wrong_values_anywhere(tmp_path: Path, place: tuple[str, tuple[object, .
 @given(rows=st.lists(st.lists(st.floats() | st.text(max_size=5), max_size=4), max_size=5))
 def test_wrong_reference_files(tmp_path: Path, rows: list[list[object]]):
     lines = "\n".join(",".join(map(str, row)) for row in rows)
-    write(tmp_path, ("push,tip_x,tip_x.velocity\n" + lines).encode(errors="surrogatepass"), "tip.csv")
+    write(
+        tmp_path, ("push,tip_x,tip_x.velocity\n" + lines).encode(errors="surrogatepass"), "tip.csv"
+    )
     try:
         load_case(write(tmp_path, BASE + BY_FILE))
     except CaseError as error:

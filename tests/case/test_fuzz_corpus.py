@@ -1,4 +1,5 @@
-"""What fuzzing has found, read again: a minimal set of inputs that reaches all that was reached, and all that failed once.
+"""What fuzzing has found, read again: a minimal set of inputs that reaches all that was reached,
+and all that failed once.
 
 The fuzzers themselves run by hand: see tests/fuzz/__main__.py.
 """
@@ -10,7 +11,13 @@ import pytest
 
 from ..fuzz import casefile, fuzzing, hardpoints, keeping, mjcf, reference, results
 
-READERS = {"casefile": casefile, "hardpoints": hardpoints, "mjcf": mjcf, "reference": reference, "results": results}
+READERS = {
+    "casefile": casefile,
+    "hardpoints": hardpoints,
+    "mjcf": mjcf,
+    "reference": reference,
+    "results": results,
+}
 # Inputs of a random choice of changes, the same in every run; the fuzzers try millions.
 CHANGES = 40
 

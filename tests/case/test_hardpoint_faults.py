@@ -1,4 +1,6 @@
-"""Hardpoint files that were cut, mistyped or left without their unit: one message each, of file, key, found value and remedy."""
+"""Hardpoint files that were cut, mistyped or left without their unit: one message each, of file,
+key, found value and remedy.
+"""
 
 from pathlib import Path
 
@@ -27,7 +29,9 @@ WHOLE = Supplied(WISHBONE, "mm", "rearward,right,up")
 
 
 def complains(file, supplied, *fragments):
-    """Exactly a CaseError, on one line, that begins with the file and contains all the fragments."""
+    """Exactly a CaseError, on one line, that begins with the file and contains all the
+    fragments.
+    """
     with pytest.raises(CaseError) as caught:
         load(file, supplied)
     message = str(caught.value)
@@ -37,7 +41,9 @@ def complains(file, supplied, *fragments):
 
 
 def edited(tmp_path, source, *edits):
-    text, name = (source, "car.csv") if isinstance(source, str) else (source.read_text(), source.name)
+    text, name = (
+        (source, "car.csv") if isinstance(source, str) else (source.read_text(), source.name)
+    )
     for old, new in edits:
         assert old in text
         text = text.replace(old, new, 1)
@@ -48,12 +54,30 @@ def edited(tmp_path, source, *edits):
 
 CHRONO_FAULTS = {
     "cut": (("Location Chassis Front", "Loc"), ["not valid JSON"]),
-    "misspelt": (('"Location Upright": [-0.02', '"Location Uprihgt": [-0.02'), ["lca_outer", "Control Arm/Location Uprihgt"]),
-    "no list": (("[0.22, 0.52, -0.156]", "0.22"), ["Control Arm/Location Chassis Front", "0.22", "three numbers"]),
-    "two numbers": (("[0.22, 0.52, -0.156]", "[0.22, 0.52]"), ["Control Arm/Location Chassis Front", "three numbers"]),
-    "text": (("[0.22, 0.52, -0.156]", '[0.22, 0.52, "low"]'), ["Control Arm/Location Chassis Front", "'low'", "coordinate"]),
-    "no suspension": (('"Type": "Suspension"', '"Type": "Steering"'), ["Type", "Steering", "Suspension"]),
-    "other template": (('"MacPhersonStrut"', '"SolidAxle"'), ["Template", "SolidAxle", "mcpherson, double_wishbone, five_link"]),
+    "misspelt": (
+        ('"Location Upright": [-0.02', '"Location Uprihgt": [-0.02'),
+        ["lca_outer", "Control Arm/Location Uprihgt"],
+    ),
+    "no list": (
+        ("[0.22, 0.52, -0.156]", "0.22"),
+        ["Control Arm/Location Chassis Front", "0.22", "three numbers"],
+    ),
+    "two numbers": (
+        ("[0.22, 0.52, -0.156]", "[0.22, 0.52]"),
+        ["Control Arm/Location Chassis Front", "three numbers"],
+    ),
+    "text": (
+        ("[0.22, 0.52, -0.156]", '[0.22, 0.52, "low"]'),
+        ["Control Arm/Location Chassis Front", "'low'", "coordinate"],
+    ),
+    "no suspension": (
+        ('"Type": "Suspension"', '"Type": "Steering"'),
+        ["Type", "Steering", "Suspension"],
+    ),
+    "other template": (
+        ('"MacPhersonStrut"', '"SolidAxle"'),
+        ["Template", "SolidAxle", "mcpherson, double_wishbone, five_link"],
+    ),
     "template no text": (('"MacPhersonStrut"', "7"), ["Template", "7", "name"]),
     "millimetres": (("0.22, 0.52, -0.156", "220.0, 520.0, -156.0"), ["span", "another unit"]),
 }
@@ -69,11 +93,20 @@ def test_chrono(tmp_path, kind):
 
 
 ADAMS_FAULTS = {
-    "no units": ((" LENGTH  =  'mm'\n", ""), ["does not say in which unit", "--units mm or --units m"]),
+    "no units": (
+        (" LENGTH  =  'mm'\n", ""),
+        ["does not say in which unit", "--units mm or --units m"],
+    ),
     "unknown unit": (("'mm'", "'furlong'"), ["unit", "furlong", "mm"]),
     "cut row": (("-750.0      130.0", "-750.0"), ["line 17", "found 4 fields", "expected 5"]),
-    "no number": (("-750.0      130.0", "-750.0      13O.0"), ["line 17", "lca_outer", "z_value", "'13O.0'"]),
-    "digit separators": (("-750.0      130.0", "-750.0      1_30.0"), ["line 17", "lca_outer", "z_value", "'1_30.0'"]),
+    "no number": (
+        ("-750.0      130.0", "-750.0      13O.0"),
+        ["line 17", "lca_outer", "z_value", "'13O.0'"],
+    ),
+    "digit separators": (
+        ("-750.0      130.0", "-750.0      1_30.0"),
+        ["line 17", "lca_outer", "z_value", "'1_30.0'"],
+    ),
     "unknown side": (
         ("'left/right  '    267.0", "'lift/right  '    267.0"),
         ["line 17", "lca_outer", "'lift/right'", "'left/right'"],
@@ -94,48 +127,117 @@ def test_adams(tmp_path, kind):
 def test_adams_cut_short(tmp_path):
     file = tmp_path / ADAMS.name
     file.write_text(ADAMS.read_text().split(" 'uca_rear")[0])
-    complains(file, Supplied(WISHBONE), "missing uca_rear, the upper arm's rear pivot", "wheel_center, the wheel's centre")
+    complains(
+        file,
+        Supplied(WISHBONE),
+        "missing uca_rear, the upper arm's rear pivot",
+        "wheel_center, the wheel's centre",
+    )
 
 
 TABLE_FAULTS = {
     "no unit": ((), Supplied(WISHBONE, None, "adams"), ["--units mm or --units m"]),
     "no axes": ((), Supplied(WISHBONE, "mm"), ["where x, y and z point", "--axes forward,left,up"]),
-    "no template": ((), Supplied(None, "mm", "adams"), ["--template", "mcpherson, double_wishbone, five_link"]),
-    "misspelt template": ((), Supplied("duoble_wishbone", "mm", "adams"), ["--template", "'duoble_wishbone'", "'double_wishbone'"]),
-    "wrong template": ((), Supplied("mcpherson", "mm", "adams"), ["template mcpherson: missing strut_lower", "uca_front"]),
+    "no template": (
+        (),
+        Supplied(None, "mm", "adams"),
+        ["--template", "mcpherson, double_wishbone, five_link"],
+    ),
+    "misspelt template": (
+        (),
+        Supplied("duoble_wishbone", "mm", "adams"),
+        ["--template", "'duoble_wishbone'", "'double_wishbone'"],
+    ),
+    "wrong template": (
+        (),
+        Supplied("mcpherson", "mm", "adams"),
+        ["template mcpherson: missing strut_lower", "uca_front"],
+    ),
     "misspelt unit": ((), Supplied(WISHBONE, "milimetre", "adams"), ["--units", "'milimetre'"]),
     "wrong unit": ((), Supplied(WISHBONE, "m", "adams"), ["span", "expected a suspension"]),
-    "misspelt axes": ((), Supplied(WISHBONE, "mm", "rearward,rihgt,up"), ["--axes", "rihgt", "left or right"]),
+    "misspelt axes": (
+        (),
+        Supplied(WISHBONE, "mm", "rearward,rihgt,up"),
+        ["--axes", "rihgt", "left or right"],
+    ),
     "axes twice": ((), Supplied(WISHBONE, "mm", "left,right,up"), ["--axes", "one each"]),
     "mirrored": (
         (),
         Supplied(WISHBONE, "mm", "rearward,left,up"),
         ["wheel_center", "y = -760", "expected the left side", "--axes"],
     ),
-    "backwards": ((), Supplied(WISHBONE, "mm", "forward,right,up"), ["uca_front", "uca_rear", "in front of that", "--axes"]),
-    "upside down": ((), Supplied(WISHBONE, "mm", "rearward,right,down"), ["uca_outer", "lca_outer", "expected it above"]),
+    "backwards": (
+        (),
+        Supplied(WISHBONE, "mm", "forward,right,up"),
+        ["uca_front", "uca_rear", "in front of that", "--axes"],
+    ),
+    "upside down": (
+        (),
+        Supplied(WISHBONE, "mm", "rearward,right,down"),
+        ["uca_outer", "lca_outer", "expected it above"],
+    ),
     "travel": ((), Supplied(WISHBONE, "mm", "adams", "5cm"), ["--travel", "'5cm'", "METRES"]),
-    "separated travel": ((), Supplied(WISHBONE, "mm", "adams", "0.0_5"), ["--travel", "'0.0_5'", "METRES"]),
-    "many samples": ((), Supplied(WISHBONE, "mm", "adams", "0.05:1000000000"), ["METRES:SAMPLES, 2 to 1000000 of them"]),
-    "one sample": ((), Supplied(WISHBONE, "mm", "adams", "0.05:1"), ["METRES:SAMPLES, 2 to 1000000 of them"]),
+    "separated travel": (
+        (),
+        Supplied(WISHBONE, "mm", "adams", "0.0_5"),
+        ["--travel", "'0.0_5'", "METRES"],
+    ),
+    "many samples": (
+        (),
+        Supplied(WISHBONE, "mm", "adams", "0.05:1000000000"),
+        ["METRES:SAMPLES, 2 to 1000000 of them"],
+    ),
+    "one sample": (
+        (),
+        Supplied(WISHBONE, "mm", "adams", "0.05:1"),
+        ["METRES:SAMPLES, 2 to 1000000 of them"],
+    ),
     "no travel": ((), Supplied(WISHBONE, "mm", "adams", "0"), ["--travel", "'0'", "METRES"]),
-    "drive": ((), Supplied(WISHBONE, "mm", "adams", drive=("a:0:1",)), ["--drive", "hardpoint table"]),
+    "drive": (
+        (),
+        Supplied(WISHBONE, "mm", "adams", drive=("a:0:1",)),
+        ["--drive", "hardpoint table"],
+    ),
     "cut row": (("417,-750,330", "417,-750"), WHOLE, ["line 6", "found 3 fields", "expected 4"]),
-    "no number": (("417,-750,330", "417,-75O,330"), WHOLE, ["line 6", "tierod_outer", "y", "'-75O'"]),
+    "no number": (
+        ("417,-750,330", "417,-75O,330"),
+        WHOLE,
+        ["line 6", "tierod_outer", "y", "'-75O'"],
+    ),
     "digit separators": (
         ("417,-750,330", "417,-7_50,330"),
         WHOLE,
         ["line 6", "tierod_outer", "y", "'-7_50'", "correct"],
     ),
-    "other digits": (("417,-750,330", "417,-７５０,330"), WHOLE, ["line 6", "tierod_outer", "y", "'-７５０'"]),
+    "other digits": (
+        ("417,-750,330", "417,-７５０,330"),
+        WHOLE,
+        ["line 6", "tierod_outer", "y", "'-７５０'"],
+    ),
     "not finite": (("417,-750,330", "417,nan,330"), WHOLE, ["line 6", "tierod_outer", "'nan'"]),
     "twice": (("lca_rear", "lca_front"), WHOLE, ["line 4", "lca_front", "line 2"]),
-    "two for one": (("lca_rear", "wheel"), WHOLE, ["wheel_center", "'wheel' (line 4)", "'wheel_center' (line 10)"]),
-    "misspelt": (("lca_rear", "lca_raer"), WHOLE, ["lca_rear, the lower arm's rear pivot", "is it 'lca_raer', line 4?"]),
+    "two for one": (
+        ("lca_rear", "wheel"),
+        WHOLE,
+        ["wheel_center", "'wheel' (line 4)", "'wheel_center' (line 10)"],
+    ),
+    "misspelt": (
+        ("lca_rear", "lca_raer"),
+        WHOLE,
+        ["lca_rear, the lower arm's rear pivot", "is it 'lca_raer', line 4?"],
+    ),
     "no head": (("name,x,y,z\n", ""), WHOLE, ["line 1", "expected the head name,x,y,z"]),
     "two units": (("name,x,y,z", "name,x [mm],y [mm],z [m]"), WHOLE, ["line 1", "one unit"]),
-    "unit contradicts": (("name,x,y,z", "name,x [m],y [m],z [m]"), WHOLE, ["--units", "found mm", "in m"]),
-    "remark contradicts": (("name,x,y,z", "# units: m\nname,x [mm],y [mm],z [mm]"), WHOLE, ["line 2", "in mm, and m"]),
+    "unit contradicts": (
+        ("name,x,y,z", "name,x [m],y [m],z [m]"),
+        WHOLE,
+        ["--units", "found mm", "in m"],
+    ),
+    "remark contradicts": (
+        ("name,x,y,z", "# units: m\nname,x [mm],y [mm],z [mm]"),
+        WHOLE,
+        ["line 2", "in mm, and m"],
+    ),
     "no name": (("lca_rear", ""), WHOLE, ["line 4", "name the point"]),
 }
 
@@ -146,7 +248,10 @@ def test_table(tmp_path, kind):
     complains(edited(tmp_path, TABLE, *([edit] if edit else [])), supplied, *fragments)
 
 
-@pytest.mark.parametrize(("text", "fragment"), [("", "is empty"), ("name,x,y,z\n", "no row"), ("# nothing\n", "is empty")])
+@pytest.mark.parametrize(
+    ("text", "fragment"),
+    [("", "is empty"), ("name,x,y,z\n", "no row"), ("# nothing\n", "is empty")],
+)
 def test_empty_tables(tmp_path, text, fragment):
     file = tmp_path / "car.csv"
     file.write_text(text)
@@ -154,7 +259,14 @@ def test_empty_tables(tmp_path, text, fragment):
 
 
 def test_the_template_must_not_contradict_the_file():
-    complains(MULTI_LINK, Supplied("mcpherson"), "--template", "found mcpherson", "MultiLink", "expected five_link")
+    complains(
+        MULTI_LINK,
+        Supplied("mcpherson"),
+        "--template",
+        "found mcpherson",
+        "MultiLink",
+        "expected five_link",
+    )
 
 
 def test_units_of_chrono_are_known():

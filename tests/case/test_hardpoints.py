@@ -1,4 +1,6 @@
-"""Hardpoint files of Project Chrono, Adams/Car and plain tables: the suspensions they mean, in any units and axes."""
+"""Hardpoint files of Project Chrono, Adams/Car and plain tables: the suspensions they mean, in any
+units and axes.
+"""
 
 import csv
 from itertools import combinations
@@ -34,30 +36,48 @@ def swept(case):
 
 
 def turned(p, a):
-    """The direction a, fixed in a body that was not turned at design, for Euler parameters p, shape (n, 4)."""
+    """The direction a, fixed in a body that was not turned at design, for Euler parameters p, shape
+    (n, 4).
+    """
     e0, e = p[:, :1], p[:, 1:]
     return (2.0 * e0**2 - 1.0) * a + 2.0 * e * (e @ a)[:, None] + 2.0 * e0 * np.cross(e, a)
 
 
 @pytest.mark.parametrize("name", CHRONO)
 def test_chrono_suspensions_move_as_rods_and_lines_do(name):
-    """Wheel centre and spin axis against 40-digit solutions by another formulation; the template is the file's own."""
+    """Wheel centre and spin axis against 40-digit solutions by another formulation; the template is
+    the file's own.
+    """
     case = load(DATA / f"{name}.json", Supplied(travel="0.07:15"))
     with (DATA / "chrono_sweeps.csv").open() as lines:
-        rows = [[float(row[key]) for key in row if key != "file"] for row in csv.DictReader(lines) if row["file"] == name]
+        rows = [
+            [float(row[key]) for key in row if key != "file"]
+            for row in csv.DictReader(lines)
+            if row["file"] == name
+        ]
     truth = np.array(rows)
     found = swept(case)
     assert case.truth is Truth.CONSENSUS_ONLY
     assert np.allclose(case.sweep.values, truth[:, 0], rtol=0, atol=EXACT)
     assert np.abs(found.points["wheel_center"].position - truth[:, 1:4]).max() < EXACT
-    assert np.abs(turned(found.bodies["knuckle"].p, np.array([0.0, 1.0, 0.0])) - truth[:, 4:]).max() < EXACT
+    assert (
+        np.abs(turned(found.bodies["knuckle"].p, np.array([0.0, 1.0, 0.0])) - truth[:, 4:]).max()
+        < EXACT
+    )
 
 
 def test_what_is_left_out_is_listed():
     source = load(DATA / "chrono_macpherson_strut.json").source
-    assert source.startswith("Project Chrono hardpoints of chrono_macpherson_strut.json on the template mcpherson")
+    assert source.startswith(
+        "Project Chrono hardpoints of chrono_macpherson_strut.json on the template mcpherson"
+    )
     listed = source.split(LEFT_OUT)[1]
-    for part in ("Spring (Spring Coefficient, Free Length)", "Shock/Location Chassis", "Spindle (Mass, Inertia", "Camber Angle"):
+    for part in (
+        "Spring (Spring Coefficient, Free Length)",
+        "Shock/Location Chassis",
+        "Spindle (Mass, Inertia",
+        "Camber Angle",
+    ):
         assert part in listed
     assert "Control Arm/Location" not in listed
     assert "[PARAMETER] (4 rows)" in load(ADAMS, AXLE).source.split(LEFT_OUT)[1]
@@ -71,12 +91,16 @@ def test_the_template_of_the_file_may_be_said_too():
 def test_comments_as_chrono_takes_them(tmp_path):
     text = (DATA / "chrono_macpherson_strut.json").read_text()
     commented = tmp_path / "chrono_macpherson_strut.json"
-    commented.write_text(text.replace('"Axle"', '// the "axle", of no use here\n /* 1, 2\n 3 */ "Axle"'))
+    commented.write_text(
+        text.replace('"Axle"', '// the "axle", of no use here\n /* 1, 2\n 3 */ "Axle"')
+    )
     assert load(commented).mechanism == load(DATA / "chrono_macpherson_strut.json").mechanism
 
 
 def rods(points, travel):
-    """The wheel centre of a carrier on rods, by its own equations: lengths stay, Rodrigues' rotation, scipy's root."""
+    """The wheel centre of a carrier on rods, by its own equations: lengths stay, Rodrigues'
+    rotation, scipy's root.
+    """
     ends = [
         (points["lca_front"], points["lca_outer"]),
         (points["lca_rear"], points["lca_outer"]),
@@ -89,7 +113,11 @@ def rods(points, travel):
     def carried(x, p):
         angle = np.linalg.norm(x[3:]) or 1.0
         axis, arm = x[3:] / angle, p - wheel
-        turn = arm * np.cos(angle) + np.cross(axis, arm) * np.sin(angle) + axis * (axis @ arm) * (1.0 - np.cos(angle))
+        turn = (
+            arm * np.cos(angle)
+            + np.cross(axis, arm) * np.sin(angle)
+            + axis * (axis @ arm) * (1.0 - np.cos(angle))
+        )
         return wheel + x[:3] + (turn if x[3:].any() else arm)
 
     def defects(x):
@@ -112,12 +140,24 @@ def test_adams_front_suspension_moves_as_five_rods_do():
 
 def adams_points():
     """The rows of the file, read in another way."""
-    rows = [line.replace("'", " ").split() for line in ADAMS.read_text().splitlines() if "left/right" in line]
-    return {row[0]: tuple(map(float, row[2:5])) for row in rows if len(row) == 5 and row[2] != "real"}
+    rows = [
+        line.replace("'", " ").split()
+        for line in ADAMS.read_text().splitlines()
+        if "left/right" in line
+    ]
+    return {
+        row[0]: tuple(map(float, row[2:5])) for row in rows if len(row) == 5 and row[2] != "real"
+    }
 
 
 def table(points, head="name,x,y,z", comment=""):
-    return "\n".join([*([comment] if comment else []), head, *(f"{name},{x!r},{y!r},{z!r}" for name, (x, y, z) in points.items())])
+    return "\n".join(
+        [
+            *([comment] if comment else []),
+            head,
+            *(f"{name},{x!r},{y!r},{z!r}" for name, (x, y, z) in points.items()),
+        ]
+    )
 
 
 AXES = {
@@ -132,7 +172,10 @@ AXES = {
 @pytest.mark.parametrize("unit", ["mm", "m"])
 def test_a_table_in_any_units_and_axes_is_the_same_suspension(tmp_path, axes, unit):
     file, scale = tmp_path / ADAMS.with_suffix(".csv").name, 1.0 if unit == "mm" else 1000.0
-    points = {name: tuple(value / scale for value in AXES[axes](*at)) for name, at in adams_points().items()}
+    points = {
+        name: tuple(value / scale for value in AXES[axes](*at))
+        for name, at in adams_points().items()
+    }
     file.write_text(table(points))
     said = Supplied(template="double_wishbone", units=unit, axes=axes)
     assert load(file, said).mechanism == load(ADAMS, AXLE).mechanism
@@ -157,14 +200,20 @@ def test_semicolons_prefixes_and_spelling(tmp_path):
     points = {f"hpl_{name}": at for name, at in adams_points().items()}
     points["hpl_Wheel Centre"] = points.pop("hpl_wheel_center")
     file.write_text(table(points).replace(",", ";"))
-    assert load(file, Supplied("double_wishbone", "mm", "adams")).mechanism == load(ADAMS, AXLE).mechanism
+    assert (
+        load(file, Supplied("double_wishbone", "mm", "adams")).mechanism
+        == load(ADAMS, AXLE).mechanism
+    )
 
 
 def test_the_right_side_of_a_file_is_left_out(tmp_path):
     file = tmp_path / ADAMS.name
     broken = " 'lca_outer                   '  'right       '    267.0      750.0      130.0\n"
     file.write_text(
-        ADAMS.read_text().replace("$----------------------------------------------------------------------PARAM", f"{broken}$")
+        ADAMS.read_text().replace(
+            "$----------------------------------------------------------------------PARAM",
+            f"{broken}$",
+        )
     )
     case = load(file, AXLE)
     assert case.mechanism == load(ADAMS, AXLE).mechanism

@@ -1,4 +1,5 @@
-"""Files made to harm: each ends within bounds of time and memory, with one clear message and exit status 2, and opens nothing else.
+"""Files made to harm: each ends within bounds of time and memory, with one clear message and exit
+status 2, and opens nothing else.
 
 The bounds are the kernel's: a process that exceeds them is ended, and the test fails.
 """
@@ -20,8 +21,9 @@ from kincheck.core.case.models.mjcf.tree import MOST_BODIES, MOST_MOVING
 
 from ..support.case_texts import BASE, BY_FILE, CSV, edited
 
-# A file of 4 MB, the largest that is read, takes some seconds to be parsed in Python and some hundred bytes a character; what is
-# refused for what it holds takes less. On a slow machine too, no file needs ten times that.
+# A file of 4 MB, the largest that is read, takes some seconds to be parsed in Python and some
+# hundred bytes a character; what is refused for what it holds takes less. On a slow machine too, no
+# file needs ten times that.
 SECONDS, MEMORY = 60, 3 << 30
 LARGEST = case_file.LARGEST_FILE
 TABLE = ("--template", "double_wishbone", "--units", "mm", "--axes", "adams")
@@ -46,18 +48,42 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
     "beyond doubles": ("a.toml", edited(("start = -0.1", "start = 1e400")), "found inf"),
     "near their end": ("a.toml", edited(("start = -0.1", "start = 1e308")), "found 1e+308"),
     "denormal": ("a.toml", edited(("axis = [1.0,", "axis = [5e-324,")), "found 5e-324"),
-    "ten thousand digits": ("a.toml", edited(("steps = 3", f"steps = {'9' * 10_000}")), "integer of thousands of digits"),
-    "as many in JSON": ("a.json", f'{{"schema": {"9" * 10_000}}}', "integer of thousands of digits"),
-    "millions in hexadecimal": ("a.toml", edited(("steps = 3", f"steps = 0x{'f' * 3_000_000}")), "a huge integer"),
-    "in a model": ("a.xml", model(f'<body pos="0 0 {"9" * 10_000}"><joint/></body>'), "expected 3 numbers"),
+    "ten thousand digits": (
+        "a.toml",
+        edited(("steps = 3", f"steps = {'9' * 10_000}")),
+        "integer of thousands of digits",
+    ),
+    "as many in JSON": (
+        "a.json",
+        f'{{"schema": {"9" * 10_000}}}',
+        "integer of thousands of digits",
+    ),
+    "millions in hexadecimal": (
+        "a.toml",
+        edited(("steps = 3", f"steps = 0x{'f' * 3_000_000}")),
+        "a huge integer",
+    ),
+    "in a model": (
+        "a.xml",
+        model(f'<body pos="0 0 {"9" * 10_000}"><joint/></body>'),
+        "expected 3 numbers",
+    ),
     "in a table": ("a.csv", f"name,x,y,z\nwheel,1,2,{'9' * 10_000}\n", "expected a coordinate"),
     # nesting
     "deep lists in JSON": ("a.json", filled("[", size=LARGEST), "nested too deeply"),
     "deep tables in JSON": ("a.json", filled('{"a":'), "nested too deeply"),
     "deep lists": ("a.toml", filled("[", "a = {}"), "nested too deeply"),
     "deep tables": ("a.toml", filled("{a=", "a = {}"), "nested too deeply"),
-    "a long key": ("a.toml", filled("a.", "{}a = 1"), "line 1: found a key nested more than 16 deep"),
-    "a long header": ("a.toml", filled('"a" . ', "# [a.a\n[{}a]", LARGEST), "line 2: found a key nested more than 16 deep"),
+    "a long key": (
+        "a.toml",
+        filled("a.", "{}a = 1"),
+        "line 1: found a key nested more than 16 deep",
+    ),
+    "a long header": (
+        "a.toml",
+        filled('"a" . ', "# [a.a\n[{}a]", LARGEST),
+        "line 2: found a key nested more than 16 deep",
+    ),
     "deep elements": ("a.xml", filled("<a>"), "nested more than 200 deep"),
     # many
     "a million bodies": (
@@ -65,7 +91,11 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         f'{{"bodies": {{{", ".join(f"{k}: 1" for k in range(1_000_000))}}}}}',
         "larger than 4000000 bytes",
     ),
-    "bodies": ("a.toml", BASE + "\n".join(f"[bodies.b{k}]" for k in range(61_000)), "bodies: found 61001, expected 60000"),
+    "bodies": (
+        "a.toml",
+        BASE + "\n".join(f"[bodies.b{k}]" for k in range(61_000)),
+        "bodies: found 61001, expected 60000",
+    ),
     "points in JSON": (
         "a.json",
         json.dumps({"schema": "kincheck-case/1", "points": {f"{k}": {} for k in range(50_000)}}),
@@ -76,33 +106,73 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         model(filled("<body><joint/></body>", size=LARGEST // 4)),
         f"more than the {MOST_MOVING} that are read",
     ),
-    "fixed bodies of a model": ("a.xml", model(filled("<body/>")), f"more than the {MOST_BODIES} that are read"),
-    "as many joints as are read": ("a.xml", model("<body><joint/></body>" * MOST_MOVING), "degrees of freedom"),
-    "joints of a body": ("a.xml", model(f"<body>{filled('<joint/>')}</body>"), f"more than the {MOST_MOVING} that are read"),
+    "fixed bodies of a model": (
+        "a.xml",
+        model(filled("<body/>")),
+        f"more than the {MOST_BODIES} that are read",
+    ),
+    "as many joints as are read": (
+        "a.xml",
+        model("<body><joint/></body>" * MOST_MOVING),
+        "degrees of freedom",
+    ),
+    "joints of a body": (
+        "a.xml",
+        model(f"<body>{filled('<joint/>')}</body>"),
+        f"more than the {MOST_MOVING} that are read",
+    ),
     "equalities": (
         "a.xml",
-        model('<body name="a"><joint type="ball"/></body>', filled('<connect body1="a" anchor="0 0 0"/>', size=LARGEST // 10)),
+        model(
+            '<body name="a"><joint type="ball"/></body>',
+            filled('<connect body1="a" anchor="0 0 0"/>', size=LARGEST // 10),
+        ),
         "degrees of freedom",
     ),
     "equalities of one name": (
         "a.xml",
-        model('<body name="a"><joint/></body>', '<connect name="c" body1="a" anchor="0 0 0"/>' * 5000),
+        model(
+            '<body name="a"><joint/></body>', '<connect name="c" body1="a" anchor="0 0 0"/>' * 5000
+        ),
         "found 'c' again",
     ),
-    "attributes": ("a.xml", "<mujoco " + " ".join(f'a{k}=""' for k in range(100_000)) + "/>", "has no body with a joint"),
-    "hardpoints": ("a.csv", "name,x,y,z\n" + "\n".join(f"p{k},1,2,3" for k in range(20_000)), f"{MOST_POINTS} at most"),
+    "attributes": (
+        "a.xml",
+        "<mujoco " + " ".join(f'a{k}=""' for k in range(100_000)) + "/>",
+        "has no body with a joint",
+    ),
+    "hardpoints": (
+        "a.csv",
+        "name,x,y,z\n" + "\n".join(f"p{k},1,2,3" for k in range(20_000)),
+        f"{MOST_POINTS} at most",
+    ),
     "hardpoints of Adams": (
         "a.sub",
         "[HARDPOINT]\n" + "\n".join(f"p{k} left 1 2 3" for k in range(20_000)),
         f"{MOST_POINTS} at most",
     ),
-    "keys, one twice": ("a.json", json.dumps({f"{k}": 1 for k in range(100_000)})[:-1] + ', "7": 1}', "'7' is given twice"),
+    "keys, one twice": (
+        "a.json",
+        json.dumps({f"{k}": 1 for k in range(100_000)})[:-1] + ', "7": 1}',
+        "'7' is given twice",
+    ),
     # texts
-    "a long name": ("a.toml", BASE + f"[bodies.{'b' * 1_000_000}]", "1 to 200 printable characters"),
-    "a long reference": ("a.toml", edited(('["ground"', f'["{"ground" * 100_000}"')), "found a text of 600000 characters"),
+    "a long name": (
+        "a.toml",
+        BASE + f"[bodies.{'b' * 1_000_000}]",
+        "1 to 200 printable characters",
+    ),
+    "a long reference": (
+        "a.toml",
+        edited(('["ground"', f'["{"ground" * 100_000}"')),
+        "found a text of 600000 characters",
+    ),
     "similar long names": (
         "a.xml",
-        model(f'<body name="{"abcdefgh" * 100_000}"><joint/></body>', f'<connect body1="{"abcdefgi" * 100_000}" anchor="0 0 0"/>'),
+        model(
+            f'<body name="{"abcdefgh" * 100_000}"><joint/></body>',
+            f'<connect body1="{"abcdefgi" * 100_000}" anchor="0 0 0"/>',
+        ),
         "expected a body",
     ),
     "a long field": ("a.csv", f"name,x,y,z\n{'a' * 1_000_000},1,2,3\n", "line 2: not valid CSV"),
@@ -125,13 +195,33 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
     },
     # XML
     "document type": ("a.xml", "<!DOCTYPE mujoco>" + model(""), "<!DOCTYPE>"),
-    "entities": ("a.xml", f'<!DOCTYPE m [<!ENTITY a0 "ha">{BOMB}]><mujoco>&a9;</mujoco>', "<!DOCTYPE>"),
-    "entity of a file": ("a.xml", '<!DOCTYPE m [<!ENTITY a SYSTEM "file:///etc/passwd">]><mujoco>&a;</mujoco>', "<!DOCTYPE>"),
+    "entities": (
+        "a.xml",
+        f'<!DOCTYPE m [<!ENTITY a0 "ha">{BOMB}]><mujoco>&a9;</mujoco>',
+        "<!DOCTYPE>",
+    ),
+    "entity of a file": (
+        "a.xml",
+        '<!DOCTYPE m [<!ENTITY a SYSTEM "file:///etc/passwd">]><mujoco>&a;</mujoco>',
+        "<!DOCTYPE>",
+    ),
     "unknown entity": ("a.xml", "<mujoco>&a;</mujoco>", "undefined entity"),
-    "unknown encoding": ("a.xml", '<?xml version="1.0" encoding="foo"?>' + model(""), "no body with a joint"),
-    "wide encoding": ("a.xml", '<?xml version="1.0" encoding="utf-7"?>' + model(""), "no body with a joint"),
+    "unknown encoding": (
+        "a.xml",
+        '<?xml version="1.0" encoding="foo"?>' + model(""),
+        "no body with a joint",
+    ),
+    "wide encoding": (
+        "a.xml",
+        '<?xml version="1.0" encoding="utf-7"?>' + model(""),
+        "no body with a joint",
+    ),
     "include": ("a.xml", '<mujoco><include file="/etc/passwd"/></mujoco>', "another file"),
-    "a name that a terminal obeys": ("\x1b[2J\n.xml", model("<body><joint/></body>"), "control characters"),
+    "a name that a terminal obeys": (
+        "\x1b[2J\n.xml",
+        model("<body><joint/></body>"),
+        "control characters",
+    ),
     # reference files: anything but a file in the folder of the case, or below
     **{
         f"reference {name!r}": ("a.toml", BASE + BY_FILE.replace("tip.csv", name), said)
@@ -160,7 +250,11 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
             "words.json": "expected a decimal number",
         }.items()
     },
-    "reference with a null": ("a.toml", BASE + BY_FILE.replace("tip.csv", "tip\\u0000.csv"), "printable"),
+    "reference with a null": (
+        "a.toml",
+        BASE + BY_FILE.replace("tip.csv", "tip\\u0000.csv"),
+        "printable",
+    ),
 }
 
 
@@ -198,15 +292,41 @@ def results(folders: tuple[Path, Path]) -> dict[str, dict[str, object]]:
     for k, (name, text, _) in enumerate(TEXTS.values()):
         file = inside / f"{k}" / name if "[reference]" not in str(text) else inside / f"a{k}.toml"
         file.parent.mkdir(exist_ok=True)
-        whole = text.replace("{outside}", str(outside)).replace('"a.toml"', f'"{file.name}"') if isinstance(text, str) else text
+        whole = (
+            text.replace("{outside}", str(outside)).replace('"a.toml"', f'"{file.name}"')
+            if isinstance(text, str)
+            else text
+        )
         file.write_bytes(whole if isinstance(whole, bytes) else whole.encode())
         lines.append(
-            json.dumps(["run", str(file), *(TABLE if name.endswith(".csv") else TABLE[:2] if name.endswith(".sub") else ())])
+            json.dumps(
+                [
+                    "run",
+                    str(file),
+                    *(
+                        TABLE
+                        if name.endswith(".csv")
+                        else TABLE[:2]
+                        if name.endswith(".sub")
+                        else ()
+                    ),
+                ]
+            )
         )
-    command = [sys.executable, str(Path(__file__).parents[1] / "support" / "hostile.py"), str(SECONDS), str(MEMORY), str(outside)]
-    ran = subprocess.run(command, input="\n".join(lines), capture_output=True, text=True, check=False)
+    command = [
+        sys.executable,
+        str(Path(__file__).parents[1] / "support" / "hostile.py"),
+        str(SECONDS),
+        str(MEMORY),
+        str(outside),
+    ]
+    ran = subprocess.run(
+        command, input="\n".join(lines), capture_output=True, text=True, check=False
+    )
     answers = ran.stdout.splitlines()
-    assert ran.returncode == 0, f"ended at {[*TEXTS][len(answers)]!r}: {ran.returncode} {ran.stderr[-2000:]}"
+    assert ran.returncode == 0, (
+        f"ended at {[*TEXTS][len(answers)]!r}: {ran.returncode} {ran.stderr[-2000:]}"
+    )
     return dict(zip(TEXTS, map(json.loads, answers), strict=True))
 
 
@@ -241,7 +361,9 @@ PLACES: dict[str, tuple[Callable[[Path], object], str]] = {
 
 @pytest.mark.parametrize("kind", PLACES)
 @pytest.mark.parametrize("end", [".toml", ".json", ".csv", ".sub", ".xml"])
-def test_what_is_no_file_is_refused(kind: str, end: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_what_is_no_file_is_refused(
+    kind: str, end: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
     from kincheck.core.cli.main import main
 
     make, said = PLACES[kind]

@@ -1,4 +1,6 @@
-"""Names and messages made to harm, in every kind of report: they are shown, and nothing obeys them."""
+"""Names and messages made to harm, in every kind of report: they are shown, and nothing obeys
+them.
+"""
 
 import csv
 import io
@@ -50,12 +52,30 @@ def run(name: str) -> Results:
     """Everything that is a name or a message is called so."""
 
     def renamed(record: Record, **changes: object) -> Record:
-        outputs = [msgspec.structs.replace(each, unit=name, sense=name, reason=name) for each in record.outputs.values()]
+        outputs = [
+            msgspec.structs.replace(each, unit=name, sense=name, reason=name)
+            for each in record.outputs.values()
+        ]
         errors = [msgspec.structs.replace(each, reason=name) for each in record.errors.values()]
-        texts = {"case": name, "engine": name, "version": name, "message": name, "loop": name, "settings": {name: name}}
+        texts = {
+            "case": name,
+            "engine": name,
+            "version": name,
+            "message": name,
+            "loop": name,
+            "settings": {name: name},
+        }
         return msgspec.structs.replace(
             record,
-            **({"outputs": {name: outputs[0]}, "errors": {name: errors[0]}, "driver": {name: [*range(21)]}} | texts | changes),
+            **(
+                {
+                    "outputs": {name: outputs[0]},
+                    "errors": {name: errors[0]},
+                    "driver": {name: [*range(21)]},
+                }
+                | texts
+                | changes
+            ),
         )
 
     made = results()
@@ -79,8 +99,21 @@ def test_terminals_show_names_and_obey_none(name: str, show):
         assert name in said
 
 
-def test_messages_and_progress_are_lines_that_obey_nothing(name: str, capsys: pytest.CaptureFixture[str], tmp_path):
-    complain([str(fault(tmp_path / f"{name.replace('/', '')}.toml", name, "found nothing, expected something; add it")), name])
+def test_messages_and_progress_are_lines_that_obey_nothing(
+    name: str, capsys: pytest.CaptureFixture[str], tmp_path
+):
+    complain(
+        [
+            str(
+                fault(
+                    tmp_path / f"{name.replace('/', '')}.toml",
+                    name,
+                    "found nothing, expected something; add it",
+                )
+            ),
+            name,
+        ]
+    )
     progress([])(run(name).records[0], 1, 2)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 3
@@ -97,7 +130,14 @@ def test_markdown_is_a_table_and_text_and_nothing_else(name: str):
     assert cells == 3  # one case in two engines
     inside = [child for token in tokens for child in token.children or ()]
     assert {child.type for child in inside} <= {"text", "code_inline", "softbreak"}
-    assert not {"html_block", "heading_open", "fence", "code_block", "blockquote_open", "bullet_list_open"} & {*kinds}
+    assert not {
+        "html_block",
+        "heading_open",
+        "fence",
+        "code_block",
+        "blockquote_open",
+        "bullet_list_open",
+    } & {*kinds}
     assert "@everyone" not in text.replace("`@everyone`", "")  # code notifies nobody
     if name.isprintable() and "`" not in name and "@" not in name:
         shown = "".join(child.content for child in inside)
@@ -106,7 +146,14 @@ def test_markdown_is_a_table_and_text_and_nothing_else(name: str):
 
 def test_junit_is_xml(name: str):
     root = ElementTree.fromstring(to_junit(run(name)))
-    assert {element.tag for element in root.iter()} <= {"testsuites", "testsuite", "testcase", "failure", "error", "skipped"}
+    assert {element.tag for element in root.iter()} <= {
+        "testsuites",
+        "testsuite",
+        "testcase",
+        "failure",
+        "error",
+        "skipped",
+    }
     if name.isprintable():
         assert root[0].get("name") == name
 
@@ -116,13 +163,16 @@ def test_pages_show_names_and_obey_none(name: str):
     page, plain = Page(text), Page(render(Material(run("name"), {}, {})))
     assert sorted(tag for tag, _ in page.tags) == sorted(tag for tag, _ in plain.tags)
     assert page.names == plain.names
-    assert {key for _, attrs in page.tags for key in attrs} == {key for _, attrs in plain.tags for key in attrs}
+    assert {key for _, attrs in page.tags for key in attrs} == {
+        key for _, attrs in plain.tags for key in attrs
+    }
     titles = [str(figure["layout"]) for figure in page.data["figures"].values()]
     assert not any("<img" in title or "<script" in title for title in titles)
 
 
 def test_json_is_read_again_as_it_was(name: str):
-    if name != NAMES["undecodable"]:  # UTF-8 cannot hold it; circumstances and messages are cleaned where they are made
+    # UTF-8 cannot hold it; circumstances and messages are cleaned where they are made
+    if name != NAMES["undecodable"]:
         assert msgspec.json.decode(to_json(run(name)), type=Results) == run(name)
 
 
@@ -135,7 +185,13 @@ def test_spreadsheets_compute_nothing(name: str):
 
 def test_numbers_are_cells_as_they_are():
     assert [cell(each) for each in (-1.5, None, 3, "a-b", "")] == [-1.5, None, 3, "a-b", ""]
-    assert [cell(each) for each in ("=1+1", "-1", "+a", "@b", "\t=1")] == ["'=1+1", "'-1", "'+a", "'@b", "'\\t=1"]
+    assert [cell(each) for each in ("=1+1", "-1", "+a", "@b", "\t=1")] == [
+        "'=1+1",
+        "'-1",
+        "'+a",
+        "'@b",
+        "'\\t=1",
+    ]
 
 
 def test_what_prints_stays_as_it_is():
@@ -144,7 +200,9 @@ def test_what_prints_stays_as_it_is():
     assert visible("\u202e\udcff\U000e0001") == "\\u202e\\udcff\\U000e0001"
 
 
-@pytest.mark.parametrize("name", [*NAMES.values(), "../escaped", "/tmp/escaped", "..", "a\\b", "C:a"])
+@pytest.mark.parametrize(
+    "name", [*NAMES.values(), "../escaped", "/tmp/escaped", "..", "a\\b", "C:a"]
+)
 def test_no_name_leads_out_of_a_folder(name, tmp_path):
     file = tmp_path / f"{file_name(name)}.reference.json"
     assert file.resolve().parent == tmp_path.resolve()
@@ -155,12 +213,28 @@ def test_a_reference_stays_in_its_folder(kincheck_main, tmp_path):
     pytest.importorskip("flint")
     (tmp_path / "proofs").mkdir()
     case = replace(crank(reference=False), name="../escaped")
-    assert kincheck_main("reference", "crank", "--digits", 20, "--out", tmp_path / "proofs", cases={"crank": case}) == 0
-    assert [each.relative_to(tmp_path) for each in tmp_path.rglob("*.json")] == [Path("proofs/.._escaped.reference.json")]
+    assert (
+        kincheck_main(
+            "reference",
+            "crank",
+            "--digits",
+            20,
+            "--out",
+            tmp_path / "proofs",
+            cases={"crank": case},
+        )
+        == 0
+    )
+    assert [each.relative_to(tmp_path) for each in tmp_path.rglob("*.json")] == [
+        Path("proofs/.._escaped.reference.json")
+    ]
 
 
 def test_two_names_of_one_file_are_refused_before_the_work(kincheck_main, tmp_path, capsys):
     cases = {name: replace(crank(reference=False), name=name) for name in ("a/b", "a:b")}
     assert kincheck_main("reference", *cases, "--out", tmp_path, cases=cases) == 2
-    assert "a_b.reference.json: found the file of a/b, expected one of its own" in capsys.readouterr().err
+    assert (
+        "a_b.reference.json: found the file of a/b, expected one of its own"
+        in capsys.readouterr().err
+    )
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,6 @@
-"""MJCF models that are cut, mistyped, open, or beyond what joints can say: one message each, of file, line, found and remedy."""
+"""MJCF models that are cut, mistyped, open, or beyond what joints can say: one message each, of
+file, line, found and remedy.
+"""
 
 from pathlib import Path
 
@@ -13,7 +15,9 @@ DRIVEN = Supplied(drive=("right_driver_joint:0:0.8:17",), hold=SPRINGS)
 
 
 def complains(file, supplied, *fragments):
-    """Exactly a CaseError, on one line, that begins with the file and contains all the fragments."""
+    """Exactly a CaseError, on one line, that begins with the file and contains all the
+    fragments.
+    """
     with pytest.raises(CaseError) as caught:
         load(file, supplied)
     message = str(caught.value)
@@ -37,74 +41,191 @@ FIRST = '<connect anchor="0 0 0" body1="right_follower"'
 BASE = '<body name="base_mount" pos="0 0 0.007" quat="1 0 0 1"'
 
 FAULTS = {
-    "misspelt attribute": (('axis="1 0 0"/>', 'axes="1 0 0"/>'), ["line 8: <joint>", "'axes'", "did you mean 'axis'?"]),
-    "misspelt element": (('<site name="right_pad"', '<sitte name="right_pad"'), ["<sitte> 'right_pad'", "did you mean 'site'?"]),
+    "misspelt attribute": (
+        ('axis="1 0 0"/>', 'axes="1 0 0"/>'),
+        ["line 8: <joint>", "'axes'", "did you mean 'axis'?"],
+    ),
+    "misspelt element": (
+        ('<site name="right_pad"', '<sitte name="right_pad"'),
+        ["<sitte> 'right_pad'", "did you mean 'site'?"],
+    ),
     "misspelt section": (("<worldbody>", "<worldboy>"), ["mismatched tag"]),
     "unknown section": (("<tendon>", "<legs/><tendon>"), ["<legs>", "unknown in a model"]),
-    "two numbers": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132"'), ["'right_spring_link'", "pos", "3 numbers"]),
-    "no number": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132 O"'), ["'right_spring_link'", "pos", "'0 0.0132 O'"]),
-    "digit separators": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132 1_0"'), ["'right_spring_link'", "pos", "'0 0.0132 1_0'"]),
+    "two numbers": (
+        ('pos="0 0.0132 0.0609"', 'pos="0 0.0132"'),
+        ["'right_spring_link'", "pos", "3 numbers"],
+    ),
+    "no number": (
+        ('pos="0 0.0132 0.0609"', 'pos="0 0.0132 O"'),
+        ["'right_spring_link'", "pos", "'0 0.0132 O'"],
+    ),
+    "digit separators": (
+        ('pos="0 0.0132 0.0609"', 'pos="0 0.0132 1_0"'),
+        ["'right_spring_link'", "pos", "'0 0.0132 1_0'"],
+    ),
     "not finite": (('pos="0 0.0132 0.0609"', 'pos="0 0.0132 inf"'), ["'right_spring_link'", "pos"]),
-    "two orientations": ((BASE, f'{BASE} euler="0 0 90"'), ["'base_mount'", "quat and euler", "one orientation"]),
+    "two orientations": (
+        (BASE, f'{BASE} euler="0 0 90"'),
+        ["'base_mount'", "quat and euler", "one orientation"],
+    ),
     "no orientation": (('quat="1 0 0 -1"', 'quat="0 0 0 0"'), ["'base'", "quat", "no direction"]),
-    "zero axis": (('<joint axis="1 0 0"/>', '<joint axis="0 0 0"/>'), ["'right_driver_joint'", "axis", "no direction"]),
-    "unknown joint type": (('name="right_coupler_joint"', 'name="right_coupler_joint" type="hing"'), ["type", "'hing'", "'hinge'"]),
-    "unknown class": (('class="driver"/>', 'class="drivr"/>'), ["'right_driver_joint'", "class", "'drivr'", "'driver'"]),
-    "class without name": (('<default class="coupler">', "<default>"), ["<default>", "class", "missing"]),
-    "outer class": (("<default>", '<default class="all">'), ["<default>", "class", "'all'", "main"]),
-    "class twice": (('<default class="coupler">', '<default class="driver">'), ["class", "'driver' again"]),
-    "body twice": (('<body name="left_driver"', '<body name="right_driver"'), ["'right_driver'", "again"]),
-    "joint twice": (('<joint name="left_driver_joint"', '<joint name="right_driver_joint"'), ["'right_driver_joint'", "again"]),
+    "zero axis": (
+        ('<joint axis="1 0 0"/>', '<joint axis="0 0 0"/>'),
+        ["'right_driver_joint'", "axis", "no direction"],
+    ),
+    "unknown joint type": (
+        ('name="right_coupler_joint"', 'name="right_coupler_joint" type="hing"'),
+        ["type", "'hing'", "'hinge'"],
+    ),
+    "unknown class": (
+        ('class="driver"/>', 'class="drivr"/>'),
+        ["'right_driver_joint'", "class", "'drivr'", "'driver'"],
+    ),
+    "class without name": (
+        ('<default class="coupler">', "<default>"),
+        ["<default>", "class", "missing"],
+    ),
+    "outer class": (
+        ("<default>", '<default class="all">'),
+        ["<default>", "class", "'all'", "main"],
+    ),
+    "class twice": (
+        ('<default class="coupler">', '<default class="driver">'),
+        ["class", "'driver' again"],
+    ),
+    "body twice": (
+        ('<body name="left_driver"', '<body name="right_driver"'),
+        ["'right_driver'", "again"],
+    ),
+    "joint twice": (
+        ('<joint name="left_driver_joint"', '<joint name="right_driver_joint"'),
+        ["'right_driver_joint'", "again"],
+    ),
     "site twice": (('<site name="left_pad"', '<site name="right_pad"'), ["'right_pad'", "again"]),
     "eulerseq": (('angle="radian"', 'angle="radian" eulerseq="xyw"'), ["eulerseq", "'xyw'"]),
     "angle": (('angle="radian"', 'angle="radians"'), ["angle", "'radians'", "'radian'"]),
-    "global coordinates": (('angle="radian"', 'angle="radian" coordinate="global"'), ["coordinate", "'global'", "local"]),
-    "include": (("<tendon>", '<include file="x.xml"/><tendon>'), ["<include>", "another file", "mj_saveLastXML"]),
-    "include in a body": ((BASE, '<include file="x.xml"/>' + BASE), ["<include>", "mj_saveLastXML"]),
-    "replicate": ((BASE, '<replicate count="3"/>' + BASE), ["<replicate>", "makes bodies", "mj_saveLastXML"]),
-    "free below": (('<joint name="right_coupler_joint" class="coupler"/>', "<freejoint/>"), ["<freejoint>", "worldbody"]),
+    "global coordinates": (
+        ('angle="radian"', 'angle="radian" coordinate="global"'),
+        ["coordinate", "'global'", "local"],
+    ),
+    "include": (
+        ("<tendon>", '<include file="x.xml"/><tendon>'),
+        ["<include>", "another file", "mj_saveLastXML"],
+    ),
+    "include in a body": (
+        (BASE, '<include file="x.xml"/>' + BASE),
+        ["<include>", "mj_saveLastXML"],
+    ),
+    "replicate": (
+        (BASE, '<replicate count="3"/>' + BASE),
+        ["<replicate>", "makes bodies", "mj_saveLastXML"],
+    ),
+    "free below": (
+        ('<joint name="right_coupler_joint" class="coupler"/>', "<freejoint/>"),
+        ["<freejoint>", "worldbody"],
+    ),
     "joint in a frame": ((BASE, "<frame><joint/></frame>" + BASE), ["<frame>", "holds a joint"]),
-    "unknown body": ((FIRST, FIRST.replace("right_follower", "right_folower")), ["body1", "'right_folower'", "'right_follower'"]),
+    "unknown body": (
+        (FIRST, FIRST.replace("right_follower", "right_folower")),
+        ["body1", "'right_folower'", "'right_follower'"],
+    ),
     "no body": ((FIRST, '<connect anchor="0 0 0"'), ["<connect>", "body1: missing"]),
     "no anchor": ((FIRST, '<connect body1="right_follower"'), ["<connect>", "anchor: missing"]),
-    "with itself": ((FIRST, '<connect anchor="0 0 0" body1="right_coupler"'), ["joins 'right_coupler' with itself"]),
-    "unknown site": ((FIRST, '<connect site1="right_pad" site2="left_pod"/>' + FIRST), ["site2", "'left_pod'", "'left_pad'"]),
-    "sites apart": ((FIRST, '<connect site1="right_pad" site2="left_pad"/>' + FIRST), ["open in the pose of the file", "m apart"]),
+    "with itself": (
+        (FIRST, '<connect anchor="0 0 0" body1="right_coupler"'),
+        ["joins 'right_coupler' with itself"],
+    ),
+    "unknown site": (
+        (FIRST, '<connect site1="right_pad" site2="left_pod"/>' + FIRST),
+        ["site2", "'left_pod'", "'left_pad'"],
+    ),
+    "sites apart": (
+        (FIRST, '<connect site1="right_pad" site2="left_pad"/>' + FIRST),
+        ["open in the pose of the file", "m apart"],
+    ),
     "weld apart": (
-        (FIRST, '<weld body1="right_driver" body2="left_driver" relpose="0 0 0.1 1 0 0 0"/>' + FIRST),
+        (
+            FIRST,
+            '<weld body1="right_driver" body2="left_driver" relpose="0 0 0.1 1 0 0 0"/>' + FIRST,
+        ),
         ["<weld>", "open in the pose of the file", "m apart"],
     ),
-    "weld turned": ((FIRST, '<weld site1="right_pad" site2="turned"/>' + FIRST), ["<weld>", "rad turned"]),
-    "curved": ((COUPLING, COUPLING.replace("0 1 0 0 0", "0 1 0.1 0 0")), ["polycoef", "'0 1 0.1 0 0'", "linear"]),
-    "offset": ((COUPLING, COUPLING.replace("0 1 0 0 0", "0.1 1 0 0 0")), ["open in the pose of the file", "0.1 rad or m off"]),
-    "unknown joint": ((COUPLING, COUPLING.replace("left_driver_", "left_drivr_")), ["joint2", "'left_drivr_joint'"]),
-    "joint with itself": ((COUPLING, COUPLING.replace("left", "right")), ["couples the joint 'right_driver_joint' with itself"]),
+    "weld turned": (
+        (FIRST, '<weld site1="right_pad" site2="turned"/>' + FIRST),
+        ["<weld>", "rad turned"],
+    ),
+    "curved": (
+        (COUPLING, COUPLING.replace("0 1 0 0 0", "0 1 0.1 0 0")),
+        ["polycoef", "'0 1 0.1 0 0'", "linear"],
+    ),
+    "offset": (
+        (COUPLING, COUPLING.replace("0 1 0 0 0", "0.1 1 0 0 0")),
+        ["open in the pose of the file", "0.1 rad or m off"],
+    ),
+    "unknown joint": (
+        (COUPLING, COUPLING.replace("left_driver_", "left_drivr_")),
+        ["joint2", "'left_drivr_joint'"],
+    ),
+    "joint with itself": (
+        (COUPLING, COUPLING.replace("left", "right")),
+        ["couples the joint 'right_driver_joint' with itself"],
+    ),
     "no tendon": ((FIRST, '<tendon tendon1="spilt"/>' + FIRST), ["tendon1", "'spilt'", "'split'"]),
     "no turning": (
         (FIRST, '<weld body1="right_driver" body2="left_driver" torquescale="0"/>' + FIRST),
         ["torquescale", "<connect>"],
     ),
-    "misspelt compiler": (('angle="radian"', 'angel="radian"'), ["<compiler>", "'angel'", "did you mean 'angle'?"]),
-    "attribute of the world": (("<worldbody>", '<worldbody childclass="driver">'), ["<worldbody>", "'childclass'"]),
-    "aligned": ((BASE, '<body><freejoint align="true"/></body>' + BASE), ["<freejoint>", "inertia", 'align="false"']),
-    "all aligned": (('angle="radian"', 'angle="radian" alignfree="true"'), ["<freejoint>", "inertia", "alignfree of <compiler>"]),
-    "ground": ((BASE, '<body name="ground"><joint/></body>' + BASE), ["<body> 'ground'", "rename the body"]),
+    "misspelt compiler": (
+        ('angle="radian"', 'angel="radian"'),
+        ["<compiler>", "'angel'", "did you mean 'angle'?"],
+    ),
+    "attribute of the world": (
+        ("<worldbody>", '<worldbody childclass="driver">'),
+        ["<worldbody>", "'childclass'"],
+    ),
+    "aligned": (
+        (BASE, '<body><freejoint align="true"/></body>' + BASE),
+        ["<freejoint>", "inertia", 'align="false"'],
+    ),
+    "all aligned": (
+        ('angle="radian"', 'angle="radian" alignfree="true"'),
+        ["<freejoint>", "inertia", "alignfree of <compiler>"],
+    ),
+    "ground": (
+        (BASE, '<body name="ground"><joint/></body>' + BASE),
+        ["<body> 'ground'", "rename the body"],
+    ),
     "tendon over more": (
         ("<fixed", '<spatial name="rope"><site site="right_pad"/></spatial><fixed'),
         ["goes over site", "two sites"],
     ),
     "tendon nowhere": (
-        ("<fixed", '<spatial name="rope"><site site="right_pad"/><site site="left_pod"/></spatial><fixed'),
+        (
+            "<fixed",
+            '<spatial name="rope"><site site="right_pad"/><site site="left_pod"/></spatial><fixed',
+        ),
         ["site: found 'left_pod'", "'left_pad'"],
     ),
     "tendon of a body": (
-        ("<fixed", '<spatial name="rope"><site site="right_pad"/><site site="right_pad"/></spatial><fixed'),
+        (
+            "<fixed",
+            '<spatial name="rope"><site site="right_pad"/><site site="right_pad"/></spatial><fixed',
+        ),
         ["<spatial> 'rope'", "between two points of 'right_follower'"],
     ),
-    "spatial tendon": (("<fixed", '<spatial name="rope"/><fixed'), ["tendon2", "'rope' is a spatial tendon"]),
-    "three in a tendon": (('coef="0.5"/>', 'coef="0.5"/><joint joint="right_coupler_joint" coef="1"/>'), ["couples 3 joints"]),
+    "spatial tendon": (
+        ("<fixed", '<spatial name="rope"/><fixed'),
+        ["tendon2", "'rope' is a spatial tendon"],
+    ),
+    "three in a tendon": (
+        ('coef="0.5"/>', 'coef="0.5"/><joint joint="right_coupler_joint" coef="1"/>'),
+        ["couples 3 joints"],
+    ),
     "flex": ((FIRST, '<flex flex="cloth"/>' + FIRST), ["<flex>", "no joint for it"]),
-    "locked and coupled": ((COUPLING, '<joint joint1="left_driver_joint"/>' + COUPLING), ["'left_driver_joint', which is locked"]),
+    "locked and coupled": (
+        (COUPLING, '<joint joint1="left_driver_joint"/>' + COUPLING),
+        ["'left_driver_joint', which is locked"],
+    ),
 }
 ALSO = {
     "all aligned": (BASE, "<body><freejoint/></body>" + BASE),
@@ -130,7 +251,10 @@ def test_models(tmp_path, kind):
     ("head", "fragments"),
     [
         ("<!DOCTYPE mujoco>", ["line 1", "<!DOCTYPE>", "remove it"]),
-        ('<!DOCTYPE a [<!ENTITY b "c"><!ENTITY d "&b;&b;&b;&b;">]>', ["line 1", "<!DOCTYPE>", "entities"]),
+        (
+            '<!DOCTYPE a [<!ENTITY b "c"><!ENTITY d "&b;&b;&b;&b;">]>',
+            ["line 1", "<!DOCTYPE>", "entities"],
+        ),
         ('<!DOCTYPE a SYSTEM "file:///etc/hostname">', ["line 1", "<!DOCTYPE>"]),
     ],
 )
@@ -166,7 +290,15 @@ def test_too_large(tmp_path):
 
 
 DRIVES = {
-    "nothing said": (Supplied(), ["3 degrees of freedom", "nothing said of what drives it", "--drive JOINT:START:STOP", "2 more"]),
+    "nothing said": (
+        Supplied(),
+        [
+            "3 degrees of freedom",
+            "nothing said of what drives it",
+            "--drive JOINT:START:STOP",
+            "2 more",
+        ],
+    ),
     "a template": (Supplied("mcpherson", drive=DRIVEN.drive), ["--template"]),
     "one short": (
         Supplied(drive=DRIVEN.drive, hold=SPRINGS[:1]),
@@ -182,15 +314,39 @@ DRIVES = {
         Supplied(drive=("right_driver_joint",)),
         ["--drive", "JOINT:START:STOP", "[rad, m]", "right_driver_joint:START:STOP"],
     ),
-    "no end": (Supplied(drive=("right_driver_joint:0",)), ["say from where to where: right_driver_joint:START:STOP"]),
-    "misspelt, no range": (Supplied(drive=("right_drive_joint",)), ["did you mean 'right_driver_joint'?"]),
-    "too many samples": (Supplied(drive=("right_driver_joint:0:1:2000000",)), ["2 to 1000000 samples; correct the numbers"]),
-    "no numbers": (Supplied(drive=("right_driver_joint:0:wide",)), ["--drive", "correct the numbers"]),
-    "no samples": (Supplied(drive=("right_driver_joint:0:1:0",)), ["--drive", "correct the numbers"]),
+    "no end": (
+        Supplied(drive=("right_driver_joint:0",)),
+        ["say from where to where: right_driver_joint:START:STOP"],
+    ),
+    "misspelt, no range": (
+        Supplied(drive=("right_drive_joint",)),
+        ["did you mean 'right_driver_joint'?"],
+    ),
+    "too many samples": (
+        Supplied(drive=("right_driver_joint:0:1:2000000",)),
+        ["2 to 1000000 samples; correct the numbers"],
+    ),
+    "no numbers": (
+        Supplied(drive=("right_driver_joint:0:wide",)),
+        ["--drive", "correct the numbers"],
+    ),
+    "no samples": (
+        Supplied(drive=("right_driver_joint:0:1:0",)),
+        ["--drive", "correct the numbers"],
+    ),
     "nowhere": (Supplied(drive=("right_driver_joint:1:1",)), ["--drive", "correct the numbers"]),
-    "two": (Supplied(drive=("right_driver_joint:0:1", "left_driver_joint:0:1")), ["--drive", "found 2 joints", "--hold"]),
-    "hold misspelt": (Supplied(drive=DRIVEN.drive, hold=("right_spring_link",)), ["--hold", "'right_spring_link_joint'"]),
-    "hold driven": (Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)), ["--hold", "which is driven"]),
+    "two": (
+        Supplied(drive=("right_driver_joint:0:1", "left_driver_joint:0:1")),
+        ["--drive", "found 2 joints", "--hold"],
+    ),
+    "hold misspelt": (
+        Supplied(drive=DRIVEN.drive, hold=("right_spring_link",)),
+        ["--hold", "'right_spring_link_joint'"],
+    ),
+    "hold driven": (
+        Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)),
+        ["--hold", "which is driven"],
+    ),
     "units": (Supplied(units="mm"), ["--units", "MJCF model", "--drive, --hold"]),
 }
 
@@ -200,9 +356,15 @@ DRIVES = {
     [
         (
             DRIVEN,
-            "--drive: found 'right_driver_joint', which an equality of the file locks, expected a joint that moves; name another",
+            (
+                "--drive: found 'right_driver_joint', which an equality of the file locks, expected"
+                " a joint that moves; name another"
+            ),
         ),
-        (Supplied(drive=("left_driver_joint:0:0.8",), hold=("right_driver_joint",)), "joint that moves; leave it out"),
+        (
+            Supplied(drive=("left_driver_joint:0:0.8",), hold=("right_driver_joint",)),
+            "joint that moves; leave it out",
+        ),
     ],
 )
 def test_a_joint_that_the_file_locks_is_not_driven(tmp_path, supplied, found):

@@ -1,4 +1,6 @@
-"""MJCF models: the mechanism that is read moves as MuJoCo, which has loaded the model itself, says it may."""
+"""MJCF models: the mechanism that is read moves as MuJoCo, which has loaded the model itself, says
+it may.
+"""
 
 from pathlib import Path
 
@@ -21,7 +23,10 @@ from ..support.model_poses import mujoco_errors, solution
 mujoco = pytest.importorskip("mujoco")
 
 GRIPPER = Path(__file__).parents[1] / "data" / "mjcf" / "robotiq_2f85.xml"
-CLOSING = Supplied(drive=("right_driver_joint:0:0.8:17",), hold=("right_spring_link_joint", "left_spring_link_joint"))
+CLOSING = Supplied(
+    drive=("right_driver_joint:0:0.8:17",),
+    hold=("right_spring_link_joint", "left_spring_link_joint"),
+)
 
 # MuJoCo's residuals at kincheck's poses: rounding of metre-sized coordinates, some operations deep.
 EXACT = 1e-13
@@ -33,15 +38,27 @@ MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 def model(tmp_path, text, name="model.xml"):
     """The text as a file, with an inertia in every body."""
     file = tmp_path / name
-    file.write_text("".join(part + ">" + MASS * part.lstrip().startswith("<body") for part in text.split(">") if part.strip()))
+    file.write_text(
+        "".join(
+            part + ">" + MASS * part.lstrip().startswith("<body")
+            for part in text.split(">")
+            if part.strip()
+        )
+    )
     return file
 
 
 def test_the_gripper_moves_as_mujoco_allows():
-    """A published model: two five-bars, closed by connects and geared, over the stroke that its file gives."""
+    """A published model: two five-bars, closed by connects and geared, over the stroke that its
+    file gives.
+    """
     case = load(GRIPPER, CLOSING)
     assert case.truth is Truth.CONSENSUS_ONLY
-    assert {point.name for point in case.mechanism.points} >= {"right_follower", "left_pad", "right_pad"}
+    assert {point.name for point in case.mechanism.points} >= {
+        "right_follower",
+        "left_pad",
+        "right_pad",
+    }
     residual, distance = mujoco_errors(mujoco, GRIPPER, case, range(17))
     assert residual < EXACT
     assert distance < EXACT
@@ -56,7 +73,12 @@ def test_the_gripper_moves_at_all_and_alike_on_both_sides():
 
 def test_what_is_lost_is_listed():
     listed = load(GRIPPER, CLOSING).source.split(LEFT_OUT)[1].split(", ")
-    assert {"inertia (9)", "ranges of joints (8)", "springs of joints (2)", "armature of joints (2)"} <= set(listed)
+    assert {
+        "inertia (9)",
+        "ranges of joints (8)",
+        "springs of joints (2)",
+        "armature of joints (2)",
+    } <= set(listed)
     assert {"tendon: fixed (1)", "actuator: general (1)"} <= set(listed)
 
 
@@ -76,7 +98,9 @@ ORIENTATIONS = {
 
 
 def agree(file):
-    """Compare what the tree holds at qpos0 with MuJoCo: places and turns of bodies, points and axes of joints, sites."""
+    """Compare what the tree holds at qpos0 with MuJoCo: places and turns of bodies, points and axes
+    of joints, sites.
+    """
     root = parse_xml(file, file.read_text())
     tree = read_tree(root, read_classes(root), read_compiler(root))
     loaded = mujoco.MjModel.from_xml_path(str(file))
@@ -92,11 +116,18 @@ def agree(file):
         assert np.allclose([*joint.point], there.xanchor, rtol=0, atol=EXACT), name
         if joint.type != "ball":
             assert np.allclose([*joint.axis], there.xaxis, rtol=0, atol=EXACT), name
-            assert np.isclose(joint.ref, loaded.qpos0[loaded.joint(name).qposadr[0]], rtol=0, atol=EXACT), name
+            assert np.isclose(
+                joint.ref, loaded.qpos0[loaded.joint(name).qposadr[0]], rtol=0, atol=EXACT
+            ), name
     for name, (_, place) in tree.sites.items():
         assert np.allclose([*place.at], data.site(name).xpos, rtol=0, atol=EXACT), name
         for column, axis in enumerate((X, Y, Z)):
-            assert np.allclose([*place.direction(axis)], data.site(name).xmat.reshape(3, 3)[:, column], rtol=0, atol=EXACT), name
+            assert np.allclose(
+                [*place.direction(axis)],
+                data.site(name).xmat.reshape(3, 3)[:, column],
+                rtol=0,
+                atol=EXACT,
+            ), name
     return tree
 
 
@@ -117,7 +148,9 @@ def test_orientations(tmp_path, orientation, sequence, angle):
 
 
 def test_classes_of_joints_and_bodies_without_joints(tmp_path):
-    """A joint takes what it lacks from its class, from the class of the body around it, or from the outermost class."""
+    """A joint takes what it lacks from its class, from the class of the body around it, or from the
+    outermost class.
+    """
     text = """
     <mujoco>
       <default class="main"><joint axis="0 1 0" pos="0 0 0.1"/>
@@ -139,7 +172,13 @@ def test_classes_of_joints_and_bodies_without_joints(tmp_path):
       </worldbody>
     </mujoco>"""
     tree = agree(model(tmp_path, text))
-    assert [joint.type for joint in tree.joints.values()] == ["hinge", "slide", "hinge", "slide", "ball"]
+    assert [joint.type for joint in tree.joints.values()] == [
+        "hinge",
+        "slide",
+        "hinge",
+        "slide",
+        "ball",
+    ]
     assert tree.carriers["part"] == "by_body"
     assert tree.sites["tip"][0] == "by_body"
     assert tree.joints["own"].outer == "by_body"
@@ -186,7 +225,10 @@ EQUALITIES = {
     "tendon of one": ('<tendon tendon1="one"/>', "lever"),
     "two tendons": ('<tendon tendon1="sum" tendon2="one" polycoef="0 0.5"/>', "lever"),
     "rod": ('<tendon tendon1="length"/>', "lever"),
-    "locked, whatever the coefficients of nothing": ('<joint joint1="lever" polycoef="0 1 2"/>', "lever"),
+    "locked, whatever the coefficients of nothing": (
+        '<joint joint1="lever" polycoef="0 1 2"/>',
+        "lever",
+    ),
     "tendon of slides": ('<tendon tendon1="both"/>', "out"),
 }
 
@@ -214,9 +256,13 @@ def test_sites(tmp_path, kind):
     """Sites that coincide at qpos0: the block follows the crank's pin, or it locks it."""
     text = linkage(f'<{kind} site1="pin" site2="hub"/>').replace('<body name="lever"', BLOCK)
     if kind == "weld":
-        text = text.replace('<site name="pin" pos="0.5 0 0.4"/>', '<site name="pin" pos="0.5 0 0.4" quat="1 0 1 0"/>')
+        text = text.replace(
+            '<site name="pin" pos="0.5 0 0.4"/>',
+            '<site name="pin" pos="0.5 0 0.4" quat="1 0 1 0"/>',
+        )
         text = text.replace(' euler="0 0 50"', "").replace(
-            'name="x" type="slide" axis="0 0 1"', 'name="x" type="hinge" axis="0 1 0" pos="0.4 0 -0.4"'
+            'name="x" type="slide" axis="0 0 1"',
+            'name="x" type="hinge" axis="0 1 0" pos="0.4 0 -0.4"',
         )
     file = model(tmp_path, text)
     case = load(file, Supplied(drive=("crank:0.5:0.8:4",), hold=EVERYTHING[1:]))
@@ -241,7 +287,10 @@ def test_bodies_made_of_several_joints_are_no_others(tmp_path):
 
 def test_inactive_equalities_are_left_out(tmp_path):
     gear = '<joint joint1="lever" joint2="crank" active="false"/>'
-    for text in (linkage(gear), linkage(gear.replace("false", "true"), '<option><flag equality="disable"/></option>')):
+    for text in (
+        linkage(gear),
+        linkage(gear.replace("false", "true"), '<option><flag equality="disable"/></option>'),
+    ):
         case = load(model(tmp_path, text), Supplied(drive=("crank:0.5:0.6",), hold=EVERYTHING[1:]))
         assert case.mechanism.couplers == ()
         assert "equalities that are not active (1)" in case.source
@@ -287,7 +336,14 @@ def test_a_name_that_is_a_path_is_no_place_to_write_to(tmp_path, monkeypatch):
 
 
 def test_every_engine_reads_the_gripper_from_the_command_line(capsys):
-    options = ["--drive", "right_driver_joint:0:0.8:5", "--hold", "right_spring_link_joint", "left_spring_link_joint", str(GRIPPER)]
+    options = [
+        "--drive",
+        "right_driver_joint:0:0.8:5",
+        "--hold",
+        "right_spring_link_joint",
+        "left_spring_link_joint",
+        str(GRIPPER),
+    ]
     assert main(["run", "--jobs", "0", "--engine", "native", "mujoco", *options]) == 0
     out, err = capsys.readouterr()
     assert "1 pass, 1 not judged" in out

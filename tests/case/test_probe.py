@@ -1,4 +1,6 @@
-"""Probes of every type of joint and coupler: made from the class alone, far from lock-up, and moving all there is to move."""
+"""Probes of every type of joint and coupler: made from the class alone, far from lock-up, and
+moving all there is to move.
+"""
 
 from dataclasses import dataclass
 
@@ -18,8 +20,12 @@ from kincheck.core.kinematics.continuation.walk import march
 
 from ..oracles import naive
 
-JOINTS = sorted(name for name, each in Joint.registry.items() if each.__module__.startswith("kincheck."))
-COUPLERS = sorted(name for name, each in Coupler.registry.items() if each.__module__.startswith("kincheck."))
+JOINTS = sorted(
+    name for name, each in Joint.registry.items() if each.__module__.startswith("kincheck.")
+)
+COUPLERS = sorted(
+    name for name, each in Coupler.registry.items() if each.__module__.startswith("kincheck.")
+)
 
 
 def probed(name):
@@ -40,7 +46,8 @@ def test_a_probe_is_well_conditioned_and_its_points_move(name):
     case = probed(name)
     found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
     assert found.solved.all(), found.message
-    # residuals are amplified by no more than the inverse of this, on which the probes' tolerance rests
+    # residuals are amplified by no more than the inverse of this, on which the probes' tolerance
+    # rests
     assert smallest_singular_value(case) > 0.01
     assert not found.details["dof_account"]["redundant_rows"]
     for output in case.outputs:  # no output may agree by standing still
@@ -51,7 +58,9 @@ def test_a_probe_is_well_conditioned_and_its_points_move(name):
 
 @pytest.mark.parametrize("name", JOINTS)
 def test_every_freedom_moves(name):
-    """Of shifts and turns along f, g, h at the joint's point, as many move as the joint has freedoms."""
+    """Of shifts and turns along f, g, h at the joint's point, as many move as the joint has
+    freedoms.
+    """
     case = probed(name)
     joint = case.mechanism.joint("tested")
     found = solve(case.mechanism, "turn", TURN, bodies=["a", "b"])
@@ -86,9 +95,16 @@ def test_specimens_are_made_from_the_kinds_of_their_fields(name):
 
 
 def test_axes_forty_degrees_apart_are_for_those_that_refuse_a_right_angle():
-    kinds = {name: specimen(Joint.registry[name]).axes for name in ("universal", "constant_velocity")}
-    cosines = {name: np.dot(*axes) / np.prod([np.linalg.norm(axis) for axis in axes]) for name, axes in kinds.items()}
-    assert cosines == pytest.approx({"universal": 0.0, "constant_velocity": np.cos(np.radians(40.0))}, abs=1e-15)
+    kinds = {
+        name: specimen(Joint.registry[name]).axes for name in ("universal", "constant_velocity")
+    }
+    cosines = {
+        name: np.dot(*axes) / np.prod([np.linalg.norm(axis) for axis in axes])
+        for name, axes in kinds.items()
+    }
+    assert cosines == pytest.approx(
+        {"universal": 0.0, "constant_velocity": np.cos(np.radians(40.0))}, abs=1e-15
+    )
 
 
 def test_a_joint_that_refuses_every_pair_says_why():
@@ -97,5 +113,7 @@ def test_a_joint_that_refuses_every_pair_says_why():
         def __post_init__(self):
             raise MechanismError("only parallel axes will do")
 
-    with pytest.raises(MechanismError, match=r"Fussy: no specimen .* 40 degrees.*only parallel axes will do"):
+    with pytest.raises(
+        MechanismError, match=r"Fussy: no specimen .* 40 degrees.*only parallel axes will do"
+    ):
         specimen(Fussy)

@@ -1,4 +1,6 @@
-"""Proved references as files and as truth: what is written can be read, and cases are judged by it."""
+"""Proved references as files and as truth: what is written can be read, and cases are judged by
+it.
+"""
 
 import json
 from dataclasses import dataclass, replace
@@ -54,13 +56,19 @@ def test_printed_numbers_are_the_closed_form_to_all_digits(made):
 
 
 def test_rows_are_chosen_for_the_sample_where_those_of_the_design_are_singular():
-    """The Bennett loop at quarter turns; at the second and the fourth they depend on each other. One solution, its rows said."""
+    """The Bennett loop at quarter turns; at the second and the fourth they depend on each other.
+    One solution, its rows said.
+    """
     case = kincheck.cases.load("bennett")
-    case = replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 90.0, 180.0, 270.0])), reference={})
+    case = replace(
+        case, sweep=replace(case.sweep, values=np.radians([0.0, 90.0, 180.0, 270.0])), reference={}
+    )
     found, errors = prove_case(case, digits=30, numbers="double", tol=TOL)
     assert found.proved == 4
     assert [sample.left_out is None for sample in found.samples] == [True, False, True, False]
-    assert all(len(sample.left_out) == len(found.redundant) for sample in found.samples if sample.left_out)
+    assert all(
+        len(sample.left_out) == len(found.redundant) for sample in found.samples if sample.left_out
+    )
     assert found.samples[1].left_out != found.redundant
     assert max(error.largest[0] for error in errors) < 1e-14
 
@@ -76,9 +84,13 @@ def test_a_file_gives_the_nearest_doubles(made, file):
     (judged,) = judged_by([case], [file])
     assert judged.truth is Truth.IN_HOUSE_ORACLE
     for name, axis in (("x", 0), ("y", 1)):
-        for quantity, truth in zip(("position", "velocity", "acceleration"), exact(case), strict=True):
+        for quantity, truth in zip(
+            ("position", "velocity", "acceleration"), exact(case), strict=True
+        ):
             expected = truth[:, axis] - (RADIUS if (name, quantity) == ("x", "position") else 0.0)
-            np.testing.assert_allclose(getattr(judged.reference[name], quantity), expected, rtol=0.0, atol=1e-15)
+            np.testing.assert_allclose(
+                getattr(judged.reference[name], quantity), expected, rtol=0.0, atol=1e-15
+            )
     assert read(file) == made[0]
 
 
@@ -103,7 +115,9 @@ def _changed(**changes):
         (_changed(driver={"turn": [0.0]}), "driver: found other samples than those of the sweep"),
         (_changed(outputs={}), "outputs: found none, expected outputs of the case"),
         (
-            lambda found: _changed(outputs={"x": msgspec.structs.replace(found.outputs["x"], unit="rad")})(found),
+            lambda found: _changed(
+                outputs={"x": msgspec.structs.replace(found.outputs["x"], unit="rad")}
+            )(found),
             "outputs.x: found another unit or convention of signs",
         ),
         (lambda found: {"schema": "kincheck-results/1"}, "expected a proved reference"),
@@ -117,7 +131,9 @@ def test_a_reference_of_something_else_is_refused(made, tmp_path, change, proble
 
 
 def test_decimals_are_what_a_file_says():
-    """A sweep of tenths: its doubles are not tenths, its decimals are, however they were rounded on the way."""
+    """A sweep of tenths: its doubles are not tenths, its decimals are, however they were rounded on
+    the way.
+    """
     case = crank()
     tenths = replace(case, sweep=replace(case.sweep, values=np.linspace(-0.3, 0.3, 7)))
     before, flint.ctx.prec = flint.ctx.prec, 200
@@ -146,17 +162,30 @@ class Angle:
 
 
 def test_outputs_that_are_formulas_are_proved():
-    found, _ = prove_case(replace(crank(), outputs=(Angle(),)), digits=30, numbers="double", tol=TOL)
+    found, _ = prove_case(
+        replace(crank(), outputs=(Angle(),)), digits=30, numbers="double", tol=TOL
+    )
     angle = found.outputs["angle"]
     assert angle.reason is None
     for text, value in zip(angle.position, crank().sweep.values.tolist(), strict=True):
         assert abs(Fraction(text) - Fraction(value)) < Fraction(1, 10**30)
-    assert all(abs(Fraction(text) - Fraction(crank().sweep.rate)) < Fraction(1, 10**30) for text in angle.velocity)
+    assert all(
+        abs(Fraction(text) - Fraction(crank().sweep.rate)) < Fraction(1, 10**30)
+        for text in angle.velocity
+    )
 
 
 def test_a_formula_that_balls_cannot_compute_says_so():
-    odd = SimpleNamespace(name="odd", points=("tip",), unit="m", signs="", of=lambda at, design: np.arccosh(at["tip"].x.x))
-    found, errors = prove_case(replace(crank(), outputs=(odd,)), digits=30, numbers="double", tol=TOL)
+    odd = SimpleNamespace(
+        name="odd",
+        points=("tip",),
+        unit="m",
+        signs="",
+        of=lambda at, design: np.arccosh(at["tip"].x.x),
+    )
+    found, errors = prove_case(
+        replace(crank(), outputs=(odd,)), digits=30, numbers="double", tol=TOL
+    )
     assert "what balls cannot" in found.outputs["odd"].reason
     assert errors == []
 
@@ -176,12 +205,26 @@ def test_the_command_writes_what_the_run_is_judged_by(kincheck_main, tmp_path, c
     assert kincheck_main("reference", "crank", "--digits", 25, "--out", tmp_path) == 0
     assert "crank: 9 of 9 samples proved to 1e-25" in capsys.readouterr().out
     written = tmp_path / "crank.reference.json"
-    assert kincheck_main("run", "crank", "--engine", "native", "--reference", written, "--json", tmp_path / "out.json") == 0
+    assert (
+        kincheck_main(
+            "run",
+            "crank",
+            "--engine",
+            "native",
+            "--reference",
+            written,
+            "--json",
+            tmp_path / "out.json",
+        )
+        == 0
+    )
     (record,) = json.loads((tmp_path / "out.json").read_text())["records"]
     assert record["errors"]["x"]["position"]["against"] == "in_house_oracle"
 
 
-def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(kincheck_main, tmp_path, capsys, made, file):
+def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(
+    kincheck_main, tmp_path, capsys, made, file
+):
     stray = tmp_path / "gone.json"
     stray.write_bytes(msgspec.json.encode(msgspec.structs.replace(made[0], case="gone")))
     (tmp_path / "gone.toml").write_text('schema = "kincheck-case/9"\n')
@@ -199,7 +242,9 @@ def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(kinchec
 
 def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsys):
     two = replace(crank().sweep, values=np.array([0.0, 1.0]))
-    monkeypatch.setattr(kincheck.cases, "load", lambda name: replace(crank(), sweep=two, reference={}))
+    monkeypatch.setattr(
+        kincheck.cases, "load", lambda name: replace(crank(), sweep=two, reference={})
+    )
     monkeypatch.setattr("kincheck.core.kinematics.verified.krawczyk.MOST_STEPS", 0)
     assert kincheck_main("reference", "crank") == 1
     out = capsys.readouterr().out

@@ -30,13 +30,22 @@ REFERENCES = [
     (CSV + "0.2, 1.7, 2.0\n", ["tip.csv", "found 4 rows", "expected 3"]),
     (CSV.replace("1.5", "1_5"), ["tip.csv", "line 5", "column tip_x", "'1_5'", "correct it"]),
     (CSV.replace("1.5", "nan"), ["tip.csv", "line 5", "column tip_x", "'nan'", "finite"]),
-    (CSV.replace("1.5", "1e308"), ["tip.csv", "line 5", "column tip_x", "'1e308'", "at most 1e+100"]),
+    (
+        CSV.replace("1.5", "1e308"),
+        ["tip.csv", "line 5", "column tip_x", "'1e308'", "at most 1e+100"],
+    ),
     (CSV.replace("1.5", ""), ["tip.csv", "line 5", "column tip_x", "expected a finite number"]),
     (CSV.replace("1.5, ", ""), ["tip.csv", "line 5", "found 2 numbers", "expected 3"]),
     (CSV.replace("tip_x,", "tip_z,"), ["tip.csv", "line 3", "'tip_z'", "did you mean 'tip_x'"]),
-    (CSV.replace("tip_x,", "tip_x.acceleration,"), ["tip.csv", "'tip_x.acceleration' alone", "add the column 'tip_x'"]),
+    (
+        CSV.replace("tip_x,", "tip_x.acceleration,"),
+        ["tip.csv", "'tip_x.acceleration' alone", "add the column 'tip_x'"],
+    ),
     (CSV.replace("tip_x.velocity", "tip_x"), ["tip.csv", "'tip_x' twice"]),
-    (CSV.replace("push, ", "tip_x, "), ["tip.csv", "'tip_x' first, the name of an output", "driver values", "name it otherwise"]),
+    (
+        CSV.replace("push, ", "tip_x, "),
+        ["tip.csv", "'tip_x' first, the name of an output", "driver values", "name it otherwise"],
+    ),
     ("push\n-0.1\n0\n0.1\n", ["tip.csv", "no column of an output"]),
     ("-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", ["tip.csv", "line 1", "'1.4'", "outputs of the case"]),
     ('push, "tip_x\n', ["tip.csv", "not valid CSV"]),
@@ -50,7 +59,17 @@ def test_broken_reference_files(tmp_path: Path, text: str, fragments: list[str])
     complains(write(tmp_path, BASE + BY_FILE), fragments)
 
 
-@pytest.mark.parametrize("name", ["../tip.csv", "/etc/passwd", "sub/../../tip.csv", "link.csv", "nul\\u0000.csv", "down/tip.csv"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../tip.csv",
+        "/etc/passwd",
+        "sub/../../tip.csv",
+        "link.csv",
+        "nul\\u0000.csv",
+        "down/tip.csv",
+    ],
+)
 def test_references_outside_the_folder_are_refused(tmp_path: Path, name: str):
     folder = tmp_path / "case"
     (folder / "sub").mkdir(parents=True)
@@ -64,7 +83,10 @@ def test_references_outside_the_folder_are_refused(tmp_path: Path, name: str):
 
 def test_absolute_names_are_refused_even_inside_the_folder(tmp_path: Path):
     name = write(tmp_path, CSV, "tip.csv").as_posix()
-    complains(write(tmp_path, BASE + BY_FILE.replace("tip.csv", name)), ["reference.file", "give its name"])
+    complains(
+        write(tmp_path, BASE + BY_FILE.replace("tip.csv", name)),
+        ["reference.file", "give its name"],
+    )
 
 
 def test_references_below_the_folder_are_fine(tmp_path: Path):

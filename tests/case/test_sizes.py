@@ -1,4 +1,6 @@
-"""Sizes that are improbable for their unit get a note that names the number, the unit and what it may be; never an error."""
+"""Sizes that are improbable for their unit get a note that names the number, the unit and what it
+may be; never an error.
+"""
 
 import pytest
 from kincheck import cases
@@ -75,14 +77,38 @@ def test_what_is_probable_gets_no_note(tmp_path, given):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"size": "0.5", "way": "0.08"}, ["the mechanism spans 0.5 mm", "expected 5 mm to 100000 mm", "metres declared as mm?"]),
+        (
+            {"size": "0.5", "way": "0.08"},
+            ["the mechanism spans 0.5 mm", "expected 5 mm to 100000 mm", "metres declared as mm?"],
+        ),
         ({"length": "m", "size": "500"}, ["the mechanism spans 500 m", "mm declared as m?"]),
-        ({"way": "0.08"}, ["'push'", "from -0.08 mm to 0.08 mm", "mechanism of 500 mm", "0.16 mm", "metres declared as mm?"]),
-        ({"length": "m", "size": "0.5"}, ["from -80 m to 80 m", "mechanism of 0.5 m", "160 m", "mm declared as m?"]),
+        (
+            {"way": "0.08"},
+            [
+                "'push'",
+                "from -0.08 mm to 0.08 mm",
+                "mechanism of 500 mm",
+                "0.16 mm",
+                "metres declared as mm?",
+            ],
+        ),
+        (
+            {"length": "m", "size": "0.5"},
+            ["from -80 m to 80 m", "mechanism of 0.5 m", "160 m", "mm declared as m?"],
+        ),
         ({"length": "m", "size": "0.5", "way": "8e-5"}, ["0.00016 m", "mm converted to m twice?"]),
-        ({"driver": "turn", "way": "0.0349"}, ["from -0.0349 deg to 0.0349 deg", "0.0698 deg", "radians declared as deg?"]),
-        ({"driver": "turn", "angle": "rad", "way": "45"}, ["from -45 rad to 45 rad", "90 rad", "degrees declared as rad?"]),
-        ({"driver": "turn", "angle": "rad", "way": "0.0005"}, ["0.001 rad", "degrees converted to radians twice?"]),
+        (
+            {"driver": "turn", "way": "0.0349"},
+            ["from -0.0349 deg to 0.0349 deg", "0.0698 deg", "radians declared as deg?"],
+        ),
+        (
+            {"driver": "turn", "angle": "rad", "way": "45"},
+            ["from -45 rad to 45 rad", "90 rad", "degrees declared as rad?"],
+        ),
+        (
+            {"driver": "turn", "angle": "rad", "way": "0.0005"},
+            ["0.001 rad", "degrees converted to radians twice?"],
+        ),
     ],
 )
 def test_what_is_improbable_gets_a_note_in_the_units_of_the_file(tmp_path, given, words):

@@ -1,4 +1,6 @@
-"""Suspension outputs against closed forms, a 60-digit solution, third numbers, the mirror image and the other convention."""
+"""Suspension outputs against closed forms, a 60-digit solution, third numbers, the mirror image and
+the other convention.
+"""
 
 import csv
 import tomllib
@@ -11,7 +13,14 @@ from kincheck import cases
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.io.suspension import with_markers, with_slopes
-from kincheck.core.case.suspension import Axle, Convention, Reaction, Side, SuspensionOutput, Vehicle
+from kincheck.core.case.suspension import (
+    Axle,
+    Convention,
+    Reaction,
+    Side,
+    SuspensionOutput,
+    Vehicle,
+)
 from kincheck.core.harness.compare import deviations, output_series
 from kincheck.core.joints import Revolute
 from kincheck.core.mechanism.drivers import JointAngle
@@ -23,7 +32,9 @@ from ..support.suspension_files import AXES, STRUT, loaded, mirrored, unreferenc
 
 TOL = 1e-12
 ROUND_OFF = 1e-14
-"""A hundred roundings of numbers near one, for values; derivatives are sums of a few products of such numbers."""
+"""A hundred roundings of numbers near one, for values; derivatives are sums of a few products of
+such numbers.
+"""
 
 
 def solved(case):
@@ -35,11 +46,21 @@ def solved(case):
 
 
 def hinged(center, hinge, axis, angles, types, rate=1.0, points=(), between=None, **vehicle):
-    """A wheel carrier on one hinge, turned through the angles: outputs by type, each with its slope."""
-    known = {"convention": Convention.ISO_8855, "side": Side.LEFT, "forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
+    """A wheel carrier on one hinge, turned through the angles: outputs by type, each with its
+    slope.
+    """
+    known = {
+        "convention": Convention.ISO_8855,
+        "side": Side.LEFT,
+        "forward": (1.0, 0.0, 0.0),
+        "up": (0.0, 0.0, 1.0),
+    }
     wheel = Vehicle(**known | {"wheel_center": "wheel", "wheel_radius": 0.3} | vehicle)
     more = {"motion_ratio": {"between": between}}
-    outputs = [SuspensionOutput.registry[each](each, wheel, 1e-9, 0.0, "test", **more.get(each, {})) for each in types]
+    outputs = [
+        SuspensionOutput.registry[each](each, wheel, 1e-9, 0.0, "test", **more.get(each, {}))
+        for each in types
+    ]
     mechanism = Mechanism(
         "hinged",
         [Body("carrier"), Body("chassis", fixed=True)],
@@ -48,7 +69,14 @@ def hinged(center, hinge, axis, angles, types, rate=1.0, points=(), between=None
         [JointAngle("turn", "hinge")],
     )
     sweep = Sweep("turn", np.asarray(angles), rate)
-    case = Case("hinged", "test", Truth.CONSENSUS_ONLY, with_markers(mechanism, outputs), sweep, with_slopes(outputs, 1.0))
+    case = Case(
+        "hinged",
+        "test",
+        Truth.CONSENSUS_ONLY,
+        with_markers(mechanism, outputs),
+        sweep,
+        with_slopes(outputs, 1.0),
+    )
     return solved(case)
 
 
@@ -56,11 +84,16 @@ ANGLES = np.linspace(-0.3, 0.4, 8)
 
 
 def test_swing_axle():
-    """A left wheel on an arm about x: it cambers as the arm turns, and its instant centre is the hinge."""
-    half, p, h, radius = 0.75, 0.2, 0.08, 0.3  # hinge p outboard and h above the wheel centre at design
+    """A left wheel on an arm about x: it cambers as the arm turns, and its instant centre is the
+    hinge.
+    """
+    # hinge p outboard and h above the wheel centre at design
+    half, p, h, radius = 0.75, 0.2, 0.08, 0.3
     rod = Point("foot", "carrier", (0.1, 0.5, 0.0)), Point("top", "chassis", (0.1, 0.4, 0.6))
     types = ["camber", "toe", "half_track_change", "roll_center_height", "motion_ratio"]
-    found = hinged((0.1, half, 0.0), (0.0, p, h), (1, 0, 0), ANGLES, types, 2.0, rod, ("foot", "top"))
+    found = hinged(
+        (0.1, half, 0.0), (0.0, p, h), (1, 0, 0), ANGLES, types, 2.0, rod, ("foot", "top")
+    )
     c, s = np.cos(ANGLES), np.sin(ANGLES)
 
     def turned(y, z):
@@ -68,11 +101,14 @@ def test_swing_axle():
 
     y, z = turned(half, 0.0)
     up = y - p  # dz by the angle, for a turn about the hinge
-    assert found["camber"].position == pytest.approx(-ANGLES, abs=ROUND_OFF)  # jounce tips the top inboard
+    # jounce tips the top inboard
+    assert found["camber"].position == pytest.approx(-ANGLES, abs=ROUND_OFF)
     assert found["camber"].velocity == pytest.approx(-2.0, abs=ROUND_OFF)
     assert found["camber.per_travel"].position == pytest.approx(-1.0 / up, abs=ROUND_OFF)
     # d(-1/up)/dangle = up'/up^2, and up' = -(z - h); by time, twice that
-    assert found["camber.per_travel"].velocity == pytest.approx(-2.0 * (z - h) / up**2, abs=ROUND_OFF)
+    assert found["camber.per_travel"].velocity == pytest.approx(
+        -2.0 * (z - h) / up**2, abs=ROUND_OFF
+    )
     assert found["toe"].position == pytest.approx(0.0, abs=ROUND_OFF)
     at_road = y + radius * s, z - radius * c
     assert found["half_track_change"].position == pytest.approx(at_road[0] - half, abs=ROUND_OFF)
@@ -83,30 +119,63 @@ def test_swing_axle():
     foot = turned(0.5, 0.0)
     way = np.subtract((0.4, 0.6), np.transpose(foot))
     rate = np.stack([-(foot[1] - h), foot[0] - p], axis=1)  # of the foot, by the angle
-    assert found["motion_ratio"].position == pytest.approx((way * rate).sum(1) / np.linalg.norm(way, axis=1) / up, abs=ROUND_OFF)
+    assert found["motion_ratio"].position == pytest.approx(
+        (way * rate).sum(1) / np.linalg.norm(way, axis=1) / up, abs=ROUND_OFF
+    )
 
 
 @pytest.mark.parametrize("side", Side)
 def test_trailing_arm(side):
-    """A rear wheel behind a lateral hinge: no camber, no track change, and anti-effects by the slope up to the hinge."""
+    """A rear wheel behind a lateral hinge: no camber, no track change, and anti-effects by the
+    slope up to the hinge.
+    """
     y = 0.7 * side.left
     ahead, above = 0.5, 0.1
-    car = {"axle": Axle.REAR, "wheelbase": 2.5, "cg_height": 0.5, "brake_share": 0.4, "drive_share": 1.0, "side": side}
-    types = ["camber", "toe", "half_track_change", "wheelbase_change", "anti_squat", "anti_lift", "roll_center_height"]
-    found = hinged((-1.0, y, 0.3), (-1.0 + ahead, 0.0, 0.3 + above), (0, 1, 0), ANGLES, types, **car)
+    car = {
+        "axle": Axle.REAR,
+        "wheelbase": 2.5,
+        "cg_height": 0.5,
+        "brake_share": 0.4,
+        "drive_share": 1.0,
+        "side": side,
+    }
+    types = [
+        "camber",
+        "toe",
+        "half_track_change",
+        "wheelbase_change",
+        "anti_squat",
+        "anti_lift",
+        "roll_center_height",
+    ]
+    found = hinged(
+        (-1.0, y, 0.3), (-1.0 + ahead, 0.0, 0.3 + above), (0, 1, 0), ANGLES, types, **car
+    )
     c, s = np.cos(ANGLES), np.sin(ANGLES)
     x, z = -ahead * c - above * s, ahead * s - above * c  # of the wheel centre from the hinge
     for none in ("camber", "toe", "half_track_change", "roll_center_height"):
         assert found[none].position == pytest.approx(0.0, abs=ROUND_OFF)
-    assert found["wheelbase_change"].position == pytest.approx(-(x + ahead), abs=ROUND_OFF)  # rearward lengthens
+    # rearward lengthens
+    assert found["wheelbase_change"].position == pytest.approx(-(x + ahead), abs=ROUND_OFF)
     assert found["anti_squat"].position == pytest.approx(2.5 / 0.5 * (-z / -x), abs=1e-13)
-    assert found["anti_lift"].position == pytest.approx(0.4 * 2.5 / 0.5 * ((0.3 - z) / -x), abs=1e-13)
-    outboard = hinged((-1.0, y, 0.3), (-0.5, 0.0, 0.4), (0, 1, 0), ANGLES, ["anti_squat"], **car | {"drive": Reaction.OUTBOARD})
+    assert found["anti_lift"].position == pytest.approx(
+        0.4 * 2.5 / 0.5 * ((0.3 - z) / -x), abs=1e-13
+    )
+    outboard = hinged(
+        (-1.0, y, 0.3),
+        (-0.5, 0.0, 0.4),
+        (0, 1, 0),
+        ANGLES,
+        ["anti_squat"],
+        **car | {"drive": Reaction.OUTBOARD},
+    )
     assert outboard["anti_squat"].position == pytest.approx(2.5 / 0.5 * ((0.3 - z) / -x), abs=1e-13)
 
 
 def test_leading_arm_in_front():
-    """A front wheel ahead of its hinge does not dive: the way to the instant centre rises rearward."""
+    """A front wheel ahead of its hinge does not dive: the way to the instant centre rises
+    rearward.
+    """
     car = {"axle": Axle.FRONT, "wheelbase": 2.5, "cg_height": 0.5, "brake_share": 0.6}
     found = hinged((0.0, 0.7, 0.3), (-0.5, 0.0, 0.4), (0, 1, 0), [0.0], ["anti_dive"], **car)
     assert found["anti_dive"].position == pytest.approx(0.6 * 2.5 / 0.5 * 0.4 / 0.5, abs=1e-13)
@@ -114,18 +183,32 @@ def test_leading_arm_in_front():
 
 @pytest.mark.parametrize("side", Side)
 def test_wheel_steered_about_a_fixed_line(side):
-    """Toe, camber, trail and scrub radius of a wheel turned about an oblique kingpin, by a rotation matrix."""
+    """Toe, camber, trail and scrub radius of a wheel turned about an oblique kingpin, by a rotation
+    matrix.
+    """
     out = side.left
     low, high = np.array([0.02, 0.6 * out, 0.1]), np.array([-0.03, 0.55 * out, 0.5])
     center, toe, camber, radius = np.array([0.0, 0.7 * out, 0.3]), 0.01, -0.02, 0.3
     pins = Point("low", "carrier", tuple(low)), Point("high", "chassis", tuple(high))
     car = {"static_toe": toe, "static_camber": camber, "kingpin": ("low", "high"), "side": side}
-    types = ["toe", "camber", "caster", "kingpin_inclination", "scrub_radius", "mechanical_trail", "steer_angle"]
+    types = [
+        "toe",
+        "camber",
+        "caster",
+        "kingpin_inclination",
+        "scrub_radius",
+        "mechanical_trail",
+        "steer_angle",
+    ]
     found = hinged(tuple(center), tuple(low), tuple(high - low), ANGLES, types, points=pins, **car)
     assert found["caster"].position == pytest.approx(np.arctan(0.05 / 0.4), abs=ROUND_OFF)
-    assert found["kingpin_inclination"].position == pytest.approx(np.arctan(0.05 / 0.4), abs=ROUND_OFF)
+    assert found["kingpin_inclination"].position == pytest.approx(
+        np.arctan(0.05 / 0.4), abs=ROUND_OFF
+    )
     k = (high - low) / np.linalg.norm(high - low)
-    spin = np.array([np.sin(toe) * np.cos(camber), out * np.cos(toe) * np.cos(camber), -np.sin(camber)])
+    spin = np.array(
+        [np.sin(toe) * np.cos(camber), out * np.cos(toe) * np.cos(camber), -np.sin(camber)]
+    )
     cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
     for n, angle in enumerate(ANGLES):
         turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross  # Rodrigues
@@ -140,37 +223,53 @@ def test_wheel_steered_about_a_fixed_line(side):
         down = s[2] * s - np.array([0.0, 0.0, 1.0])
         contact = c + radius * down / np.linalg.norm(down)
         meets = low + (contact[2] - low[2]) / (high[2] - low[2]) * (high - low)
-        assert found["mechanical_trail"].position[n] == pytest.approx((meets - contact) @ ahead, abs=ROUND_OFF)
-        assert found["scrub_radius"].position[n] == pytest.approx((contact - meets) @ aside, abs=ROUND_OFF)
+        assert found["mechanical_trail"].position[n] == pytest.approx(
+            (meets - contact) @ ahead, abs=ROUND_OFF
+        )
+        assert found["scrub_radius"].position[n] == pytest.approx(
+            (contact - meets) @ aside, abs=ROUND_OFF
+        )
 
 
 def test_strut_against_its_reference():
-    """Every output, rate, second rate and slope of the built-in case; its tolerances are far wider than what is seen."""
+    """Every output, rate, second rate and slope of the built-in case; its tolerances are far wider
+    than what is seen.
+    """
     case = loaded(STRUT)
     found = solved(case)
     assert [*case.reference] == [output.name for output in case.outputs]
     for output in case.outputs:
-        errors = deviations(case, output, found[output.name], [("reference", case.reference[output.name])])
+        errors = deviations(
+            case, output, found[output.name], [("reference", case.reference[output.name])]
+        )
         assert len(errors.items()) == output.orders
         for order, (quantity, error) in enumerate(errors.items(), start=3 - output.orders):
-            # the pose is good to 1e-16 m, directions to that over 0.25 m; every further derivative, of which a slope is one, is
-            # some ten times as large
+            # the pose is good to 1e-16 m, directions to that over 0.25 m; every further derivative,
+            # of which a slope is one, is some ten times as large
             assert error.max_abs < (2e-15, 1e-14, 5e-14)[order], (output.name, quantity)
             assert error.within
 
 
 def test_reference_of_the_strut_is_that_of_sixty_digits():
-    lines = [line for line in (cases.FOLDER / "mcpherson_suspension.csv").read_text().splitlines() if not line.startswith("#")]
+    lines = [
+        line
+        for line in (cases.FOLDER / "mcpherson_suspension.csv").read_text().splitlines()
+        if not line.startswith("#")
+    ]
     table = [row for row in csv.DictReader(lines) if float(row["stroke"]) in (-0.08, 0.045)]
     assert len(table) == 2
-    for written, made in zip(table, strut_oracle.rows([mpf(row["stroke"]) for row in table]), strict=True):
+    for written, made in zip(
+        table, strut_oracle.rows([mpf(row["stroke"]) for row in table]), strict=True
+    ):
         assert written.keys() == made.keys()
         for name, value in made.items():
-            assert abs(mpf(written[name]) - value) <= mpf("1e-16") * abs(value) + mpf("1e-40"), name  # 17 digits are printed
+            # 17 digits are printed
+            assert abs(mpf(written[name]) - value) <= mpf("1e-16") * abs(value) + mpf("1e-40"), name
 
 
-# Spin axis of Project Chrono's generic MacPherson strut (BSD-3-Clause) over the stroke: a solution of its rods and its strut's
-# line to 40 digits that shares nothing with this project. A left wheel, x forward, y left, z up.
+# Spin axis of Project Chrono's generic MacPherson strut (BSD-3-Clause) over the stroke: a solution
+# of its rods and its strut's line to 40 digits that shares nothing with this project. A left wheel,
+# x forward, y left, z up.
 CHRONO = {
     -0.07: (0.036703185761281249241, 0.99905916117216708365, -0.023101269076367991694),
     -0.02: (0.011149989625884017296, 0.99992233617913548656, -0.0055677052187265087943),
@@ -180,7 +279,10 @@ CHRONO = {
 
 def test_chrono_strut_toes_out_in_jounce():
     data = tomllib.loads((cases.FOLDER / "chrono_macpherson.toml").read_text())
-    data |= {"suspension": AXES | {"side": "left"}, "outputs": {"toe": {"type": "toe"}, "camber": {"type": "camber"}}}
+    data |= {
+        "suspension": AXES | {"side": "left"},
+        "outputs": {"toe": {"type": "toe"}, "camber": {"type": "camber"}},
+    }
     case = loaded(unreferenced(data))
     case = replace(case, sweep=replace(case.sweep, values=np.array([*CHRONO])))
     found = solved(case)
@@ -198,14 +300,20 @@ def test_mirror_image_is_the_other_wheel():
     assert right.keys() == left.keys()
     for name, series in right.items():
         sign = -1.0 if name.split(".")[0] in ONE_SIGN else 1.0
-        for here, there in ((series.position, left[name].position), (series.velocity, left[name].velocity)):
+        for here, there in (
+            (series.position, left[name].position),
+            (series.velocity, left[name].velocity),
+        ):
             if here is not None:
                 assert there == pytest.approx(sign * here, abs=ROUND_OFF)
     assert np.ptp(right["toe"].position) > 0.05  # and it is no strut at rest
 
 
 def test_sae_turns_what_has_axes():
-    iso, sae = (loaded(unreferenced(STRUT | {"suspension": STRUT["suspension"] | {"convention": each}})) for each in Convention)
+    iso, sae = (
+        loaded(unreferenced(STRUT | {"suspension": STRUT["suspension"] | {"convention": each}}))
+        for each in Convention
+    )
     assert "y left, z up" in iso.signs
     assert "y right, z down" in sae.signs
     found, turned = solved(iso), solved(sae)
@@ -233,7 +341,13 @@ def test_without_velocities_there_are_positions_and_no_slopes():
     case = loaded(STRUT)
     engine = Native()
     full = engine.solve(engine.build(case), case, TOL)
-    bare = replace(full, points={name: replace(each, velocity=None, acceleration=None) for name, each in full.points.items()})
+    bare = replace(
+        full,
+        points={
+            name: replace(each, velocity=None, acceleration=None)
+            for name, each in full.points.items()
+        },
+    )
     found = {output.name: output_series(case, output, bare) for output in case.outputs}
     assert np.isfinite(found["toe"].position).all()
     assert found["toe"].velocity is None
@@ -242,9 +356,13 @@ def test_without_velocities_there_are_positions_and_no_slopes():
 
 
 def test_slopes_where_the_wheel_stands_still_are_unknown():
-    """A swing axle whose wheel passes the top of its way: travel stops there, and camber does not."""
+    """A swing axle whose wheel passes the top of its way: travel stops there, and camber does
+    not.
+    """
     angles = np.linspace(np.pi / 2 - 0.2, np.pi / 2 + 0.2, 5)
-    found = hinged((0.0, 0.75, 0.0), (0.0, 0.2, 0.0), (1, 0, 0), angles, ["camber", "roll_center_height"])
+    found = hinged(
+        (0.0, 0.75, 0.0), (0.0, 0.2, 0.0), (1, 0, 0), angles, ["camber", "roll_center_height"]
+    )
     assert np.isfinite(found["camber"].position).all()
     for name in ("camber.per_travel", "roll_center_height"):
         assert np.isnan(found[name].position).tolist() == [False, False, True, False, False]
@@ -252,24 +370,39 @@ def test_slopes_where_the_wheel_stands_still_are_unknown():
 
 def test_markers_do_not_widen_tolerances():
     case = loaded(STRUT)
-    plain = replace(case, outputs=(Output("x", "wheel_center", (1.0, 0.0, 0.0), True, 1e-9, case.outputs[0].rtol, "test"),))
+    plain = replace(
+        case,
+        outputs=(
+            Output("x", "wheel_center", (1.0, 0.0, 0.0), True, 1e-9, case.outputs[0].rtol, "test"),
+        ),
+    )
     one = next(islice((output for output in case.outputs if output.name == "toe.per_travel"), 1))
     series = solved(case)["toe"]
     tolerance = deviations(plain, plain.outputs[0], series, [("x", series)]).velocity.tolerance
-    assert deviations(case, case.outputs[0], series, [("x", series)]).velocity.tolerance == pytest.approx(tolerance)
+    assert deviations(
+        case, case.outputs[0], series, [("x", series)]
+    ).velocity.tolerance == pytest.approx(tolerance)
     assert one.atol == pytest.approx(1e-9 / 0.61)  # the strut from ball to top
 
 
 def test_relative_is_measured_from_the_design():
     """A wheel with static angles, each output once as it is and once relative."""
-    data = STRUT | {"suspension": STRUT["suspension"] | {"static_toe": 0.02, "static_camber": -0.03}}
+    data = STRUT | {
+        "suspension": STRUT["suspension"] | {"static_toe": 0.02, "static_camber": -0.03}
+    }
     types = ("toe", "camber", "caster", "scrub_radius")
-    outputs = {f"{each}{end}": {"type": each, "relative": bool(end)} for each in types for end in ("", "_change")}
+    outputs = {
+        f"{each}{end}": {"type": each, "relative": bool(end)}
+        for each in types
+        for end in ("", "_change")
+    }
     found = solved(loaded(unreferenced(data | {"outputs": outputs})))
     middle = 16  # the design is the middle of the sweep
     for each, design in zip(types, (0.02, -0.03, 0.05306489, 0.0), strict=True):
         absolute, relative = found[each], found[f"{each}_change"]
-        assert relative.position == pytest.approx(absolute.position - absolute.position[middle], abs=ROUND_OFF)
+        assert relative.position == pytest.approx(
+            absolute.position - absolute.position[middle], abs=ROUND_OFF
+        )
         assert relative.velocity == pytest.approx(absolute.velocity, abs=ROUND_OFF)
         if design:
             assert absolute.position[middle] == pytest.approx(design, abs=1e-8)  # the digits above

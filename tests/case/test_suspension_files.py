@@ -1,4 +1,6 @@
-"""Suspension outputs in case files, reference tables, results and reports: units, signs in every header, and clear refusals."""
+"""Suspension outputs in case files, reference tables, results and reports: units, signs in every
+header, and clear refusals.
+"""
 
 import json
 from dataclasses import dataclass, field, replace
@@ -21,13 +23,18 @@ from kincheck.core.report.table import print_table
 from ..support.suspension_files import STRUT, TABLE, loaded, unreferenced
 from .test_vary import HEAD
 
-SIGNS = "ISO 8855 (x forward, y left, z up); front right wheel; forward is [-1, 0, 0] and up [0, 0, 1] in the case's axes"
+SIGNS = (
+    "ISO 8855 (x forward, y left, z up); front right wheel; forward is [-1, 0, 0] and up [0, 0, 1]"
+    " in the case's axes"
+)
 HEADING = f"Signs of mcpherson_suspension: {SIGNS}"
 
 
 def changed(table, **keys):
     """The strut's data with keys of a top-level table changed, or left out where None."""
-    return STRUT | {table: {key: value for key, value in (STRUT[table] | keys).items() if value is not None}}
+    return STRUT | {
+        table: {key: value for key, value in (STRUT[table] | keys).items() if value is not None}
+    }
 
 
 TOE = {"outputs": {"toe": {"type": "toe"}}}
@@ -39,30 +46,69 @@ WRONG = {
         changed("suspension", side="left"),
         ["suspension.side", "'left'", "0.715 m on the other side", "correct side"],
     ),
-    "another convention": (changed("suspension", convention="din"), ["suspension.convention", "'din'", "iso8855, sae_j670"]),
+    "another convention": (
+        changed("suspension", convention="din"),
+        ["suspension.convention", "'din'", "iso8855, sae_j670"],
+    ),
     "no convention": (changed("suspension", convention=None), ["suspension.convention", "missing"]),
     "no forward": (changed("suspension", forward=None), ["suspension.forward", "missing"]),
-    "zero forward": (changed("suspension", forward=[0, 0, 0]), ["suspension.forward", "found zero"]),
-    "leaning up": (changed("suspension", up=[0.1, 0, 1]), ["suspension.up", "right angles to forward", "correct one"]),
+    "zero forward": (
+        changed("suspension", forward=[0, 0, 0]),
+        ["suspension.forward", "found zero"],
+    ),
+    "leaning up": (
+        changed("suspension", up=[0.1, 0, 1]),
+        ["suspension.up", "right angles to forward", "correct one"],
+    ),
     "no such wheel": (
         changed("suspension", wheel_center="wheel"),
         ["suspension.wheel_center", "'wheel', expected a point; known: lower_ball"],
     ),
-    "no such kingpin": (changed("suspension", kingpin=["lower_ball", "strut"]), ["suspension.kingpin", "did you mean 'strut_top'"]),
+    "no such kingpin": (
+        changed("suspension", kingpin=["lower_ball", "strut"]),
+        ["suspension.kingpin", "did you mean 'strut_top'"],
+    ),
     "kingpin upside down": (
         changed("suspension", kingpin=["strut_top", "lower_ball"]),
         ["suspension.kingpin", "the lower point, then"],
     ),
     "wheel of the chassis": (ON_CHASSIS, ["suspension.wheel_center", "a body that moves"]),
-    "negative radius": (changed("suspension", wheel_radius=-0.3), ["suspension.wheel_radius", "-0.3", "a positive length"]),
-    "share in percent": (changed("suspension", brake_share=70), ["suspension.brake_share", "70", "0 to 1"]),
-    "no radius": (changed("suspension", wheel_radius=None), ["outputs.half_track_change", "wheel_radius", 'at = "wheel_center"']),
-    "no kingpin": (changed("suspension", kingpin=None), ["suspension.kingpin", "missing", "outputs.caster of type 'caster'"]),
-    "no axle": (changed("suspension", axle=None), ["suspension.axle", "missing", "outputs.wheelbase_change"]),
-    "dive of the rear": (changed("suspension", axle="rear"), ["outputs.anti_dive", "rear axle, expected a front one"]),
-    "no table": ({key: value for key, value in STRUT.items() if key != "suspension"}, ["suspension: missing", "add [suspension]"]),
-    "unknown type": (STRUT | {"outputs": {"toe": {"type": "tow"}}}, ["outputs.toe.type", "'tow'", "did you mean 'toe'"]),
-    "key of another type": (changed("outputs", toe={"type": "toe", "at": "contact"}), ["outputs.toe.at", "unknown key"]),
+    "negative radius": (
+        changed("suspension", wheel_radius=-0.3),
+        ["suspension.wheel_radius", "-0.3", "a positive length"],
+    ),
+    "share in percent": (
+        changed("suspension", brake_share=70),
+        ["suspension.brake_share", "70", "0 to 1"],
+    ),
+    "no radius": (
+        changed("suspension", wheel_radius=None),
+        ["outputs.half_track_change", "wheel_radius", 'at = "wheel_center"'],
+    ),
+    "no kingpin": (
+        changed("suspension", kingpin=None),
+        ["suspension.kingpin", "missing", "outputs.caster of type 'caster'"],
+    ),
+    "no axle": (
+        changed("suspension", axle=None),
+        ["suspension.axle", "missing", "outputs.wheelbase_change"],
+    ),
+    "dive of the rear": (
+        changed("suspension", axle="rear"),
+        ["outputs.anti_dive", "rear axle, expected a front one"],
+    ),
+    "no table": (
+        {key: value for key, value in STRUT.items() if key != "suspension"},
+        ["suspension: missing", "add [suspension]"],
+    ),
+    "unknown type": (
+        STRUT | {"outputs": {"toe": {"type": "tow"}}},
+        ["outputs.toe.type", "'tow'", "did you mean 'toe'"],
+    ),
+    "key of another type": (
+        changed("outputs", toe={"type": "toe", "at": "contact"}),
+        ["outputs.toe.at", "unknown key"],
+    ),
     "another place": (
         changed("outputs", half_track_change={"type": "half_track_change", "at": "hub"}),
         ["'hub'", "wheel_center, contact"],
@@ -71,8 +117,14 @@ WRONG = {
         changed("outputs", motion_ratio={"type": "motion_ratio", "between": ["strut_foot", "top"]}),
         ["outputs.motion_ratio.between", "'top', expected a point; known: lower_ball"],
     ),
-    "tolerance without reason": (changed("outputs", toe={"type": "toe", "atol": 1e-6}), ["outputs.toe.why", "missing"]),
-    "name of a slope": (changed("outputs", **{"toe.per_travel": {"type": "toe"}}), ["outputs.toe.per_travel", "another name"]),
+    "tolerance without reason": (
+        changed("outputs", toe={"type": "toe", "atol": 1e-6}),
+        ["outputs.toe.why", "missing"],
+    ),
+    "name of a slope": (
+        changed("outputs", **{"toe.per_travel": {"type": "toe"}}),
+        ["outputs.toe.per_travel", "another name"],
+    ),
 }
 
 
@@ -89,35 +141,77 @@ def test_quotients_of_velocities_want_travel_alone():
     rack = {**STRUT["bodies"]["rack"], "fixed": False}
     steered = STRUT | {
         "bodies": STRUT["bodies"] | {"rack": rack},
-        "joints": STRUT["joints"]
-        | {"guide": {"type": "translational", "bodies": ["chassis", "rack"], "point": [1.14, 0, 0.1455], "axis": [0, 1, 0]}},
-        "drivers": STRUT["drivers"]
-        | {"steering": {"type": "joint_displacement", "joint": "guide", "motion": {"type": "ramp", "rate": 0.5}}},
+        "joints": (
+            STRUT["joints"]
+            | {
+                "guide": {
+                    "type": "translational",
+                    "bodies": ["chassis", "rack"],
+                    "point": [1.14, 0, 0.1455],
+                    "axis": [0, 1, 0],
+                }
+            }
+        ),
+        "drivers": (
+            STRUT["drivers"]
+            | {
+                "steering": {
+                    "type": "joint_displacement",
+                    "joint": "guide",
+                    "motion": {"type": "ramp", "rate": 0.5},
+                }
+            }
+        ),
     }
-    with pytest.raises(CaseError, match=r"outputs\.motion_ratio\.type: found 'motion_ratio' while stroke, steering move"):
+    with pytest.raises(
+        CaseError,
+        match=r"outputs\.motion_ratio\.type: found 'motion_ratio' while stroke, steering move",
+    ):
         loaded(unreferenced(steered))
-    case = loaded(unreferenced(steered | TOE))  # along the path of both drivers a slope has a meaning
+    # along the path of both drivers a slope has a meaning
+    case = loaded(unreferenced(steered | TOE))
     assert [output.name for output in case.outputs] == ["toe", "toe.per_travel"]
 
 
 def test_signs_of_a_reference_table_must_be_those_of_the_case():
     with pytest.raises(CaseError, match=r"signs: found 'iso8855' of signs, expected 'sae_j670'"):
         loaded(changed("suspension", convention="sae_j670"))
-    with pytest.raises(CaseError, match=r'found no convention of signs, expected .* write "# signs: iso8855"'):
+    with pytest.raises(
+        CaseError, match=r'found no convention of signs, expected .* write "# signs: iso8855"'
+    ):
         loaded(STRUT, TABLE.replace("# signs: iso8855\n", ""))
 
 
 def test_millimetres_and_degrees():
-    """All numbers of the file in mm and degrees: tolerances, references and outputs in SI are the same."""
+    """All numbers of the file in mm and degrees: tolerances, references and outputs in SI are the
+    same.
+    """
 
     def scaled(value):
         return [scaled(each) for each in value] if isinstance(value, list) else 1000.0 * value
 
-    lengths = {"origin", "point", "points", "position", "start", "stop", "rate", "wheel_radius", "wheelbase", "cg_height"}
+    lengths = {
+        "origin",
+        "point",
+        "points",
+        "position",
+        "start",
+        "stop",
+        "rate",
+        "wheel_radius",
+        "wheelbase",
+        "cg_height",
+    }
 
     def table(data):
         return {
-            key: table(each) if isinstance(each, dict) else scaled(each) if key in lengths and not isinstance(each, str) else each
+            key: (
+                table(each)
+                if isinstance(each, dict)
+                else scaled(each)
+                if key in lengths and not isinstance(each, str)
+                else each
+            )
             for key, each in data.items()
         }
 
@@ -127,14 +221,19 @@ def test_millimetres_and_degrees():
     }
     reference = {"reference": {"columns": ["stroke", "toe", "camber.per_travel"]}}
     rows = [[k / 1000, 0.25, 3.0] for k in range(-80, 81, 5)]
-    other = {key: table(value) if isinstance(value, dict) and key != "drivers" else value for key, value in metres.items()}
+    other = {
+        key: table(value) if isinstance(value, dict) and key != "drivers" else value
+        for key, value in metres.items()
+    }
     other["points"] = table(STRUT["points"])
     other["joints"] = {name: table(joint) for name, joint in STRUT["joints"].items()}
     other["drivers"] = {"stroke": STRUT["drivers"]["stroke"]}
     other["suspension"] |= {"static_camber": np.degrees(-0.02), "center_plane": [0.0, 10.0, 0.0]}
     other["outputs"] |= {"toe": {"type": "toe", "atol": np.degrees(0.5), "why": "test"}}
     other["units"] = {"length": "mm", "angle": "deg"}
-    other["reference"] = reference["reference"] | {"rows": [[1000 * s, np.degrees(t), np.degrees(c) / 1000] for s, t, c in rows]}
+    other["reference"] = reference["reference"] | {
+        "rows": [[1000 * s, np.degrees(t), np.degrees(c) / 1000] for s, t, c in rows]
+    }
     a, b = loaded(metres | {"reference": reference["reference"] | {"rows": rows}}), loaded(other)
     for one, two in zip(a.outputs, b.outputs, strict=True):
         assert (one.name, one.atol) == (two.name, pytest.approx(two.atol))
@@ -148,7 +247,9 @@ def test_millimetres_and_degrees():
 
 def test_slopes_can_be_left_out():
     case = loaded(
-        changed("suspension", per_travel=False) | TOE | {"reference": {"rows": [[k / 1000, 0.0] for k in range(-80, 81, 5)]}}
+        changed("suspension", per_travel=False)
+        | TOE
+        | {"reference": {"rows": [[k / 1000, 0.0] for k in range(-80, 81, 5)]}}
     )
     assert [output.name for output in case.outputs] == ["toe"]
     assert case.points == ("wheel_center", "~wheel_center.spin")  # and nothing else is computed
@@ -210,8 +311,19 @@ def test_signs_head_everything(results, tmp_path):
 def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
     parquet = pytest.importorskip("pyarrow.parquet")
     varied = {"ball": {"at": "ball", "sigma": 1.0}}
-    (tmp_path / "vary.json").write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied}))
-    sweep = ["sweep", "--samples", "4", "--out", str(tmp_path), "--store", str(tmp_path / "all.parquet"), "--vary"]
+    (tmp_path / "vary.json").write_text(
+        json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied})
+    )
+    sweep = [
+        "sweep",
+        "--samples",
+        "4",
+        "--out",
+        str(tmp_path),
+        "--store",
+        str(tmp_path / "all.parquet"),
+        "--vary",
+    ]
     for command, first in (
         (["explain"], "output "),
         (["reference"], "native error"),
@@ -223,19 +335,27 @@ def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
         assert tables
         assert all(SIGNS in lines[k - 1] or SIGNS in lines[k - 2] for k in tables), command
     assert SIGNS in (tmp_path / "sweep.html").read_text().replace("&#39;", "'")
-    assert json.loads(parquet.read_schema(tmp_path / "all.parquet").metadata[b"kincheck"])["signs"] == SIGNS
+    assert (
+        json.loads(parquet.read_schema(tmp_path / "all.parquet").metadata[b"kincheck"])["signs"]
+        == SIGNS
+    )
 
 
 def test_tables_keep_lengths_and_angles_apart(results):
     """Lengths are shown where there are any; errors in other units have theirs beside them."""
     assert "[" not in cells(results)[1]
     native, bent = cells(run([loaded(unreferenced(STRUT | TOE))], [Native(), Bent()], tol=1e-12))
-    assert native.startswith("not judged, residual")  # no truth, and nothing else to be compared with
+    # no truth, and nothing else to be compared with
+    assert native.startswith("not judged, residual")
     assert bent.startswith("fail: 4e-06 [rad] · ")
 
 
 def cells(results):
-    row = next(line for line in to_markdown(results).splitlines() if line.startswith("| `mcpherson_suspension`"))
+    row = next(
+        line
+        for line in to_markdown(results).splitlines()
+        if line.startswith("| `mcpherson_suspension`")
+    )
     return [cell.strip() for cell in row.split("|")[2:-1]]
 
 
@@ -257,7 +377,9 @@ def test_a_new_type_is_a_short_class(capsys):
         for name, cls in SuspensionOutput.registry.items():
             assert f"  {name} " in printed
             assert cls.positive in printed
-        case = loaded(unreferenced(STRUT | {"outputs": {"lead": {"type": Lead.type, "relative": True}}}))
+        case = loaded(
+            unreferenced(STRUT | {"outputs": {"lead": {"type": Lead.type, "relative": True}}})
+        )
         assert [output.name for output in case.outputs] == ["lead", "lead.per_travel"]
     finally:
         del SuspensionOutput.registry[Lead.type]

@@ -1,4 +1,6 @@
-"""Files that say what varies: what moves together, units, draws by seed and index, and a message for whatever is wrong."""
+"""Files that say what varies: what moves together, units, draws by seed and index, and a message
+for whatever is wrong.
+"""
 
 import json
 from dataclasses import replace
@@ -19,17 +21,24 @@ HEAD = {"schema": "kincheck-vary/1", "units": {"length": "mm", "angle": "deg"}}
 def vary(tmp_path, case, mode="monte_carlo", lines=None, **hardpoints):
     """The variation that a file of these hardpoints gives."""
     path = tmp_path / "vary.json"
-    path.write_text(json.dumps({**HEAD, "mode": mode, "hardpoints": hardpoints, "lines": lines or {}}))
+    path.write_text(
+        json.dumps({**HEAD, "mode": mode, "hardpoints": hardpoints, "lines": lines or {}})
+    )
     return read_variation(path, case)
 
 
 def moved(variation, **offsets):
-    """Values of the places that move, with these offsets of coordinates [SI]; dots are written as two underscores."""
+    """Values of the places that move, with these offsets of coordinates [SI]; dots are written as
+    two underscores.
+    """
     names = [each.name.replace(".", "__") for each in variation.coordinates]
     column = np.array([offsets.pop(name, 0.0) for name in names])
     assert not offsets
     before = variation.values(np.zeros(len(names)))
-    return {place: np.subtract(value, before[place]) for place, value in variation.values(column).items()}
+    return {
+        place: np.subtract(value, before[place])
+        for place, value in variation.values(column).items()
+    }
 
 
 def test_what_is_at_the_same_point_moves_together_unless_it_is_not_to(tmp_path):
@@ -38,14 +47,22 @@ def test_what_is_at_the_same_point_moves_together_unless_it_is_not_to(tmp_path):
     assert set(together) == {"joints.ball.point", "points.lower_ball.position"}
     for change in together.values():
         np.testing.assert_allclose(change, [0.25, 0, 0], atol=1e-16)
-    alone = vary(tmp_path, case, ball={"at": "lower_ball", "sigma": 1.0, "only": ["joints.ball.point"]})
+    alone = vary(
+        tmp_path, case, ball={"at": "lower_ball", "sigma": 1.0, "only": ["joints.ball.point"]}
+    )
     assert set(alone.places) == {"joints.ball.point"}
 
 
 def test_markers_go_with_the_wheel_centre(tmp_path):
     """Else the wheel's axis of rotation, which goes through both, would turn."""
-    found = moved(vary(tmp_path, load("mcpherson_suspension"), wc={"at": "wheel_center", "sigma": 1.0}), wc__y=0.5)
-    assert set(found) == {f"points.{name}.position" for name in ("wheel_center", "~wheel_center.spin", "~wheel_center.top")}
+    found = moved(
+        vary(tmp_path, load("mcpherson_suspension"), wc={"at": "wheel_center", "sigma": 1.0}),
+        wc__y=0.5,
+    )
+    assert set(found) == {
+        f"points.{name}.position"
+        for name in ("wheel_center", "~wheel_center.spin", "~wheel_center.top")
+    }
     assert all(np.allclose(change, [0, 0.5, 0], atol=1e-15) for change in found.values())
 
 
@@ -61,21 +78,31 @@ def test_units_laws_and_kinds_of_places(tmp_path):
         ("pivot.z", "m", Law.UNIFORM),
         *((f"axis.{axis}", "rad", Law.NORMAL) for axis in "xyz"),
     ]
-    assert [each.scale for each in found.coordinates] == pytest.approx([1e-3, 2e-3] + [np.radians(0.5)] * 3)
+    assert [each.scale for each in found.coordinates] == pytest.approx(
+        [1e-3, 2e-3] + [np.radians(0.5)] * 3
+    )
 
 
 def test_a_length_varies_by_one_number(tmp_path):
     case = load("modelica_four_bar_distance")
-    joints = [replace(joint, length=1.1) if joint.name == "rod" else joint for joint in case.mechanism.joints]
+    joints = [
+        replace(joint, length=1.1) if joint.name == "rod" else joint
+        for joint in case.mechanism.joints
+    ]
     rod = replace(case, mechanism=replace(case.mechanism, joints=joints))
     found = vary(tmp_path, rod, "grid", rod={"at": "joints.rod.length", "values": [-1, 2]})
     assert [found.values(found.of_variant(0, k))["joints.rod.length"] for k in range(2)] == [
         pytest.approx((1.099,)),
         pytest.approx((1.102,)),
     ]
-    with pytest.raises(CaseError, match=r"hardpoints.rod: found \[1.0, 1.0, 1.0\], expected one number, for it is a length"):
+    with pytest.raises(
+        CaseError,
+        match=r"hardpoints.rod: found \[1.0, 1.0, 1.0\], expected one number, for it is a length",
+    ):
         vary(tmp_path, rod, rod={"at": "joints.rod.length", "sigma": [1, 1, 1]})
-    with pytest.raises(CaseError, match=r"hardpoints.rod.values: .+ expected a list of offsets, for it is a length"):
+    with pytest.raises(
+        CaseError, match=r"hardpoints.rod.values: .+ expected a list of offsets, for it is a length"
+    ):
         vary(tmp_path, rod, "grid", rod={"at": "joints.rod.length", "values": [[1], [1], [1]]})
 
 
@@ -86,16 +113,27 @@ def test_a_line_follows_the_positions_it_goes_through(tmp_path):
     case = load("mcpherson_strut")
     offsets = {"foot__x": 0.01, "foot__z": -0.02, "top__y": 0.03}
     for through in (line["through"], line["through"][::-1]):
-        found = moved(vary(tmp_path, case, lines={"strut": {**line, "through": through}}, **ends), **offsets)
-        np.testing.assert_allclose(found["joints.strut_slide.axis"], [-0.01, 0.03, 0.02], atol=1e-12)
+        found = moved(
+            vary(tmp_path, case, lines={"strut": {**line, "through": through}}, **ends), **offsets
+        )
+        np.testing.assert_allclose(
+            found["joints.strut_slide.axis"], [-0.01, 0.03, 0.02], atol=1e-12
+        )
     assert "joints.strut_slide.axis" not in moved(vary(tmp_path, case, **ends), **offsets)
 
 
 def test_a_variant_is_known_by_seed_and_index(tmp_path):
-    found = vary(tmp_path, crank(), tip={"at": "tip", "sigma": [1.0, 0, 0]}, pivot={"at": "pivot", "half_width": [0, 3.0, 0]})
+    found = vary(
+        tmp_path,
+        crank(),
+        tip={"at": "tip", "sigma": [1.0, 0, 0]},
+        pivot={"at": "pivot", "half_width": [0, 3.0, 0]},
+    )
     whole = np.hstack([found.offsets(5, first, DRAWN) for first in range(0, 40 * DRAWN, DRAWN)])
     for first, count in ((2 * DRAWN, 7), (250, 600), (513, 1)):
-        np.testing.assert_array_equal(found.offsets(5, first, count), whole[:, first : first + count])
+        np.testing.assert_array_equal(
+            found.offsets(5, first, count), whole[:, first : first + count]
+        )
     for index in (0, 255, 256, 9999):
         np.testing.assert_array_equal(found.of_variant(5, index), whole[:, index])
     assert not np.isin(whole, found.offsets(6, 0, DRAWN)).any()
@@ -119,12 +157,17 @@ def test_a_grid_has_every_combination_once(tmp_path):
     np.testing.assert_allclose(rows, expected, atol=1e-15)
     # as many digits as it takes
     pivot = {"at": "pivot", "half_width": 1, "steps": 10_000}
-    huge = vary(tmp_path, crank(), "grid", tip={"at": "tip", "half_width": 1, "steps": 10_000}, pivot=pivot)
+    huge = vary(
+        tmp_path, crank(), "grid", tip={"at": "tip", "half_width": 1, "steps": 10_000}, pivot=pivot
+    )
     assert huge.count == 10**24
 
 
 def test_one_at_a_time_begins_with_the_nominal_design(tmp_path):
-    points = {"tip": {"at": "tip", "sigma": [1, 0, 2]}, "pivot": {"at": "pivot", "values": [[-3, 0, 3], [4], [5]]}}
+    points = {
+        "tip": {"at": "tip", "sigma": [1, 0, 2]},
+        "pivot": {"at": "pivot", "values": [[-3, 0, 3], [4], [5]]},
+    }
     found = vary(tmp_path, crank(), "one_at_a_time", **points)
     assert found.count == 1 + 2 + 2 + 2 + 1 + 1
     offsets = found.offsets(0, 0, found.count) * 1e3
@@ -135,7 +178,10 @@ def test_one_at_a_time_begins_with_the_nominal_design(tmp_path):
 
 
 FAULTS = [
-    ({"schema": "kincheck-case/1"}, "schema: found 'kincheck-case/1', expected \"kincheck-vary/1\""),
+    (
+        {"schema": "kincheck-case/1"},
+        "schema: found 'kincheck-case/1', expected \"kincheck-vary/1\"",
+    ),
     ({"mode": "random"}, "mode: found 'random', expected one of monte_carlo, grid, one_at_a_time"),
     ({"hardpoints": {}}, "hardpoints: found {}, expected a table of at least one hardpoint"),
     ({"units": {}}, 'units.length: missing, expected "m" or "mm" for hardpoints.tip'),
@@ -146,30 +192,72 @@ FAULTS = [
         {"tip": {"at": "tipp", "sigma": 1.0}},
         "hardpoints.tip.at: found 'tipp', expected a position, direction or length of the case;",
     ),
-    ({"tip": {"at": "tip", "sigma": -1.0}}, "hardpoints.tip.sigma: found -1.0, expected a number that is not negative, or three"),
-    ({"tip": {"at": "tip", "sigma": [1.0, 2.0]}}, "hardpoints.tip.sigma: found [1.0, 2.0], expected"),
-    ({"tip": {"at": "tip", "sigma": [1.0, -2.0, 0.0]}}, "hardpoints.tip.sigma: found [1.0, -2.0, 0.0], expected"),
-    ({"tip": {"at": "tip"}}, "hardpoints.tip: found none of them, expected for monte_carlo: sigma, or half_width"),
-    ({"tip": {"at": "tip", "sigma": 1, "half_width": 1}}, "hardpoints.tip: found half_width and sigma, expected for monte_carlo"),
+    (
+        {"tip": {"at": "tip", "sigma": -1.0}},
+        "hardpoints.tip.sigma: found -1.0, expected a number that is not negative, or three",
+    ),
+    (
+        {"tip": {"at": "tip", "sigma": [1.0, 2.0]}},
+        "hardpoints.tip.sigma: found [1.0, 2.0], expected",
+    ),
+    (
+        {"tip": {"at": "tip", "sigma": [1.0, -2.0, 0.0]}},
+        "hardpoints.tip.sigma: found [1.0, -2.0, 0.0], expected",
+    ),
+    (
+        {"tip": {"at": "tip"}},
+        "hardpoints.tip: found none of them, expected for monte_carlo: sigma, or half_width",
+    ),
+    (
+        {"tip": {"at": "tip", "sigma": 1, "half_width": 1}},
+        "hardpoints.tip: found half_width and sigma, expected for monte_carlo",
+    ),
     ({"tip": {"at": "tip", "sigma": 0}}, "hardpoints: nothing varies"),
-    ({"mode": "grid", "tip": {"at": "tip", "sigma": 1}}, "found sigma, expected for grid: values, or half_width and steps"),
-    ({"mode": "grid", "tip": {"at": "tip", "values": [[1], [2]]}}, "hardpoints.tip.values: found [[1.0], [2.0]], expected a list"),
-    ({"mode": "grid", "tip": {"at": "tip", "values": [1, 1]}}, "hardpoints.tip.values: found an offset twice"),
-    ({"mode": "grid", "tip": {"at": "tip", "half_width": 1, "steps": 1}}, "hardpoints.tip.steps: found 1, expected a whole number"),
+    (
+        {"mode": "grid", "tip": {"at": "tip", "sigma": 1}},
+        "found sigma, expected for grid: values, or half_width and steps",
+    ),
+    (
+        {"mode": "grid", "tip": {"at": "tip", "values": [[1], [2]]}},
+        "hardpoints.tip.values: found [[1.0], [2.0]], expected a list",
+    ),
+    (
+        {"mode": "grid", "tip": {"at": "tip", "values": [1, 1]}},
+        "hardpoints.tip.values: found an offset twice",
+    ),
+    (
+        {"mode": "grid", "tip": {"at": "tip", "half_width": 1, "steps": 1}},
+        "hardpoints.tip.steps: found 1, expected a whole number",
+    ),
     (
         {"tip": {"at": "tip", "sigma": 1}, "same": {"at": "tip", "sigma": 1}},
-        "hardpoints.same: moves points.tip.position, as does hardpoints.tip, expected one of them to",
+        (
+            "hardpoints.same: moves points.tip.position, as does hardpoints.tip, expected one of"
+            " them to"
+        ),
     ),
     (
         {"tip": {"at": "tip", "sigma": 1, "only": ["pivot"]}},
-        "hardpoints.tip.only: found 'joints.pivot.point', which is not at points.tip.position at design",
+        (
+            "hardpoints.tip.only: found 'joints.pivot.point', which is not at points.tip.position"
+            " at design"
+        ),
     ),
     (
-        {"tip": {"at": "tip", "sigma": 1}, "lines": {"a": {"axis": "joints.pivot.axis", "through": ["pivot", "tip"]}}},
-        "lines.a.through: found joints.pivot.axis, which does not go through joints.pivot.point and points.tip.position at design",
+        {
+            "tip": {"at": "tip", "sigma": 1},
+            "lines": {"a": {"axis": "joints.pivot.axis", "through": ["pivot", "tip"]}},
+        },
+        (
+            "lines.a.through: found joints.pivot.axis, which does not go through joints.pivot.point"
+            " and points.tip.position at design"
+        ),
     ),
     (
-        {"tip": {"at": "tip", "sigma": 1}, "lines": {"a": {"axis": "pivot", "through": ["pivot", "tip"]}}},
+        {
+            "tip": {"at": "tip", "sigma": 1},
+            "lines": {"a": {"axis": "pivot", "through": ["pivot", "tip"]}},
+        },
         "lines.a.axis: found joints.pivot.point, a point [x, y, z], expected a direction",
     ),
 ]
@@ -191,7 +279,12 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, change, message):
 
 
 def test_a_name_that_may_be_two_places_is_refused(tmp_path):
-    with pytest.raises(CaseError, match=r"which may be joints.tie_rod.points.0 or joints.tie_rod.points.1, expected one place"):
+    with pytest.raises(
+        CaseError,
+        match=(
+            r"which may be joints.tie_rod.points.0 or joints.tie_rod.points.1, expected one place"
+        ),
+    ):
         vary(tmp_path, load("mcpherson_strut"), rod={"at": "tie_rod", "sigma": 1.0})
 
 
@@ -200,6 +293,12 @@ def test_an_absolute_driver_of_a_point_that_varies_is_refused(tmp_path):
     case = load("mcpherson_strut")
     drivers = [replace(case.mechanism.driver("stroke"), relative=False)]
     absolute = replace(case, mechanism=replace(case.mechanism, drivers=drivers))
-    with pytest.raises(CaseError, match=r"driver 'stroke' of the case gives the absolute position of 'wheel_center', which varies"):
+    with pytest.raises(
+        CaseError,
+        match=(
+            r"driver 'stroke' of the case gives the absolute position of 'wheel_center', which"
+            r" varies"
+        ),
+    ):
         vary(tmp_path, absolute, wc={"at": "wheel_center", "sigma": 1.0})
     vary(tmp_path, absolute, ball={"at": "ball", "sigma": 1.0})

@@ -9,7 +9,9 @@ from kincheck.core.cli.main import main
 
 
 def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):
-    """One begins while the other is at it: what is there in the end is the whole of the one that ended last."""
+    """One begins while the other is at it: what is there in the end is the whole of the one that
+    ended last.
+    """
     file = tmp_path / "results.json"
 
     def first(part):
@@ -45,7 +47,8 @@ def test_a_pipe_takes_what_several_have_to_say(tmp_path):
     os.mkfifo(named)
     reader = os.open(named, os.O_RDONLY | os.O_NONBLOCK)
     nameless = named.with_name("link")
-    nameless.symlink_to(f"/proc/self/fd/{end[1]}")  # as a shell has it: what it leads to is a name of nothing
+    # as a shell has it: what it leads to is a name of nothing
+    nameless.symlink_to(f"/proc/self/fd/{end[1]}")
     assert write_all([(named, b"one "), (named, b"two"), (nameless, b"three")]) == []
     assert os.read(reader, 100) == b"one two"
     assert os.read(end[0], 100) == b"three"
@@ -53,19 +56,30 @@ def test_a_pipe_takes_what_several_have_to_say(tmp_path):
         os.close(each)
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no device that is always full")
-@pytest.mark.parametrize("command", ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"])
+@pytest.mark.skipif(
+    not os.path.exists("/dev/full"), reason="there is no device that is always full"
+)
+@pytest.mark.parametrize(
+    "command",
+    ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"],
+)
 def test_a_full_disk_is_one_message(command, capsys):
     assert main([*command.split(), "--json", "/dev/full"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a folder that ")
+    assert line.startswith(
+        "kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a"
+        " folder that "
+    )
 
 
 def test_two_options_that_name_one_pipe(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    assert main(["run", "rssr", "--engine", "native", "--junit", str(pipe), "--markdown", str(pipe)]) == 0
+    assert (
+        main(["run", "rssr", "--engine", "native", "--junit", str(pipe), "--markdown", str(pipe)])
+        == 0
+    )
     text = os.read(reader, 100_000).decode()
     os.close(reader)
     assert "</testsuites>" in text

@@ -46,9 +46,14 @@ component = "x"
 """
 TURN = 'type = "joint_angle"\njoint = "pivot"'
 SHIFT = 'type = "point_coordinate"\npoint = "tip"\ndirection = [1, 0, 0]'
-ROD = '[bodies.rocker]\n[joints.rod]\ntype = "distance"\nbodies = ["crank", "rocker"]\npoints = [[0, 0, 0], [SIDE, 0, 0]]\n'
+ROD = (
+    '[bodies.rocker]\n[joints.rod]\ntype = "distance"\nbodies = ["crank", "rocker"]\npoints = [[0,'
+    " 0, 0], [SIDE, 0, 0]]\n"
+)
 numbers = st.floats(1e-3, 1e4) | st.integers(1, 9999) | st.decimals(1, 999, places=4)
-quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 def as_read(number):
@@ -78,7 +83,9 @@ def test_a_driver_value_off_the_grid_is_quoted(tmp_path, number, unit, inline):
     given_by = rows if inline else 'file = "x.csv"'
     reference = f"[reference]\n{given_by}\n"
     message = refused(write(tmp_path, text(**units, start=start, stop="1e5") + reference))
-    quoted = re.search(r"driver value (\S+) (\w+) of sample 0, expected (\S+) (\w+) as in the sweep", message)
+    quoted = re.search(
+        r"driver value (\S+) (\w+) of sample 0, expected (\S+) (\w+) as in the sweep", message
+    )
     assert quoted is not None, message
     assert quoted[2] == quoted[4] == unit
     written = found if not inline else as_read(number * 2)
@@ -101,14 +108,19 @@ def test_a_length_that_is_none_is_quoted(tmp_path, number, unit):
 @given(number=st.decimals(1, 999, places=6), unit=st.sampled_from(["mm", "m"]))
 def test_a_note_on_a_rod_quotes_its_length(tmp_path, number, unit):
     rod = ROD.replace("SIDE", "1234.5") + f"length = {number}\n"
-    found = next(note for note in notes(load_case(write(tmp_path, text(length=unit) + rod))) if "rod" in note)
+    found = next(
+        note for note in notes(load_case(write(tmp_path, text(length=unit) + rod))) if "rod" in note
+    )
     assert f"length {plain(float(number))} {unit}, points 1234.5 {unit} apart" in found
 
 
 @quick
 @given(number=numbers, unit=st.sampled_from(["mm", "m"]))
 def test_a_wheel_on_the_other_side_is_quoted(tmp_path, number, unit):
-    vehicle = '[suspension]\nconvention = "iso8855"\nside = "right"\nforward = [1, 0, 0]\nup = [0, 0, 1]\nwheel_center = "tip"\n'
+    vehicle = (
+        '[suspension]\nconvention = "iso8855"\nside = "right"\nforward = [1, 0, 0]\nup = [0, 0,'
+        ' 1]\nwheel_center = "tip"\n'
+    )
     message = refused(write(tmp_path, text(length=unit, side=str(number)) + vehicle))
     (found,) = re.findall(rf"'tip' is (\S+) {unit} on the other side", message)
     assert math.isclose(float(found), number, rel_tol=1e-9)
@@ -131,10 +143,30 @@ wheel_center,0.2,WHEEL,0
 @pytest.mark.parametrize(
     ("upper", "wheel", "axes", "words"),
     [
-        ("0.2", "-0.7512", "forward,left,up", "wheel_center: found y = -0.7512 UNIT, not left of the middle"),
-        ("-0.2345", "0.75", "forward,left,up", "uca_outer: found z = -0.2345 UNIT, not above lca_outer with z = -0.15 UNIT"),
-        ("0.2", "0.75", "rearward,left,up", "uca_front: found x = 0.4 UNIT, and uca_rear with x = 0 UNIT"),
-        ("0.2", "0.75", "forward,right,up", "wheel_center: found y = 0.75 UNIT, not left of the middle"),
+        (
+            "0.2",
+            "-0.7512",
+            "forward,left,up",
+            "wheel_center: found y = -0.7512 UNIT, not left of the middle",
+        ),
+        (
+            "-0.2345",
+            "0.75",
+            "forward,left,up",
+            "uca_outer: found z = -0.2345 UNIT, not above lca_outer with z = -0.15 UNIT",
+        ),
+        (
+            "0.2",
+            "0.75",
+            "rearward,left,up",
+            "uca_front: found x = 0.4 UNIT, and uca_rear with x = 0 UNIT",
+        ),
+        (
+            "0.2",
+            "0.75",
+            "forward,right,up",
+            "wheel_center: found y = 0.75 UNIT, not left of the middle",
+        ),
     ],
 )
 def test_hardpoints_are_quoted_in_the_axes_of_their_file(tmp_path, unit, upper, wheel, axes, words):
@@ -144,7 +176,10 @@ def test_hardpoints_are_quoted_in_the_axes_of_their_file(tmp_path, unit, upper, 
         assert "the points span" in message
         assert "metres declared as mm?" in message
     elif unit == "cm" or "span" in message:
-        assert f"the points span {message.split('the points span ')[1].split()[0]} {unit}, expected " in message
+        assert (
+            f"the points span {message.split('the points span ')[1].split()[0]} {unit}, expected "
+            in message
+        )
     else:
         assert words.replace("UNIT", unit) in message
 
@@ -165,5 +200,8 @@ def test_decimals_come_back_as_they_are(number):
 
 
 def test_a_description_in_python_speaks_in_metres():
-    with pytest.raises(MechanismError, match=r"length is -0\.35 m, expected a positive one; the points are 0\.5 m apart"):
+    with pytest.raises(
+        MechanismError,
+        match=r"length is -0\.35 m, expected a positive one; the points are 0\.5 m apart",
+    ):
         Distance("rod", "a", "b", ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0)), -0.35)

@@ -1,4 +1,6 @@
-"""The case library: every case against its truth, the truths against published values, and truths that must not pass."""
+"""The case library: every case against its truth, the truths against published values, and truths
+that must not pass.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -8,7 +10,14 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
-from kincheck.cases import andrews_squeezer, bennett, bricard, hooke_joint, modelica_four_bar, planar_slider_crank
+from kincheck.cases import (
+    andrews_squeezer,
+    bennett,
+    bricard,
+    hooke_joint,
+    modelica_four_bar,
+    planar_slider_crank,
+)
 from kincheck.cases.jet import Jet, steady
 from kincheck.cases.vectors import Circle
 from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, solve
@@ -16,9 +25,14 @@ from kincheck.core.case.case import Output, Truth
 from kincheck.core.harness.compare import deviations, output_series
 
 CASES = {name: cases.load(name) for name in cases.names()}
-COORDINATES = [name for name, case in CASES.items() if all(isinstance(output, Output) for output in case.outputs)]
+COORDINATES = [
+    name
+    for name, case in CASES.items()
+    if all(isinstance(output, Output) for output in case.outputs)
+]
 CLOSED_FORMS = [name for name in COORDINATES if CASES[name].truth is Truth.CLOSED_FORM]
-# What is asked of the native engine [m]; each derivative passes the equations, of pivots above 0.03, once more.
+# What is asked of the native engine [m]; each derivative passes the equations, of pivots above
+# 0.03, once more.
 ROUND_OFF = 1e-14
 LIMITS = {"position": ROUND_OFF, "velocity": 10 * ROUND_OFF, "acceleration": 100 * ROUND_OFF}
 
@@ -46,7 +60,10 @@ def test_the_native_engine_finds_the_truth_to_round_off(name: str):
         series = output_series(case, output, found)
         for order, limit in LIMITS.items():
             truth, values = getattr(case.reference[output.name], order), getattr(series, order)
-            assert np.abs(values - truth).max() <= limit * max(1.0, np.abs(truth).max()), (output.name, order)
+            assert np.abs(values - truth).max() <= limit * max(1.0, np.abs(truth).max()), (
+                output.name,
+                order,
+            )
 
 
 @pytest.mark.parametrize("name", COORDINATES)
@@ -56,7 +73,9 @@ def test_a_truth_that_is_off_by_twice_the_tolerance_fails(name: str):
         series = case.reference[output.name]
         shifted = series.position.copy()
         shifted[len(shifted) // 3] += 2.0 * output.atol
-        assert off(case, output.name, found, replace(series, position=shifted)) == pytest.approx(2.0, rel=1e-3)
+        assert off(case, output.name, found, replace(series, position=shifted)) == pytest.approx(
+            2.0, rel=1e-3
+        )
 
 
 def test_the_truth_of_the_other_branch_fails():
@@ -65,12 +84,16 @@ def test_the_truth_of_the_other_branch_fails():
         (case, found), (there, _) = solved(one), solved(other)
         for output in case.outputs:
             expected = 1.0 if output.point == "crank_pin" else 1e6
-            assert (off(case, output.name, found, there.reference[output.name]) > expected) is (output.point != "crank_pin")
+            assert (off(case, output.name, found, there.reference[output.name]) > expected) is (
+                output.point != "crank_pin"
+            )
 
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
 def test_closed_forms_are_differentiated_rightly(name: str):
-    """By the complex step, exact to round-off: an imaginary time of 1e-30 s leaves the derivative in the imaginary part."""
+    """By the complex step, exact to round-off: an imaginary time of 1e-30 s leaves the derivative
+    in the imaginary part.
+    """
     case, motion = CASES[name], cases.closed_form(name)
     path, drivers = case.sweep.path, [driver.name for driver in case.mechanism.drivers]
     step = 1e-30
@@ -111,42 +134,68 @@ def angles(*degrees: float) -> Jet:
 
 
 def test_hooke_joint_by_the_book():
-    """tan t2 = tan t1 / cos b and the ratio of the rates, cos b / (1 - sin^2 b cos^2 t1), for b of 30 and 60 degrees."""
-    for bend, t2, ratio in ((30, 33.690067525979786914, 1.0658774200423860268), (60, 49.106605350869094395, 1.1428571428571428571)):
+    """tan t2 = tan t1 / cos b and the ratio of the rates, cos b / (1 - sin^2 b cos^2 t1), for b of
+    30 and 60 degrees.
+    """
+    for bend, t2, ratio in (
+        (30, 33.690067525979786914, 1.0658774200423860268),
+        (60, 49.106605350869094395, 1.1428571428571428571),
+    ):
         c, s = hooke_joint.driven(angles(30), np.cos(np.radians(bend)))
         assert np.degrees(np.arctan2(s.x, c.x)) == pytest.approx([t2], abs=1e-13)
         assert c.x * s.v - s.x * c.v == pytest.approx([ratio], abs=1e-14)
 
 
 def test_slider_cranks_by_the_book():
-    """Modelica's displacement s and its rate (Modelica Standard Library, Fourbar1), and the planar slider; 20 digits by mpmath."""
+    """Modelica's displacement s and its rate (Modelica Standard Library, Fourbar1), and the planar
+    slider; 20 digits by mpmath.
+    """
     x, _, _ = modelica_four_bar.motion(angles(0, 105, 330))["slider_pin"]
-    assert x.x - 1.2 == pytest.approx([-0.2, -0.35762291227269653612, -0.20340325067914869836], abs=1e-15)
-    assert x.v == pytest.approx([-0.02, -0.10852170964608418664, 0.032791088217557655035], abs=1e-15)
+    assert x.x - 1.2 == pytest.approx(
+        [-0.2, -0.35762291227269653612, -0.20340325067914869836], abs=1e-15
+    )
+    assert x.v == pytest.approx(
+        [-0.02, -0.10852170964608418664, 0.032791088217557655035], abs=1e-15
+    )
     x, _, _ = planar_slider_crank.motion(angles(75, 90, 345))["slider"]
-    assert x.x == pytest.approx([3.0990632772254874503, 2.8284271247461900976, 3.9547404244018751701], abs=1e-15)
+    assert x.x == pytest.approx(
+        [3.0990632772254874503, 2.8284271247461900976, 3.9547404244018751701], abs=1e-15
+    )
 
 
 def test_bricard_closes():
-    """Its last link comes back to the grounded one: P5 is a link from the origin; at the start the points are the cube's edges."""
-    points = {name: np.stack([jet.x for jet in xyz], axis=1) for name, xyz in bricard.motion(angles(0, -60, 25)).items()}
+    """Its last link comes back to the grounded one: P5 is a link from the origin; at the start the
+    points are the cube's edges.
+    """
+    points = {
+        name: np.stack([jet.x for jet in xyz], axis=1)
+        for name, xyz in bricard.motion(angles(0, -60, 25)).items()
+    }
     assert np.linalg.norm(points["P5"], axis=1) == pytest.approx(np.ones(3), abs=1e-15)
     start = {"P2": (1, -1, 0), "P3": (1, -1, 1), "P4": (0, -1, 1), "P5": (0, 0, 1)}
     assert {name: tuple(np.round(xyz[0], 15)) for name, xyz in points.items()} == start
 
 
 def test_bennett_closes():
-    """The follower's pin stays a link's length from the hinge on the ground, and square to it; at the design it is rational."""
+    """The follower's pin stays a link's length from the hinge on the ground, and square to it; at
+    the design it is rational.
+    """
     hinge, axis = np.array([-0.3, 0.0, 0.0]), np.array([0.0, 0.6, 0.8])
-    pins = {name: np.stack([jet.x for jet in xyz], axis=1) for name, xyz in bennett.motion(angles(0, 77, 180, 301)).items()}
+    pins = {
+        name: np.stack([jet.x for jet in xyz], axis=1)
+        for name, xyz in bennett.motion(angles(0, 77, 180, 301)).items()
+    }
     arm = pins["follower_pin"] - hinge
     assert np.linalg.norm(arm, axis=1) == pytest.approx(np.full(4, bennett.B), abs=1e-15)
     assert arm @ axis == pytest.approx(np.zeros(4), abs=1e-15)
-    assert np.linalg.norm(pins["follower_pin"] - pins["crank_pin"], axis=1) == pytest.approx(np.full(4, bennett.A), abs=1e-15)
+    assert np.linalg.norm(pins["follower_pin"] - pins["crank_pin"], axis=1) == pytest.approx(
+        np.full(4, bennett.A), abs=1e-15
+    )
     assert pins["follower_pin"][0] * 130.0 == pytest.approx([9.0, 16.0, -12.0], abs=1e-13)
 
 
-# Andrews' squeezer: the equations and both states are those of the Bari test set for initial value problems, problem andrews
+# Andrews' squeezer: the equations and both states are those of the Bari test set for initial value
+# problems, problem andrews
 
 START = (
     "-0.0617138900142764496358948458001",
@@ -157,14 +206,20 @@ START = (
     "-0.222668390165885884674473185609",
     "1.23054744454982119249735015568",
 )
-LATER = ((15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948), (0.5244099658805304, 1.048080741042263))
-LATER_RATES = (1139.920302151208, -24631.76316945196), (11.03291221937134, 324102.5686413781)  # of beta and gamma
+LATER = (
+    (15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948),
+    (0.5244099658805304, 1.048080741042263),
+)
+# of beta and gamma
+LATER_RATES = (1139.920302151208, -24631.76316945196), (11.03291221937134, 324102.5686413781)
 
 
 def closure(q, x_b: str) -> list:
     """The six published constraints [m]; q: beta, Theta, gamma, Phi, delta, Omega, epsilon."""
     beta, theta, gamma, phi, delta, omega, epsilon = map(mp.mpf, q)
-    rr, d, ss, e, zt, zf, u = map(mp.mpf, ("7e-3", "28e-3", "35e-3", "2e-2", "4e-2", "2e-2", "4e-2"))
+    rr, d, ss, e, zt, zf, u = map(
+        mp.mpf, ("7e-3", "28e-3", "35e-3", "2e-2", "4e-2", "2e-2", "4e-2")
+    )
     xa, ya, xb, yb = map(mp.mpf, ("-.06934", "-.00227", x_b, ".03273"))
     x = rr * mp.cos(beta) - d * mp.cos(beta + theta)
     y = rr * mp.sin(beta) - d * mp.sin(beta + theta)
@@ -179,7 +234,9 @@ def closure(q, x_b: str) -> list:
 
 
 def test_andrews_published_start_closes():
-    """In the published equations to 1e-30 m, in the case as it stands to 1e-17 m; with the misprint found of B it stays open."""
+    """In the published equations to 1e-30 m, in the case as it stands to 1e-17 m; with the misprint
+    found of B it stays open.
+    """
     with mp.workdps(40):
         assert max(map(abs, closure(START, "-.03635"))) < 1e-30
         assert max(map(abs, closure(START, ".03635"))) == pytest.approx(0.0727, abs=1e-12)
@@ -192,7 +249,9 @@ def test_andrews_published_start_closes():
 
 
 def test_andrews_published_acceleration_at_the_start():
-    """The crank starts from rest with 14222.44 rad/s^2, the rod on it with -10666.83, and all else stays: E and D do not move."""
+    """The crank starts from rest with 14222.44 rad/s^2, the rod on it with -10666.83, and all else
+    stays: E and D do not move.
+    """
     rest, pull = np.zeros(1), np.array([14222.4439199541138705911625887])
     points = andrews_squeezer.motion(Jet(rest, rest, pull))
     x, y, _ = points["F"]
@@ -205,13 +264,21 @@ def test_andrews_published_acceleration_at_the_start():
 
 
 def test_andrews_published_state_after_two_and_a_half_turns():
-    """t = 0.03 s, computed by others to 1e-14: the constraints hold, and the crank alone leads to the rest, rates included."""
+    """t = 0.03 s, computed by others to 1e-14: the constraints hold, and the crank alone leads to
+    the rest, rates included.
+    """
     (beta, theta, gamma, phi), (delta, epsilon) = LATER
-    assert max(map(abs, closure((beta, theta, gamma, phi, delta, -phi, epsilon), "-.03635"))) < 1e-16
+    assert (
+        max(map(abs, closure((beta, theta, gamma, phi, delta, -phi, epsilon), "-.03635"))) < 1e-16
+    )
     crank, arm = LATER_RATES
-    E = andrews_squeezer.motion(Jet(*(np.array([each]) for each in (beta - andrews_squeezer.START, *crank))))["E"]
+    E = andrews_squeezer.motion(
+        Jet(*(np.array([each]) for each in (beta - andrews_squeezer.START, *crank)))
+    )["E"]
     angle = Jet(*(np.array([each]) for each in (gamma, *arm)))
-    circle = Circle(andrews_squeezer.B, (0.0, -andrews_squeezer.SS, 0.0), (andrews_squeezer.SS, 0.0, 0.0))
+    circle = Circle(
+        andrews_squeezer.B, (0.0, -andrews_squeezer.SS, 0.0), (andrews_squeezer.SS, 0.0, 0.0)
+    )
     for found, published in zip(E, circle.turned(angle), strict=True):
         assert found.x == pytest.approx(published.x, abs=1e-15)
         assert found.v == pytest.approx(published.v, abs=1e-8)
@@ -220,11 +287,14 @@ def test_andrews_published_state_after_two_and_a_half_turns():
 
 
 def test_rssr_does_not_reach_what_cannot_be_assembled():
-    """a = 2, b = 4, L = 7, O = (6, 1, 0.5): the crank only rocks; of the angles tried it reaches 75 and 90 degrees (mpmath)."""
+    """a = 2, b = 4, L = 7, O = (6, 1, 0.5): the crank only rocks; of the angles tried it reaches 75
+    and 90 degrees (mpmath).
+    """
     O, start = (6.0, 1.0, 0.5), 80.0  # noqa: E741
     crank = Circle((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 2.0, 0.0)).turned(angles(start))
     pin, rocker = (
-        tuple(float(jet.x[0]) for jet in vec) for vec in (crank, Circle(O, (0.0, 4.0, 0.0), (0.0, 0.0, 4.0)).meet(crank, 7.0, 1.0))
+        tuple(float(jet.x[0]) for jet in vec)
+        for vec in (crank, Circle(O, (0.0, 4.0, 0.0), (0.0, 0.0, 4.0)).meet(crank, 7.0, 1.0))
     )
     mechanism = Mechanism(
         "rocking",
@@ -241,4 +311,6 @@ def test_rssr_does_not_reach_what_cannot_be_assembled():
     assert found.solved.tolist() == [False, True, True, False]
     assert "cannot be followed beyond" in found.message
     _, y, z = (found.points["pin"].position[1:3] - O).T
-    assert np.degrees(np.arctan2(z, y)) == pytest.approx([74.243600242217683299, 35.064891244316906268], abs=1e-12)
+    assert np.degrees(np.arctan2(z, y)) == pytest.approx(
+        [74.243600242217683299, 35.064891244316906268], abs=1e-12
+    )

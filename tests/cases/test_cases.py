@@ -1,4 +1,6 @@
-"""The built-in cases: their closed forms against the constraints solved and differentiated by mpmath, and published values."""
+"""The built-in cases: their closed forms against the constraints solved and differentiated by
+mpmath, and published values.
+"""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -15,7 +17,8 @@ from kincheck.core.joints import Distance
 
 CLOSED_FORMS = {"four_bar": four_bar, "rssr": rssr, "spatial_slider_crank": spatial_slider_crank}
 ANGLES = [0.3, 1.9, 3.5, 5.6]
-# Round-off of the closed forms, some dozen operations in double precision, is 1e-15 of the numbers they pass through.
+# Round-off of the closed forms, some dozen operations in double precision, is 1e-15 of the numbers
+# they pass through.
 ROUND_OFF = 1e-13
 
 
@@ -31,7 +34,9 @@ IN_HOUSE |= {
 
 
 def test_names_and_truths():
-    """Nobody publishes curves of suspensions: what the project computed for them must never read as validated."""
+    """Nobody publishes curves of suspensions: what the project computed for them must never read as
+    validated.
+    """
     found = {name: cases.load(name).truth for name in cases.names()}
     assert {name for name, truth in found.items() if truth is Truth.IN_HOUSE_ORACLE} == IN_HOUSE
     assert {truth for name, truth in found.items() if name not in IN_HOUSE} == {Truth.CLOSED_FORM}
@@ -62,8 +67,13 @@ def test_at_design_the_reference_is_the_case_file(name: str):
     case = cases.load(name)
     (design,) = np.flatnonzero(np.abs(case.sweep.change) < 1e-15)
     for output in (each for each in case.outputs if isinstance(each, Output)):
-        position = 0.0 if output.relative else np.dot(case.mechanism.point(output.point).position, output.direction)
-        assert case.reference[output.name].position[design] == pytest.approx(position, abs=4e-15)  # round-off of metres
+        position = (
+            0.0
+            if output.relative
+            else np.dot(case.mechanism.point(output.point).position, output.direction)
+        )
+        # round-off of metres
+        assert case.reference[output.name].position[design] == pytest.approx(position, abs=4e-15)
 
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
@@ -77,7 +87,8 @@ def test_a_full_turn_comes_back(name: str):
         assert np.ptp(series.position) > 0.02  # every output moves
 
 
-# The same mechanisms once more, from the geometry in their case files: constraints solved by mpmath to 40 digits.
+# The same mechanisms once more, from the geometry in their case files: constraints solved by mpmath
+# to 40 digits.
 
 Points = dict[str, Sequence[mp.mpf]]
 
@@ -87,7 +98,9 @@ def vec(values: Sequence[float]) -> mp.matrix:
 
 
 def cross(a: mp.matrix, b: mp.matrix) -> mp.matrix:
-    return mp.matrix([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return mp.matrix(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
 
 
 def dot(a: mp.matrix, b: mp.matrix) -> mp.mpf:
@@ -110,7 +123,9 @@ def at(case: Case, point: str) -> mp.matrix:
 
 def solve_four_bar(case: Case, angle: mp.mpf, near: Points) -> Points:
     """Coupler pin: its distances from the crank pin and from the rocker's pivot, and its plane."""
-    A, B, C, D = (where(case, joint) for joint in ("crank_pivot", "crank_pin", "coupler_pin", "rocker_pivot"))
+    A, B, C, D = (
+        where(case, joint) for joint in ("crank_pivot", "crank_pin", "coupler_pin", "rocker_pivot")
+    )
     axis = vec(case.mechanism.joint("crank_pivot").axis)
     pin = A + turned(B - A, axis, angle)
 
@@ -144,13 +159,20 @@ def solve_rssr(case: Case, angle: mp.mpf, near: Points) -> Points:
         return dot(arm, arm) - mp.mpf(rod.rod_length) ** 2
 
     design = at(case, "rocker_pin") - O
-    guess = mp.atan2(near["rocker_pin"][2] - O[2], near["rocker_pin"][1] - O[1]) - mp.atan2(design[2], design[1])
+    guess = mp.atan2(near["rocker_pin"][2] - O[2], near["rocker_pin"][1] - O[1]) - mp.atan2(
+        design[2], design[1]
+    )
     turn = mp.findroot(length, guess)
-    return {"crank_pin": list(pin), **{point: list(moved(turn, point)) for point in ("rocker_pin", "rocker_tip")}}
+    return {
+        "crank_pin": list(pin),
+        **{point: list(moved(turn, point)) for point in ("rocker_pin", "rocker_tip")},
+    }
 
 
 def solve_spatial_slider_crank(case: Case, angle: mp.mpf, near: Points) -> Points:
-    """Slider: the conrod keeps its length; side point: distances from both ends, and the axes of the universal joint."""
+    """Slider: the conrod keeps its length; side point: distances from both ends, and the axes of
+    the universal joint.
+    """
     A, B, S = (where(case, joint) for joint in ("crank_pivot", "crank_pin", "gudgeon"))
     cross_axes = case.mechanism.joint("gudgeon").axes
     pin, X = A + turned(B - A, vec([1, 0, 0]), angle), vec([1, 0, 0])
@@ -161,17 +183,25 @@ def solve_spatial_slider_crank(case: Case, angle: mp.mpf, near: Points) -> Point
     slider = mp.findroot(length, near["slider"][0]) * X
 
     def universal(*a: mp.mpf) -> list[mp.mpf]:
-        """The axis on the conrod: of constant length and angle to the conrod, perpendicular to the axis on the slider."""
+        """The axis on the conrod: of constant length and angle to the conrod, perpendicular to the
+        axis on the slider.
+        """
         axis, design = mp.matrix(a), vec(cross_axes[0])
         same = [dot(axis, axis) - dot(design, design), dot(axis, pin - slider) - dot(design, B - S)]
         return [*same, dot(axis, vec(cross_axes[1]))]
 
     axis = mp.matrix(mp.findroot(universal, (0, -2 * pin[2], 2 * pin[1])))
-    frame, moved = [[u, a, cross(u, a)] for u, a in ((B - S, vec(cross_axes[0])), (pin - slider, axis))]
+    frame, moved = [
+        [u, a, cross(u, a)] for u, a in ((B - S, vec(cross_axes[0])), (pin - slider, axis))
+    ]
     arm, side = at(case, "conrod_side") - S, slider
     for before, now in zip(frame, moved, strict=True):
         side += dot(arm, before) / dot(before, before) * now
-    return {"slider": list(slider), "conrod_centre": list((slider + pin) / 2), "conrod_side": list(side)}
+    return {
+        "slider": list(slider),
+        "conrod_centre": list((slider + pin) / 2),
+        "conrod_side": list(side),
+    }
 
 
 SOLVERS: dict[str, Callable[[Case, mp.mpf, Points], Points]] = {
@@ -196,14 +226,18 @@ def test_closed_forms_solve_the_constraints(name: str, angle: float):
 
                 for order, found in enumerate((closed.x, closed.v, closed.a)):
                     expected = float(mp.diff(coordinate, 0, order))
-                    assert found[0] == pytest.approx(expected, abs=ROUND_OFF * 10 ** (order / 2), rel=ROUND_OFF), (point, k, order)
+                    assert found[0] == pytest.approx(
+                        expected, abs=ROUND_OFF * 10 ** (order / 2), rel=ROUND_OFF
+                    ), (point, k, order)
 
 
 # Published values
 
 
 def test_spatial_slider_crank_against_the_benchmark():
-    """IFToMM benchmark 'Spatial rigid slider-crank mechanism' (Masoudi and McPhee), at the start, with the crank at 6 rad/s."""
+    """IFToMM benchmark 'Spatial rigid slider-crank mechanism' (Masoudi and McPhee), at the start,
+    with the crank at 6 rad/s.
+    """
     motion = spatial_slider_crank.motion(jet.steady(np.zeros(1), 6.0))
     position, velocity = (
         {point: [j.x[0] for j in xyz] for point, xyz in motion.items()},
@@ -212,29 +246,42 @@ def test_spatial_slider_crank_against_the_benchmark():
     assert position["slider"] == pytest.approx([0.2, 0.0, 0.0], abs=1e-15)
     assert velocity["slider"] == pytest.approx([0.24, 0.0, 0.0], abs=1e-15)
     assert velocity["conrod_centre"] == pytest.approx([0.12, -0.24, 0.0], abs=1e-15)
-    # the conrod's angular velocity, published as (1.92, -0.96, 0.48), shows in the point off its line
+    # the conrod's angular velocity, published as (1.92, -0.96, 0.48), shows in the point off its
+    # line
     arm = np.subtract(position["conrod_side"], position["conrod_centre"])
     turning = np.cross([1.92, -0.96, 0.48], arm)
-    assert np.subtract(velocity["conrod_side"], velocity["conrod_centre"]) == pytest.approx(turning, abs=1e-15)
+    assert np.subtract(velocity["conrod_side"], velocity["conrod_centre"]) == pytest.approx(
+        turning, abs=1e-15
+    )
 
 
 def test_spatial_slider_crank_through_the_turn():
-    """Slider x [m] and its derivatives at crank angles [deg], 6 rad/s: the closed form evaluated to 50 digits with mpmath."""
+    """Slider x [m] and its derivatives at crank angles [deg], 6 rad/s: the closed form evaluated to
+    50 digits with mpmath.
+    """
     table = {
         45: (0.2386152935169978746, 0.31293248220898394129, -0.23970545635230388215),
         180: (0.28, -0.17142857142857142857, -1.3392419825072886297),
         315: (0.18522915888766953838, -0.036647713244260374687, 2.4114982994909980202),
     }
     slider, _, _ = spatial_slider_crank.motion(jet.steady(np.radians([*table]), 6.0))["slider"]
-    assert np.stack([slider.x, slider.v, slider.a], axis=1) == pytest.approx(np.array([*table.values()]), abs=ROUND_OFF)
+    assert np.stack([slider.x, slider.v, slider.a], axis=1) == pytest.approx(
+        np.array([*table.values()]), abs=ROUND_OFF
+    )
 
 
 def test_rssr_against_a_table():
     """Rocker angle [deg] at crank angles [deg], a = 1, b = 4, L = 5.5, O = (2, 1, 3).
 
-    Formula of Hartenberg and Denavit (1964, ch. 12) in its arctangent form, evaluated to 50 digits with mpmath.
+    Formula of Hartenberg and Denavit (1964, ch. 12) in its arctangent form, evaluated to 50 digits
+    with mpmath.
     """
-    table = {0: 348.94609687978577331, 90: -357.01449399425346206, 195: 325.86625177583580752, 330: 337.09754271028875053}
+    table = {
+        0: 348.94609687978577331,
+        90: -357.01449399425346206,
+        195: 325.86625177583580752,
+        330: 337.09754271028875053,
+    }
     _, y, z = rssr.motion(jet.steady(np.radians([*table]), 1.0))["rocker_pin"]
     found = np.degrees(np.arctan2(z.x - 3.0, y.x - 1.0)) % 360
     assert found == pytest.approx(np.array([*table.values()]) % 360, abs=360 * ROUND_OFF)
@@ -249,12 +296,19 @@ def test_mcpherson_derivatives_are_those_of_its_positions():
     for series in cases.load("mcpherson_strut").reference.values():
         assert series.velocity is not None
         assert series.acceleration is not None
-        for values, derivative in ((series.position, series.velocity), (series.velocity, series.acceleration)):
+        for values, derivative in (
+            (series.position, series.velocity),
+            (series.velocity, series.acceleration),
+        ):
             # with 2 mm the differences are off by 3e-11 (seen), so with 1 mm by 2^-6 of that, 5e-13
             assert derivative[3:-3] == pytest.approx(slope(values, 1e-3), abs=1e-12, rel=0)
 
 
 def test_mcpherson_samples_are_decimal_millimetres():
-    lines = [line for line in (cases.FOLDER / "mcpherson_strut.csv").read_text().splitlines() if not line.startswith("#")]
+    lines = [
+        line
+        for line in (cases.FOLDER / "mcpherson_strut.csv").read_text().splitlines()
+        if not line.startswith("#")
+    ]
     strokes = [Decimal(row["stroke"]) for row in csv.DictReader(lines)]
     assert strokes == [Decimal(k) / 1000 for k in range(-80, 81)]

@@ -1,4 +1,6 @@
-"""Several driven motions, from case file to records: a strut steered by its rack while the wheel strokes, in every engine."""
+"""Several driven motions, from case file to records: a strut steered by its rack while the wheel
+strokes, in every engine.
+"""
 
 import json
 from dataclasses import replace
@@ -36,8 +38,12 @@ type = "table"
 times = [-0.1, -0.033, 0.0045, 0.0525, 0.1]
 values = [0.01, -0.01, 0.004, 0.012, -0.005]
 """
-# the bounce of a wheel in time: 30 mm about the design, a quarter of a period ahead, so that it does not start there
-BOUNCE = '[drivers.stroke.motion]\ntype = "sine"\namplitude = 0.03\nfrequency = 2.0\nphase = 1.5707963267948966\n'
+# the bounce of a wheel in time: 30 mm about the design, a quarter of a period ahead, so that it
+# does not start there
+BOUNCE = (
+    '[drivers.stroke.motion]\ntype = "sine"\namplitude = 0.03\nfrequency = 2.0\nphase ='
+    " 1.5707963267948966\n"
+)
 STROKE = STRUT[STRUT.index("[sweep]") : STRUT.index("[outputs.half")]
 CLOCK = "[sweep]\nstart = 0.0\nstop = 0.5\nsteps = 101\n\n"
 REFERENCE = STRUT[STRUT.index("[reference]") :]
@@ -85,21 +91,30 @@ def test_engines_agree(case, engine):
         pytest.skip(f"{engine} is not installed")
     native, found = (solved(case, name).points["wheel_center"] for name in ("native", engine))
     for quantity in ("position", "velocity", "acceleration"):
-        # residuals of 1e-12 at most; a velocity or acceleration of another path would be off by its own size, 0.1 and more
+        # residuals of 1e-12 at most; a velocity or acceleration of another path would be off by its
+        # own size, 0.1 and more
         assert np.abs(getattr(found, quantity) - getattr(native, quantity)).max() <= 1e-11
 
 
 def test_rates_are_those_of_the_path(case):
-    """Differences of positions over time, sixth order, on the same motions sampled more finely about every tenth sample."""
+    """Differences of positions over time, sixth order, on the same motions sampled more finely
+    about every tenth sample.
+    """
     path, native = case.sweep.path, solved(case).points["wheel_center"]
     h = 2e-4  # seconds: truncation (omega h)^6 of 1e-11, round-off 1e-16 / h^2 of 1e-8
     weights = {1: (3 / 4, -3 / 20, 1 / 60), 2: (3 / 2, -3 / 20, 1 / 90)}
     for k in range(0, len(path.times), 10):
         near = path.times[k] + h * np.arange(-3, 4)
         at = near * case.sweep.rate + case.sweep.design if case.sweep.driver != "time" else near
-        x = solved(replace(case, sweep=replace(case.sweep, values=at))).points["wheel_center"].position
+        x = (
+            solved(replace(case, sweep=replace(case.sweep, values=at)))
+            .points["wheel_center"]
+            .position
+        )
         velocity = sum(w * (x[3 + m] - x[3 - m]) for m, w in enumerate(weights[1], 1)) / h
-        acceleration = (sum(w * (x[3 + m] + x[3 - m]) for m, w in enumerate(weights[2], 1)) - 49 / 18 * x[3]) / h**2
+        acceleration = (
+            sum(w * (x[3 + m] + x[3 - m]) for m, w in enumerate(weights[2], 1)) - 49 / 18 * x[3]
+        ) / h**2
         assert native.velocity[k] == pytest.approx(velocity, abs=1e-9)
         assert native.acceleration[k] == pytest.approx(acceleration, abs=2e-6)
 
@@ -109,9 +124,16 @@ def test_rates_are_those_of_the_path(case):
 
 @pytest.fixture
 def both(tmp_path):
-    """Two drivers over time, one of them absolute: its values are the wheel's height, 0.101 m at design."""
-    height = BOUNCE.replace("[drivers.stroke.motion]", "relative = false\n[drivers.stroke.motion]").replace("sine", "table")
-    height = height[: height.index("amplitude")] + "times = [0, 0.2, 0.5]\nvalues = [0.091, 0.131, 0.101]\n"
+    """Two drivers over time, one of them absolute: its values are the wheel's height, 0.101 m at
+    design.
+    """
+    height = BOUNCE.replace(
+        "[drivers.stroke.motion]", "relative = false\n[drivers.stroke.motion]"
+    ).replace("sine", "table")
+    height = (
+        height[: height.index("amplitude")]
+        + "times = [0, 0.2, 0.5]\nvalues = [0.091, 0.131, 0.101]\n"
+    )
     text = steered(SINE, CLOCK)
     where = "direction = [0.0, 0.0, 1.0]\n"
     return load_case(write(tmp_path, edited((where, where + height), base=text)))
@@ -119,7 +141,9 @@ def both(tmp_path):
 
 def test_absolute_values_are_absolute(both):
     assert both.sweep.driver == "time"
-    assert both.sweep.motions["stroke"] == Absolute(Table((0.0, 0.2, 0.5), (0.091, 0.131, 0.101)), 0.101)
+    assert both.sweep.motions["stroke"] == Absolute(
+        Table((0.0, 0.2, 0.5), (0.091, 0.131, 0.101)), 0.101
+    )
     z = solved(both).points["wheel_center"].position[:, 2]
     assert z[[0, 40, 100]] == pytest.approx([0.091, 0.131, 0.101], abs=1e-15)
 
@@ -129,7 +153,10 @@ def test_the_record_lists_every_driver_the_swept_one_first(both):
     assert list(record.driver) == ["time", "stroke", "steer"]
     assert record.driver["time"] == np.linspace(0.0, 0.5, 101).tolist()
     assert record.driver["stroke"][40] == pytest.approx(0.131, abs=1e-15)
-    assert record.driver["steer"] == (0.012 * np.sin(8.0 * np.pi * np.linspace(0.0, 0.5, 101))).tolist()
+    assert (
+        record.driver["steer"]
+        == (0.012 * np.sin(8.0 * np.pi * np.linspace(0.0, 0.5, 101))).tolist()
+    )
 
 
 @pytest.mark.parametrize(("name", "swept"), [("sine", "stroke"), ("time", "time")])
@@ -137,15 +164,26 @@ def test_engines_pass_and_all_is_told(tmp_path, name, swept):
     case = load_case(write(tmp_path, CASES[name]))
     engines = [adapters.engine(each) for each in adapters.ENGINES]
     results = run([case], engines, tol=1e-12)
-    assert {each.outcome for each in results.records} <= {Outcome.PASS, Outcome.UNJUDGED, Outcome.UNAVAILABLE}
+    assert {each.outcome for each in results.records} <= {
+        Outcome.PASS,
+        Outcome.UNJUDGED,
+        Outcome.UNAVAILABLE,
+    }
     assert next(iter(results.records[0].driver)) == swept
     assert from_json(to_json(results)) == results
     facts = results.run["cases"]["strut/steered"]
     assert facts["driver"]["name"] == swept
-    assert facts["motions"]["steer"]["motion"] == {"type": "sine", "amplitude": 0.012, "frequency": 4.0, "phase": 0.0}
+    assert facts["motions"]["steer"]["motion"] == {
+        "type": "sine",
+        "amplitude": 0.012,
+        "frequency": 4.0,
+        "phase": 0.0,
+    }
     write_report(results, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    said = {"stroke": "Also driven: steer (sine).", "time": "Driven: stroke (sine), steer (sine)."}[swept]
+    said = {"stroke": "Also driven: steer (sine).", "time": "Driven: stroke (sine), steer (sine)."}[
+        swept
+    ]
     assert said in " ".join(page.split())
     axis = {"stroke": "wheel travel", "time": "time"}[swept]
     assert f"against {axis}, all engines" in page
@@ -168,7 +206,9 @@ def test_a_deviation_is_located_in_time(both):
     results = run([both], [native, Wrong()], tol=1e-12)
     wrong = results.records[1]
     assert wrong.outcome is Outcome.FAIL
-    assert "half_track_change: position is off by 0.001 m at sample 30 (time = 0.15)" in wrong.message
+    assert (
+        "half_track_change: position is off by 0.001 m at sample 30 (time = 0.15)" in wrong.message
+    )
     assert b"at sample 30 (time = 0.15)" in to_junit(results)
 
 
@@ -199,13 +239,19 @@ def at_pace(case, **sweep):
 
 
 def test_the_pace_is_that_of_the_fastest_driver(tmp_path):
-    case = load_case(write(tmp_path, steered('[drivers.steer.motion]\ntype = "ramp"\nrate = -0.2\n')))
+    case = load_case(
+        write(tmp_path, steered('[drivers.steer.motion]\ntype = "ramp"\nrate = -0.2\n'))
+    )
     size = 1.0 / at_pace(case, motions={})  # a rate of 1 m/s
     assert 0.3 < size < 1.0
     assert pace(case) == pytest.approx(1.0 / size)
     assert at_pace(case, motions={"steer": Ramp(-3.0)}) == pytest.approx(3.0 / size)
     clock = np.linspace(0.0, 1.0, 401)
-    long = Sweep("time", clock, motions={"steer": Sine(10.0, 1.0)})  # 20 m to and fro are the size, then
-    assert pace(replace(case, sweep=long)) == pytest.approx(max(10.0 * 2.0 * np.pi / 20.0, np.sqrt(10.0 * 4.0 * np.pi**2 / 20.0)))
-    short = Sweep("time", clock, motions={"steer": Sine(1e-4, 1.0)})  # at rest where it turns, and yet accelerated
+    # 20 m to and fro are the size, then
+    long = Sweep("time", clock, motions={"steer": Sine(10.0, 1.0)})
+    assert pace(replace(case, sweep=long)) == pytest.approx(
+        max(10.0 * 2.0 * np.pi / 20.0, np.sqrt(10.0 * 4.0 * np.pi**2 / 20.0))
+    )
+    # at rest where it turns, and yet accelerated
+    short = Sweep("time", clock, motions={"steer": Sine(1e-4, 1.0)})
     assert pace(replace(case, sweep=short)) == pytest.approx(2.0 * np.pi * np.sqrt(1e-4 / size))

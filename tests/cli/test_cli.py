@@ -36,16 +36,31 @@ def test_exit_status_of_a_run(kincheck_main, engine, status):
 
 @pytest.mark.parametrize(
     ("engines", "status"),
-    [([BROKEN], 2), ([BROKEN, MISSING, UNABLE], 2), ([BROKEN, PARTIAL], 1), ([BROKEN, WRONG], 1), ([MISSING, UNABLE], 2)],
-    ids=["errors", "errors and missing", "errors and a motion that ends", "errors and deviations", "missing"],
+    [
+        ([BROKEN], 2),
+        ([BROKEN, MISSING, UNABLE], 2),
+        ([BROKEN, PARTIAL], 1),
+        ([BROKEN, WRONG], 1),
+        ([MISSING, UNABLE], 2),
+    ],
+    ids=[
+        "errors",
+        "errors and missing",
+        "errors and a motion that ends",
+        "errors and deviations",
+        "missing",
+    ],
 )
-def test_a_run_of_which_nothing_came_but_errors_has_not_found_that_something_deviates(kincheck_main, capsys, engines, status):
+def test_a_run_of_which_nothing_came_but_errors_has_not_found_that_something_deviates(
+    kincheck_main, capsys, engines, status
+):
     assert kincheck_main("run", engines=engines) == status
     told = capsys.readouterr().err
     solved, tried = status != 2, BROKEN in engines
-    assert ("kincheck: nothing was solved: every engine that was there and able ended in an error" in told) is (
-        tried and not solved
-    )
+    assert (
+        "kincheck: nothing was solved: every engine that was there and able ended in an error"
+        in told
+    ) is (tried and not solved)
     nothing = "kincheck: nothing was compared (2 unsupported, 2 unavailable); run other engines\n"
     assert (nothing in told) is not tried
 
@@ -63,10 +78,17 @@ def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
 
 @pytest.mark.parametrize(
     ("engines", "options", "inside"),
-    [([RIGHT], [], True), ([RIGHT], ["--timeout", "60"], False), ([RIGHT, Fake()], [], False), ([Fake()], [], False)],
+    [
+        ([RIGHT], [], True),
+        ([RIGHT], ["--timeout", "60"], False),
+        ([RIGHT, Fake()], [], False),
+        ([Fake()], [], False),
+    ],
     ids=["native", "native, limited", "both", "other"],
 )
-def test_what_is_not_ours_alone_is_solved_in_worker_processes(kincheck_main, capsys, monkeypatch, engines, options, inside):
+def test_what_is_not_ours_alone_is_solved_in_worker_processes(
+    kincheck_main, capsys, monkeypatch, engines, options, inside
+):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     RIGHT.solves = 0
     assert kincheck_main("run", "crank", "--json", "-", *options, engines=engines, jobs=None) == 0
@@ -76,7 +98,9 @@ def test_what_is_not_ours_alone_is_solved_in_worker_processes(kincheck_main, cap
     assert (RIGHT.solves > 0) is inside
 
 
-def test_an_adapter_that_cannot_be_loaded_is_an_error_of_its_pairs(kincheck_main, capsys, monkeypatch):
+def test_an_adapter_that_cannot_be_loaded_is_an_error_of_its_pairs(
+    kincheck_main, capsys, monkeypatch
+):
     def load(name):
         if name == "other":
             raise ImportError("libother.so: no such file")
@@ -89,17 +113,41 @@ def test_an_adapter_that_cannot_be_loaded_is_an_error_of_its_pairs(kincheck_main
     assert main.main([*argv, "--jobs", "0"]) == 1
     records = json.loads(capsys.readouterr().out)["records"]
     assert [each["outcome"] for each in records] == ["pass", "error"]
-    assert records[1]["message"] == "ImportError: engine 'other' cannot be loaded: ImportError: libother.so: no such file"
+    assert (
+        records[1]["message"]
+        == "ImportError: engine 'other' cannot be loaded: ImportError: libother.so: no such file"
+    )
 
 
 def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
-    assert kincheck_main("run", "crank_two", "crank_two", "--engine", "native", "--json", "-", engines=[RIGHT, WRONG]) == 0
-    assert [each["case"] for each in json.loads(capsys.readouterr().out)["records"]] == ["crank_two"]
+    assert (
+        kincheck_main(
+            "run",
+            "crank_two",
+            "crank_two",
+            "--engine",
+            "native",
+            "--json",
+            "-",
+            engines=[RIGHT, WRONG],
+        )
+        == 0
+    )
+    assert [each["case"] for each in json.loads(capsys.readouterr().out)["records"]] == [
+        "crank_two"
+    ]
 
 
-def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_that_was_not_asked_for(kincheck_main, capsys):
+def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_that_was_not_asked_for(
+    kincheck_main, capsys
+):
     cases = {"crank": crank(reference=False)}
-    assert kincheck_main("run", "--engine", "wrong", "--json", "-", engines=[RIGHT, WRONG], cases=cases) == 1
+    assert (
+        kincheck_main(
+            "run", "--engine", "wrong", "--json", "-", engines=[RIGHT, WRONG], cases=cases
+        )
+        == 1
+    )
     (record,) = json.loads(capsys.readouterr().out)["records"]
     assert record["engine"] == "wrong"
     assert "against native" in record["message"]
@@ -118,14 +166,23 @@ def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_tha
         (["crank", "--tol", "tight"], "'tight' is not a positive number"),
         (["crank", "--mode", "dream"], "invalid choice: 'dream'"),
         (["crank", "--mode", "simulate"], "no engine has the mode 'simulate'"),
-        (["crank", "--engine", "native", "--mode", "simulate"], "engine 'native' has the mode 'projection', not 'simulate'"),
+        (
+            ["crank", "--engine", "native", "--mode", "simulate"],
+            "engine 'native' has the mode 'projection', not 'simulate'",
+        ),
         (["--unknown"], "unrecognized arguments: --unknown"),
         (["--jobs", "-1"], "'-1' is not a whole number of 0 or more; give one"),
         (
             ["--timeout", "5"],
-            "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and --memory, or --jobs",
+            (
+                "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and"
+                " --memory, or --jobs"
+            ),
         ),
-        (["--scheduler", "tcp://there:8786"], "--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs"),
+        (
+            ["--scheduler", "tcp://there:8786"],
+            "--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs",
+        ),
         (["--resume"], "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"),
     ],
 )
@@ -156,14 +213,18 @@ def test_all_bad_case_files_are_named_before_anything_is_computed(kincheck_main,
     assert kincheck_main("run", first, second, tmp_path / "third.toml") == 2
     captured = capsys.readouterr()
     said = captured.err.splitlines()
-    assert [sum(name in line for line in said) for name in ("first.toml", "second.json", "third.toml")] == [1, 1, 1]
+    assert [
+        sum(name in line for line in said) for name in ("first.toml", "second.json", "third.toml")
+    ] == [1, 1, 1]
     assert "Traceback" not in captured.err
     assert captured.out == ""
     assert RIGHT.solves == 0
 
 
 @pytest.mark.parametrize("bad", ["bad.toml", "nosuch"])
-def test_the_other_cases_of_a_bad_one_are_run_and_recorded(kincheck_main, capsys, tmp_path, monkeypatch, bad):
+def test_the_other_cases_of_a_bad_one_are_run_and_recorded(
+    kincheck_main, capsys, tmp_path, monkeypatch, bad
+):
     monkeypatch.chdir(tmp_path)
     Path("bad.toml").write_text('schema = "kincheck-case/9"\n')
     files = ["--out", "out", "--junit", "junit.xml", "--history", "history"]
@@ -180,26 +241,48 @@ def test_the_other_cases_of_a_bad_one_are_run_and_recorded(kincheck_main, capsys
     assert message in found.unread[bad]
     assert headline(found).endswith("within tolerance; 1 case could not be read")
     assert dict(caveats(found))[f"Not read: {bad}"].startswith(message)
-    (error,) = (test.find("error") for test in ElementTree.parse("junit.xml").iter("testcase") if test.find("error") is not None)
+    (error,) = (
+        test.find("error")
+        for test in ElementTree.parse("junit.xml").iter("testcase")
+        if test.find("error") is not None
+    )
     assert error.get("message") == found.unread[bad]
     # what is broken tonight is told, and tomorrow too
     assert kincheck_main("report", "--history", "history") == 1
     told = capsys.readouterr().out
     assert message.partition(":")[0].replace("_", r"\_") in told
-    assert told.startswith("## run 2: all 2 right, 1 case could not be read; compared with nothing: no earlier run in which")
+    assert told.startswith(
+        "## run 2: all 2 right, 1 case could not be read; compared with nothing: no earlier run in"
+        " which"
+    )
     # and is one fault, however many engines were to solve it
     engines = [RIGHT, Fake("other")]
     assert kincheck_main("run", "crank", "--history", "history", engines=engines) == 0
     assert kincheck_main("run", "crank", bad, "--history", "history", engines=engines) == 2
     capsys.readouterr()
     assert kincheck_main("report", "--history", "history") == 1
-    assert capsys.readouterr().out.startswith("## run 4 against run 3 (last green): 1 case could not be read\n")
+    assert capsys.readouterr().out.startswith(
+        "## run 4 against run 3 (last green): 1 case could not be read\n"
+    )
 
 
-def test_a_night_in_which_no_case_can_be_read_is_recorded(kincheck_main, capsys, tmp_path, monkeypatch):
-    """Else the report would judge the night before, and its files would stand there as those of this one."""
+def test_a_night_in_which_no_case_can_be_read_is_recorded(
+    kincheck_main, capsys, tmp_path, monkeypatch
+):
+    """Else the report would judge the night before, and its files would stand there as those of
+    this one.
+    """
     monkeypatch.chdir(tmp_path)
-    files = ["--out", "out", "--junit", "junit.xml", "--markdown", "cases.md", "--history", "history"]
+    files = [
+        "--out",
+        "out",
+        "--junit",
+        "junit.xml",
+        "--markdown",
+        "cases.md",
+        "--history",
+        "history",
+    ]
     for _ in range(2):
         assert kincheck_main("run", "crank", *files) == 0
     assert kincheck_main("run", "nosuch", *files) == 2
@@ -208,10 +291,14 @@ def test_a_night_in_which_no_case_can_be_read_is_recorded(kincheck_main, capsys,
     assert captured.out.endswith("nothing was run\n1 case could not be read: nosuch\n")
     found = read_results(Path("out/results.json"))
     assert (found.records, found.missing) == ([], [("nosuch", "native", "projection")])
-    assert [test.get("name") for test in ElementTree.parse("junit.xml").iter("testcase")] == ["never made"]
+    assert [test.get("name") for test in ElementTree.parse("junit.xml").iter("testcase")] == [
+        "never made"
+    ]
     assert "1 case could not be read: nosuch" in Path("cases.md").read_text()
     assert kincheck_main("report", "--history", "history") == 1
-    assert capsys.readouterr().out.startswith("## run 3: all 0 right, 1 case could not be read; compared with nothing")
+    assert capsys.readouterr().out.startswith(
+        "## run 3: all 0 right, 1 case could not be read; compared with nothing"
+    )
 
 
 def test_an_option_that_is_wrong_ends_a_run_and_the_bad_cases_are_told_too(kincheck_main, capsys):
@@ -245,12 +332,25 @@ def test_two_cases_of_one_name_are_refused(kincheck_main, capsys):
     ("engine", "said"),
     [
         (MISSING, "required engine 'missing': missing is not installed"),
-        (UNABLE, "required engine 'unable': case 'crank' is unsupported: joint 'cv' (universal) has no counterpart"),
+        (
+            UNABLE,
+            (
+                "required engine 'unable': case 'crank' is unsupported: joint 'cv' (universal) has"
+                " no counterpart"
+            ),
+        ),
     ],
     ids=["missing", "unable"],
 )
-def test_a_required_engine_that_cannot_is_status_2_and_the_results_are_kept(kincheck_main, capsys, engine, said):
-    assert kincheck_main("run", "crank", "--require", engine.name, "--json", "-", engines=[RIGHT, engine]) == 2
+def test_a_required_engine_that_cannot_is_status_2_and_the_results_are_kept(
+    kincheck_main, capsys, engine, said
+):
+    assert (
+        kincheck_main(
+            "run", "crank", "--require", engine.name, "--json", "-", engines=[RIGHT, engine]
+        )
+        == 2
+    )
     captured = capsys.readouterr()
     assert said in captured.err
     assert json.loads(captured.out)["records"][0]["outcome"] == "pass"
@@ -259,7 +359,10 @@ def test_a_required_engine_that_cannot_is_status_2_and_the_results_are_kept(kinc
 def test_a_required_engine_is_run_even_if_others_were_asked_for(kincheck_main, capsys):
     argv = ["run", "crank", "--engine", "native", "--require", "wrong", "--json", "-"]
     assert kincheck_main(*argv, engines=[RIGHT, WRONG]) == 1
-    assert [each["engine"] for each in json.loads(capsys.readouterr().out)["records"]] == ["native", "wrong"]
+    assert [each["engine"] for each in json.loads(capsys.readouterr().out)["records"]] == [
+        "native",
+        "wrong",
+    ]
 
 
 def test_how_to_install_comes_from_the_metadata():
@@ -277,4 +380,7 @@ def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys):
         ["free", "consensus", "only", "made", "up"],
     ]
     assert any(line.startswith("  native     1.2  projection, loop: python") for line in lines)
-    assert any(line.startswith("  pinocchio  not installed, or cannot be imported: pip install 'pin>=") for line in lines)
+    assert any(
+        line.startswith("  pinocchio  not installed, or cannot be imported: pip install 'pin>=")
+        for line in lines
+    )

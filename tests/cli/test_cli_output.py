@@ -1,4 +1,6 @@
-"""What a run writes, and to which stream: JSON, the table, files, and what is kept where something fails."""
+"""What a run writes, and to which stream: JSON, the table, files, and what is kept where something
+fails.
+"""
 
 import json
 import os
@@ -26,7 +28,9 @@ def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
         os.write(1, b"from the file descriptor\n")
         return off("position", lambda p: p)(case)
 
-    assert kincheck_main("run", "crank", "--json", "-", engines=[Fake("native", answer=chatty)]) == 0
+    assert (
+        kincheck_main("run", "crank", "--json", "-", engines=[Fake("native", answer=chatty)]) == 0
+    )
     captured = capfd.readouterr()
     assert len(from_json(captured.out.encode()).records) == 1
     for text in ("from Python", "from the file descriptor", "[1/1] crank native: pass", "truth"):
@@ -43,7 +47,9 @@ def test_what_c_keeps_in_its_buffer_does_not_come_after_the_json():
         "print('json')\n"
     )
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered
+    )
     assert (done.stdout, done.stderr) == ("json\n", "from C\n")
 
 
@@ -82,11 +88,29 @@ steps = 3
 """
 
 
-@pytest.mark.parametrize(("length", "told"), [("1.1", True), ("1.0", False), ("1.0000000001", False), ("1.00001", True)])
-def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(tmp_path, capsys, length, told):
+@pytest.mark.parametrize(
+    ("length", "told"), [("1.1", True), ("1.0", False), ("1.0000000001", False), ("1.00001", True)]
+)
+def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(
+    tmp_path, capsys, length, told
+):
     file, out = tmp_path / "rod.toml", tmp_path / "out"
     file.write_text(ROD.replace("LENGTH", length))
-    assert main.main(["run", str(file), "--engine", "native", "--out", str(out), "--markdown", str(tmp_path / "rod.md")]) == 2
+    assert (
+        main.main(
+            [
+                "run",
+                str(file),
+                "--engine",
+                "native",
+                "--out",
+                str(out),
+                "--markdown",
+                str(tmp_path / "rod.md"),
+            ]
+        )
+        == 2
+    )
     note = (
         f"joint 'rod' (distance): length {length} m, points 1 m apart at design: "
         "assembled from there, so the design position is another than the given one"
@@ -102,7 +126,9 @@ def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(tmp_p
 
 
 @pytest.mark.parametrize("length", ["1.1", "1.0"])
-def test_a_length_that_contradicts_the_points_is_told_where_a_case_is_explained_or_its_design_varied(tmp_path, capsys, length):
+def test_a_length_that_contradicts_the_points_is_told_where_a_case_is_explained_or_its_design_varied(
+    tmp_path, capsys, length
+):
     file, vary, out = tmp_path / "rod.toml", tmp_path / "vary.toml", tmp_path / "out"
     file.write_text(ROD.replace("LENGTH", length))
     vary.write_text(
@@ -110,21 +136,31 @@ def test_a_length_that_contradicts_the_points_is_told_where_a_case_is_explained_
         '[hardpoints.tip]\nat = "tip"\nvalues = [1.0]\n'
     )
     note, told = "joint 'rod' (distance): length 1.1 m, points 1 m apart at design", length == "1.1"
-    for command in (["explain", str(file)], ["sweep", str(file), "--vary", str(vary), "--out", str(out)]):
+    for command in (
+        ["explain", str(file)],
+        ["sweep", str(file), "--vary", str(vary), "--out", str(out)],
+    ):
         assert main.main(command) == 0
         assert (f"\nnote: {note}" in capsys.readouterr().out) is told
-    assert ("Nominal design of rod: joint &#39;rod&#39;" in (out / "sweep.html").read_text()) is told
+    assert (
+        "Nominal design of rod: joint &#39;rod&#39;" in (out / "sweep.html").read_text()
+    ) is told
     assert main.main(["run", str(file), "--engine", "native", "--explain"]) == 2
     assert (f"\n  note: {note}" in capsys.readouterr().out) is told
 
 
 def test_a_case_that_cannot_be_solved_keeps_no_other_from_being_explained(tmp_path, capsys):
-    (tmp_path / "far.toml").write_text(ROD.replace("LENGTH", "5.0").replace('name = "rod"', 'name = "far"'))
+    (tmp_path / "far.toml").write_text(
+        ROD.replace("LENGTH", "5.0").replace('name = "rod"', 'name = "far"')
+    )
     (tmp_path / "rod.toml").write_text(ROD.replace("LENGTH", "1.0"))
     files = [str(tmp_path / f"{name}.toml") for name in ("far", "rod")]
     assert main.main(["run", *files, "--engine", "native", "--explain"]) == 2
     printed = capsys.readouterr().out
-    assert "\nfar: nothing is computed: mechanism 'far' does not close at the design position" in printed
+    assert (
+        "\nfar: nothing is computed: mechanism 'far' does not close at the design position"
+        in printed
+    )
     assert "\n  note: joint 'rod' (distance): length 5 m" in printed
     assert "\nrod: 12 unknowns for crank, rocker\n" in printed
 
@@ -133,15 +169,25 @@ def test_a_case_that_cannot_be_solved_keeps_no_other_from_being_explained(tmp_pa
 def test_a_file_that_standard_output_goes_to_is_not_written_over(tmp_path):
     file = tmp_path / "case.toml"
     file.write_text(ROD.replace("LENGTH", "1.0"))
-    command = [sys.executable, "-c", "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))"]
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))",
+    ]
     command += ["run", str(file), "--engine", "native", "--junit"]
     for name in ("/dev/stdout", str(tmp_path / "printed")):
         with open(tmp_path / "printed", "w") as printed:
-            done = subprocess.run([*command, name], stdout=printed, stderr=subprocess.PIPE, text=True, check=False)
+            done = subprocess.run(
+                [*command, name], stdout=printed, stderr=subprocess.PIPE, text=True, check=False
+            )
         assert done.returncode == 2
-        expected = f"kincheck: --junit {name}: found the file that standard output goes to, expected one of its own; give another\n"
+        expected = (
+            f"kincheck: --junit {name}: found the file that standard output goes to, expected one"
+            " of its own; give another\n"
+        )
         assert done.stderr == expected
-    done = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=False)  # a pipe takes both
+    # a pipe takes both
+    done = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=False)
     assert "</testsuites>" in done.stdout
     assert "1 not judged" in done.stdout
 
@@ -169,15 +215,33 @@ def test_the_table_says_what_happened_and_never_too_much(kincheck_main, capsys):
     assert captured.err.splitlines() == [
         f"[{k + 1}/6] crank {engine.name}: {outcome}"
         for k, (engine, outcome) in enumerate(
-            zip(engines, ("pass", "fail", "fail", "error", "unavailable", "unsupported"), strict=True)
+            zip(
+                engines,
+                ("pass", "fail", "fail", "error", "unavailable", "unsupported"),
+                strict=True,
+            )
         )
     ]
 
 
-@pytest.mark.parametrize(("truth", "words"), [(Truth.IN_HOUSE_ORACLE, "in-house oracle"), (Truth.CONSENSUS_ONLY, "consensus only")])
-def test_agreement_with_ourselves_is_never_called_validated(kincheck_main, capsys, tmp_path, truth, words):
+@pytest.mark.parametrize(
+    ("truth", "words"),
+    [(Truth.IN_HOUSE_ORACLE, "in-house oracle"), (Truth.CONSENSUS_ONLY, "consensus only")],
+)
+def test_agreement_with_ourselves_is_never_called_validated(
+    kincheck_main, capsys, tmp_path, truth, words
+):
     case = crank(truth=truth, reference=truth is Truth.IN_HOUSE_ORACLE)
-    assert kincheck_main("run", "--json", tmp_path / "results.json", engines=[RIGHT, Fake()], cases={"crank": case}) == 0
+    assert (
+        kincheck_main(
+            "run",
+            "--json",
+            tmp_path / "results.json",
+            engines=[RIGHT, Fake()],
+            cases={"crank": case},
+        )
+        == 0
+    )
     captured = capsys.readouterr()
     assert words in captured.out
     assert "validated" not in captured.out + captured.err + (tmp_path / "results.json").read_text()
@@ -185,7 +249,19 @@ def test_agreement_with_ourselves_is_never_called_validated(kincheck_main, capsy
 
 def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
     out = tmp_path / "made" / "here"
-    assert kincheck_main("run", "crank", "--out", out, "--json", tmp_path / "r.json", "--junit", tmp_path / "j.xml") == 0
+    assert (
+        kincheck_main(
+            "run",
+            "crank",
+            "--out",
+            out,
+            "--json",
+            tmp_path / "r.json",
+            "--junit",
+            tmp_path / "j.xml",
+        )
+        == 0
+    )
     results = from_json((out / "results.json").read_bytes())
     assert results == from_json((tmp_path / "r.json").read_bytes())
     assert results.run["command"].startswith("kincheck run crank --out ")
@@ -194,8 +270,13 @@ def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
     assert "[1/1]" not in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("option", "name"), [("--out", "file/sub"), ("--out", "file"), ("--json", "no/r.json"), ("--junit", ".")])
-def test_a_destination_that_cannot_be_written_is_found_before_the_work(kincheck_main, capsys, tmp_path, option, name):
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [("--out", "file/sub"), ("--out", "file"), ("--json", "no/r.json"), ("--junit", ".")],
+)
+def test_a_destination_that_cannot_be_written_is_found_before_the_work(
+    kincheck_main, capsys, tmp_path, option, name
+):
     (tmp_path / "file").write_text("here already")
     RIGHT.solves = 0
     assert kincheck_main("run", "crank", option, tmp_path / name) == 2
@@ -205,7 +286,9 @@ def test_a_destination_that_cannot_be_written_is_found_before_the_work(kincheck_
     assert RIGHT.solves == 0
 
 
-def test_a_file_that_fails_in_the_end_does_not_keep_back_the_others(kincheck_main, capsys, tmp_path):
+def test_a_file_that_fails_in_the_end_does_not_keep_back_the_others(
+    kincheck_main, capsys, tmp_path
+):
     def hostile(case):
         (tmp_path / "j.xml").mkdir(exist_ok=True)  # in the way, since the destinations were checked
         return off("position", lambda p: p)(case)
@@ -235,7 +318,9 @@ KINCHECK = "import sys; from kincheck.core.harness import cli; sys.exit(cli.main
 
 def kincheck(*arguments, out=subprocess.PIPE, **env):
     arguments = [sys.executable, "-c", KINCHECK, *arguments]
-    return subprocess.run(arguments, stdout=out, stderr=subprocess.PIPE, env=os.environ | env, check=False)
+    return subprocess.run(
+        arguments, stdout=out, stderr=subprocess.PIPE, env=os.environ | env, check=False
+    )
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-16"])
@@ -249,40 +334,64 @@ def test_an_encoding_that_lacks_letters_ends_no_finished_run(encoding):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
-@pytest.mark.parametrize("asked", [["list"], ["run", "rssr", "--engine", "native"], ["explain", "rssr", "--json", "-"]])
+@pytest.mark.parametrize(
+    "asked", [["list"], ["run", "rssr", "--engine", "native"], ["explain", "rssr", "--json", "-"]]
+)
 def test_a_full_standard_output_is_one_message(asked):
     with open("/dev/full", "wb") as full:
         done = kincheck(*asked, out=full)
     assert done.returncode == 2
-    assert done.stderr.decode().splitlines()[-1].startswith("kincheck: standard output cannot be written (No space left")
+    assert (
+        done.stderr.decode()
+        .splitlines()[-1]
+        .startswith("kincheck: standard output cannot be written (No space left")
+    )
     assert b"Traceback" not in done.stderr
 
 
 @pytest.mark.skipif(os.name != "posix", reason="closes a stream as a POSIX shell does")
 def test_a_closed_standard_output_has_nobody_to_read_it(tmp_path):
-    code = f"import os, sys; os.close(1); os.execv(sys.executable, [sys.executable, '-c', {KINCHECK!r}, *sys.argv[1:]])"
+    code = (
+        "import os, sys; os.close(1); os.execv(sys.executable, [sys.executable, '-c',"
+        f" {KINCHECK!r}, *sys.argv[1:]])"
+    )
     file = tmp_path / "r.json"
-    done = subprocess.run([sys.executable, "-c", code, "run", "rssr", "--engine", "native", "--json", str(file)], check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, "run", "rssr", "--engine", "native", "--json", str(file)],
+        check=False,
+    )
     assert done.returncode == 0
     assert len(from_json(file.read_bytes()).records) == 1
 
 
 @pytest.mark.skipif(os.name != "posix", reason="closes a pipe as a shell does")
-@pytest.mark.parametrize("command", [("list",), ("list", "--joints"), ("run", "rssr", "--engine", "native"), ("explain", "rssr")])
+@pytest.mark.parametrize(
+    "command",
+    [("list",), ("list", "--joints"), ("run", "rssr", "--engine", "native"), ("explain", "rssr")],
+)
 def test_a_reader_that_has_gone_is_no_failure(command):
     """As for `kincheck list | head`, whose head has what it wanted."""
     read, write = os.pipe()
     os.close(read)
     code = "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))"
     with os.fdopen(write, "wb") as gone:
-        done = subprocess.run([sys.executable, "-c", code, *command], stdout=gone, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-c", code, *command],
+            stdout=gone,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     assert done.returncode == 0
-    assert all(line.startswith("[") for line in done.stderr.splitlines()), done.stderr  # progress, and no complaint
+    # progress, and no complaint
+    assert all(line.startswith("[") for line in done.stderr.splitlines()), done.stderr
 
 
 @pytest.mark.parametrize("option", ["--junit", "--markdown"])
 def test_standard_output_takes_json_alone(kincheck_main, capsys, option, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert kincheck_main("run", "crank", option, "-", engines=[RIGHT]) == 2
-    assert f"{option} -: standard output takes the document of --json alone" in capsys.readouterr().err
+    assert (
+        f"{option} -: standard output takes the document of --json alone" in capsys.readouterr().err
+    )
     assert not list(tmp_path.iterdir())

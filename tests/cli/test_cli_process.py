@@ -17,16 +17,21 @@ def test_the_version_is_that_of_the_installation(capsys):
 
 def test_the_package_is_the_command_too(tmp_path):
     module = [sys.executable, "-m", "kincheck"]
-    done = subprocess.run([*module, "--version"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [*module, "--version"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     assert done.stdout == f"kincheck {VERSION}\n"
-    wrong = subprocess.run([*module, "run", "no_such_case"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    wrong = subprocess.run(
+        [*module, "run", "no_such_case"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert (wrong.returncode, wrong.stderr[:9]) == (2, "kincheck:")
 
 
 def test_a_command_loads_no_other():
     code = (
-        "import sys; from kincheck.core.harness import cli; cli.main(['check-joint', '--help']);"
-        "print(*sorted(name.rpartition('.')[2] for name in sys.modules if '.harness.commands.' in name))"
+        "import sys; from kincheck.core.harness import cli; cli.main(['check-joint',"
+        " '--help']);print(*sorted(name.rpartition('.')[2] for name in sys.modules if"
+        " '.harness.commands.' in name))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "check_joint house"
@@ -34,10 +39,11 @@ def test_a_command_loads_no_other():
 
 def test_the_start_loads_nothing_that_is_not_needed():
     code = (
-        "import sys; from kincheck.core.harness import cli; status = cli.main(['--version']);"
-        "print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio', 'exudyn', 'scipy', 'llvmlite', 'flint', 'pyarrow',"
-        "'sqlite3', 'asyncio', 'multiprocessing', 'distributed', 'kincheck.core.kinematics', 'kincheck.core.program'}"
-        "& set(sys.modules)))"
+        "import sys; from kincheck.core.harness import cli; status ="
+        " cli.main(['--version']);print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio',"
+        " 'exudyn', 'scipy', 'llvmlite', 'flint', 'pyarrow','sqlite3', 'asyncio',"
+        " 'multiprocessing', 'distributed', 'kincheck.core.kinematics', 'kincheck.core.program'}&"
+        " set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[1] == "[]"

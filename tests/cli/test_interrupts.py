@@ -1,4 +1,6 @@
-"""Ctrl-C and SIGTERM at any moment: one line, status 130 or 143, no traceback, and what was made is written."""
+"""Ctrl-C and SIGTERM at any moment: one line, status 130 or 143, no traceback, and what was made is
+written.
+"""
 
 import json
 import os
@@ -13,7 +15,8 @@ from kincheck.core.harness import interrupts
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 
-# The process sends itself a signal at its so many-th event of a kind: the same moment however fast the machine is.
+# The process sends itself a signal at its so many-th event of a kind: the same moment however fast
+# the machine is.
 AT = """
 import os, sys
 from kincheck.__main__ import main
@@ -42,20 +45,29 @@ def ended(process):
 
 def stopped_at(kind, count, number, *arguments):
     command = [sys.executable, "-c", AT, kind, str(count), str(int(number)), *map(str, arguments)]
-    return ended(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening))
+    return ended(
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening
+        )
+    )
 
 
 def lines(err):
     return [line for line in err.splitlines() if not line.startswith("[")]  # progress
 
 
-@pytest.mark.parametrize(("number", "status", "said"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")])
+@pytest.mark.parametrize(
+    ("number", "status", "said"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
 @pytest.mark.parametrize("count", [1, 10, 100, 300])
 def test_during_imports(count, number, status, said):
     assert stopped_at("import", count, number, "list") == (status, "", f"kincheck: {said}\n")
 
 
-@pytest.mark.parametrize("command", [["list"], ["run", "rssr", "--engine", "native"], ["trace", "four_bar"], ["doctor"]])
+@pytest.mark.parametrize(
+    "command", [["list"], ["run", "rssr", "--engine", "native"], ["trace", "four_bar"], ["doctor"]]
+)
 def test_an_interrupt_of_any_command_is_one_line(command):
     """Texts that imports compile, which make Python end by the signal if it is left to itself."""
     for count in (5, 40):
@@ -66,8 +78,22 @@ def test_an_interrupt_of_any_command_is_one_line(command):
 def test_what_was_made_is_written(tmp_path):
     """While records come, and once more while they are written."""
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "kincheck", "run", "--engine", "native", "mujoco", "--jobs", "1", "--out", str(out)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening)
+    command = [
+        sys.executable,
+        "-m",
+        "kincheck",
+        "run",
+        "--engine",
+        "native",
+        "mujoco",
+        "--jobs",
+        "1",
+        "--out",
+        str(out),
+    ]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening
+    )
     first = process.stderr.readline()
     process.send_signal(signal.SIGINT)
     status, _, err = ended(process)
@@ -86,10 +112,21 @@ def test_what_was_made_is_written(tmp_path):
 def test_while_results_are_written_they_are_written_to_the_end(tmp_path, number):
     """A file is renamed when it is whole: the signal comes with the first of three."""
     names = ["junit.xml", "results.json", "report.html"]
-    command = ["run", "rssr", "--engine", "native", "--junit", tmp_path / "junit.xml", "--out", tmp_path]
+    command = [
+        "run",
+        "rssr",
+        "--engine",
+        "native",
+        "--junit",
+        tmp_path / "junit.xml",
+        "--out",
+        tmp_path,
+    ]
     status, out, err = stopped_at("os.rename", 1, number, *command)
     assert status == 128 + number
-    assert lines(err) == [f"kincheck: {'terminated' if number == signal.SIGTERM else 'interrupted'}"]
+    assert lines(err) == [
+        f"kincheck: {'terminated' if number == signal.SIGTERM else 'interrupted'}"
+    ]
     assert sorted(each.name for each in tmp_path.iterdir()) == sorted(names)
     assert "1 pass" in out
 
@@ -98,9 +135,23 @@ def test_while_results_are_written_they_are_written_to_the_end(tmp_path, number)
 def test_at_any_moment(tmp_path, trial):
     """From when Python has begun to the end of the run, workers and history included."""
     generator = random.Random(trial)
-    command = ["run", "rssr", "bennett", "--engine", "native", "mujoco", "--history", tmp_path / "h.sqlite", "--out", tmp_path]
+    command = [
+        "run",
+        "rssr",
+        "bennett",
+        "--engine",
+        "native",
+        "mujoco",
+        "--history",
+        tmp_path / "h.sqlite",
+        "--out",
+        tmp_path,
+    ]
     begun = tmp_path / "begun"
-    code = f"open({str(begun)!r}, 'w').close(); from kincheck.__main__ import main; import sys; sys.exit(main())"
+    code = (
+        f"open({str(begun)!r}, 'w').close(); from kincheck.__main__ import main; import sys;"
+        " sys.exit(main())"
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", code, *map(str, command)],
         stdout=subprocess.PIPE,

@@ -1,10 +1,15 @@
-"""Options that would be ignored, destroy each other's files or be no limits are refused, before anything is computed."""
+"""Options that would be ignored, destroy each other's files or be no limits are refused, before
+anything is computed.
+"""
 
 import pytest
 from kincheck.core.case.io.atomic_files import unwritable
 from kincheck.core.cli.main import main
 
-VARY = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.ball]\nat = "ball"\nsigma = 1.0\n'
+VARY = (
+    'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.ball]\nat = "ball"\nsigma ='
+    " 1.0\n"
+)
 
 WITHOUT_EFFECT = [
     ("assemblies rssr --number 2", "--number: found without --export, expected with it, to say what it writes;"),
@@ -80,9 +85,36 @@ def test_a_second_file_of_an_export_does_not_go_over_the_json(here, capsys):
 
 
 def test_what_is_no_file_takes_what_several_options_write():
-    assert unwritable([("--json", "/dev/null"), ("--junit", "/dev/null"), ("--plot", None), ("--store", "-"), ("--out", "-")]) == []
+    assert (
+        unwritable(
+            [
+                ("--json", "/dev/null"),
+                ("--junit", "/dev/null"),
+                ("--plot", None),
+                ("--store", "-"),
+                ("--out", "-"),
+            ]
+        )
+        == []
+    )
 
 
 def test_a_limit_that_can_be_counted_is_one(capsys):
-    assert main(["run", "rssr", "--engine", "native", "--jobs", "1", "--memory", "1e9", "--timeout", "1e9"]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "rssr",
+                "--engine",
+                "native",
+                "--jobs",
+                "1",
+                "--memory",
+                "1e9",
+                "--timeout",
+                "1e9",
+            ]
+        )
+        == 0
+    )
     assert "1 pass" in capsys.readouterr().out

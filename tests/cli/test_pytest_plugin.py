@@ -1,4 +1,6 @@
-"""The pytest plugin, in a repository of somebody else: pytest is run there, in a process of its own."""
+"""The pytest plugin, in a repository of somebody else: pytest is run there, in a process of its
+own.
+"""
 
 import json
 import re
@@ -60,7 +62,9 @@ def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(repo
     out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")
     assert status == 1
     assert "1 failed, 1 passed" in out
-    assert re.search(r"wrong.toml: native: fail: .*tip_x.* velocity .* against closed_form", out), out
+    assert re.search(r"wrong.toml: native: fail: .*tip_x.* velocity .* against closed_form", out), (
+        out
+    )
     assert "Traceback" not in out
 
 
@@ -96,7 +100,9 @@ def test_what_becomes_of_each_outcome(repository):
 
 def test_an_engine_that_is_asked_for_must_be_there(repository):
     (repository / "conftest.py").write_text(SOLVED)
-    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "mujoco", "--kincheck-engine", "pinocchio")
+    out, status = pytest_there(
+        repository, "--kincheck", "--kincheck-engine", "mujoco", "--kincheck-engine", "pinocchio"
+    )
     assert status == 1
     assert "1 failed, 1 skipped" in out
     assert "slider.toml: mujoco: mujoco cannot: pip install 'mujoco" in out
@@ -121,7 +127,10 @@ def test_a_file_that_makes_no_sense_is_an_error_with_its_message(repository):
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        (["--kincheck", "--kincheck-engine", "mujco"], "there is no engine 'mujco'; did you mean 'mujoco'?"),
+        (
+            ["--kincheck", "--kincheck-engine", "mujco"],
+            "there is no engine 'mujco'; did you mean 'mujoco'?",
+        ),
         (["--kincheck-engine", "native"], "--kincheck-engine: give --kincheck too"),
     ],
 )
@@ -134,7 +143,9 @@ def test_options_that_make_no_sense_are_refused(repository, argv, message):
 def test_without_the_option_nothing_is_collected_and_nothing_heavy_loaded(repository):
     heavy = {"numpy", "scipy", "msgspec", "rich", "kincheck.core.mechanism.mechanism"}
     light = f"import sys\ndef test_light():\n    assert not {heavy} & {{*sys.modules}}\n"
-    (repository / "test_light.py").write_text(light + "    assert 'kincheck.core.cli.pytest_plugin' in sys.modules\n")
+    (repository / "test_light.py").write_text(
+        light + "    assert 'kincheck.core.cli.pytest_plugin' in sys.modules\n"
+    )
     out, status = pytest_there(repository, "-p", "no:hypothesispytest")
     assert status == 0, out
     assert "1 passed" in out
@@ -147,7 +158,9 @@ def test_every_public_name_is_found_though_none_is_loaded_at_first():
 
 
 def test_case_files_are_found_however_they_are_written(repository):
-    """The schema anywhere in a line of JSON, behind a byte order mark, or in a file with capital letters."""
+    """The schema anywhere in a line of JSON, behind a byte order mark, or in a file with capital
+    letters.
+    """
     case = tomllib.loads(BASE + INLINE)
     (repository / "sorted.json").write_text(json.dumps(dict(sorted(case.items()))))
     (repository / "marked.toml").write_bytes(BOM_UTF8 + (BASE + INLINE).encode())

@@ -1,6 +1,7 @@
 """Coverage-guided fuzzing of one reader: python -m tests.fuzz casefile --seconds 3600
 
-Inputs that were found are in build/fuzz/NAME, from where the next run goes on; crashes are in build/fuzz/NAME.crashes:
+Inputs that were found are in build/fuzz/NAME, from where the next run goes on; crashes are in
+build/fuzz/NAME.crashes:
 
     python -m tests.fuzz casefile build/fuzz/casefile.crashes/*         run them again
     python -m tests.fuzz casefile --keep build/fuzz/casefile.crashes/*  keep them as tests, once the defect is understood
@@ -19,11 +20,15 @@ from typing import Any
 
 from .keeping import keep, kept
 
-# Before numpy is there: small matrices gain nothing by threads, which on a busy machine wait for each other as in a hang.
+# Before numpy is there: small matrices gain nothing by threads, which on a busy machine wait for
+# each other as in a hang.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 HERE = Path(__file__).parent
 BUILD = HERE.parent.parent / "build" / "fuzz"
-READERS = sorted({each.name for each in pkgutil.iter_modules([str(HERE)])} - {"__main__", "fuzzing", "keeping", "trees"})
+READERS = sorted(
+    {each.name for each in pkgutil.iter_modules([str(HERE)])}
+    - {"__main__", "fuzzing", "keeping", "trees"}
+)
 # Bounds of one input: far above what any of these small ones needs, also on a busy machine.
 SECONDS, MEGABYTES = 20, 2048
 # Where half of the changes keep the document's form, the other half are free to break it.
@@ -33,7 +38,9 @@ FREE = 0.5
 def main(argv: Sequence[str]) -> int:
     """Run the fuzzer, or keep what it has found."""
     parser = argparse.ArgumentParser(
-        prog="python -m tests.fuzz", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="python -m tests.fuzz",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("reader", choices=READERS)
     parser.add_argument("--seconds", type=int, default=60)
@@ -53,14 +60,17 @@ def main(argv: Sequence[str]) -> int:
         folder.mkdir(parents=True, exist_ok=True)
     bounds = [f"-timeout={SECONDS}", f"-rss_limit_mb={MEGABYTES}", f"-artifact_prefix={crashes}/"]
     if not options.keep:
-        return fuzz(options.reader, [f"-max_total_time={options.seconds}", *bounds, "-print_final_stats=1", str(corpus)])
+        return fuzz(
+            options.reader,
+            [f"-max_total_time={options.seconds}", *bounds, "-print_final_stats=1", str(corpus)],
+        )
     keep(options.reader, minimal(options.reader, corpus))
     return 0
 
 
 def minimal(name: str, corpus: Path) -> list[bytes]:
-    """Inputs that together take every step from line to line that all take, the short ones first. (libFuzzer's own merge starts
-    its program anew, which Python is not.)"""
+    """Inputs that together take every step from line to line that all take, the short ones first.
+    (libFuzzer's own merge starts its program anew, which Python is not.)"""
     reader, here = importlib.import_module(f"tests.fuzz.{name}"), str(HERE.parent.parent / "core")
     inputs = [*reader.seeds(), *(file.read_bytes() for file in corpus.iterdir())]
     steps: set[tuple[Any, int, int]] = set()

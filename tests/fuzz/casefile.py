@@ -43,7 +43,10 @@ def one(data: bytes) -> None:
 
 def seeds() -> list[bytes]:
     """The built-in cases without the files beside them, and one with a reference inside."""
-    texts = [file.read_text().partition("[reference]")[0] for file in sorted(kincheck.cases.FOLDER.glob("*.toml"))]
+    texts = [
+        file.read_text().partition("[reference]")[0]
+        for file in sorted(kincheck.cases.FOLDER.glob("*.toml"))
+    ]
     return [text.encode() for text in (BASE + INLINE, *texts)]
 
 

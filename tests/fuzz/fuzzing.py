@@ -1,4 +1,6 @@
-"""What all fuzzers share: what counts as a crash, where inputs are written, and how they are changed."""
+"""What all fuzzers share: what counts as a crash, where inputs are written, and how they are
+changed.
+"""
 
 import os
 import random
@@ -9,10 +11,13 @@ from pathlib import Path
 from kincheck.core.errors import KincheckError
 
 _MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-_TEMPORARY = tempfile.TemporaryDirectory(prefix="kincheck-fuzz-", dir=_MEMORY, ignore_cleanup_errors=True)
+_TEMPORARY = tempfile.TemporaryDirectory(
+    prefix="kincheck-fuzz-", dir=_MEMORY, ignore_cleanup_errors=True
+)
 FOLDER = Path(_TEMPORARY.name)
 """Where inputs are written to be read: files that never reach a disk, where there are such."""
-# An excerpt of what was found (60 characters), a list of what is known, and a path; nobody reads more.
+# An excerpt of what was found (60 characters), a list of what is known, and a path; nobody reads
+# more.
 LONGEST_MESSAGE = 4000
 
 
@@ -24,7 +29,9 @@ def written(name: str, data: bytes) -> Path:
 
 
 def read_or_refused(read: Callable[[], object]) -> None:
-    """Let a reader take an input, or refuse it: one line that names the file, what was found, and a remedy. All else is a crash."""
+    """Let a reader take an input, or refuse it: one line that names the file, what was found, and a
+    remedy. All else is a crash.
+    """
     try:
         read()
     except KincheckError as error:
@@ -36,7 +43,9 @@ def read_or_refused(read: Callable[[], object]) -> None:
         assert "; " in message, f"no remedy: {message!r}"
 
 
-def changing(*steps: Callable[[bytes, random.Random, tuple[str, ...]], bytes], words: tuple[str, ...]):
+def changing(
+    *steps: Callable[[bytes, random.Random, tuple[str, ...]], bytes], words: tuple[str, ...]
+):
     """A mutator: the first of these changes that can read an input, once or several times."""
 
     def mutate(data: bytes, rng: random.Random) -> bytes:

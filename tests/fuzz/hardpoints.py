@@ -1,4 +1,6 @@
-"""Hardpoint files: Project Chrono (JSON with comments), Adams/Car blocks, plain tables, onto a template."""
+"""Hardpoint files: Project Chrono (JSON with comments), Adams/Car blocks, plain tables, onto a
+template.
+"""
 
 from pathlib import Path
 
@@ -11,23 +13,46 @@ from .trees import changed_json, changed_lines
 
 LONGEST = 3000
 DATA = Path(__file__).parent.parent / "data" / "hardpoints"
-ROLES = [name for template in TEMPLATES.values() for role in template.roles for name in (role.name, *role.also)]
+ROLES = [
+    name
+    for template in TEMPLATES.values()
+    for role in template.roles
+    for name in (role.name, *role.also)
+]
 KEYS = """name x y z mm cm inch [HARDPOINT] [UNITS] {hardpoint_name symmetry x_value y_value z_value} left/right single right LENGTH
 = Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up"""
-WORDS = (*KEYS.split(), *ROLES, *TEMPLATES, *(name for each in TEMPLATES.values() for name in each.also))
+WORDS = (
+    *KEYS.split(),
+    *ROLES,
+    *TEMPLATES,
+    *(name for each in TEMPLATES.values() for name in each.also),
+)
 
 
 def one(data: bytes) -> None:
     """Read one input as the kind of file that it begins like."""
     start = data.lstrip()[:1]
     if start in (b"{", b"/"):
-        read_or_refused(lambda: load(written("car.json", data), Supplied(template=None if b"Template" in data else "mcpherson")))
+        read_or_refused(
+            lambda: load(
+                written("car.json", data),
+                Supplied(template=None if b"Template" in data else "mcpherson"),
+            )
+        )
         return
-    template = "mcpherson" if b"strut" in data else "five_link" if b"trailing" in data else "double_wishbone"
+    template = (
+        "mcpherson"
+        if b"strut" in data
+        else "five_link"
+        if b"trailing" in data
+        else "double_wishbone"
+    )
     if b"[" in data.split(b"\n", 1)[0] or b"[HARDPOINT]" in data:
         read_or_refused(lambda: load(written("car.sub", data), Supplied(template)))
         return
-    said = Supplied(template, None if b"unit" in data else "mm", None if b"axes" in data else "adams")
+    said = Supplied(
+        template, None if b"unit" in data else "mm", None if b"axes" in data else "adams"
+    )
     read_or_refused(lambda: load(written("car.csv", data), said))
 
 
@@ -41,7 +66,10 @@ def seeds() -> list[bytes]:
     ]
     table = "name,x,y,z\n" + "\n".join(",".join([row[0], *row[-3:]]) for row in rows)
     other = "# units: mm\n# axes: rearward,right,up\n" + table.replace(",", "\t")
-    return [*(file.read_bytes() for file in sorted(DATA.glob("*.json"))), *(text.encode() for text in (adams, table, other))]
+    return [
+        *(file.read_bytes() for file in sorted(DATA.glob("*.json"))),
+        *(text.encode() for text in (adams, table, other)),
+    ]
 
 
 mutate = changing(changed_json, changed_lines, words=WORDS)

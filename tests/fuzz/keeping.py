@@ -1,4 +1,6 @@
-"""Inputs of fuzzers that are kept as tests: NAME.json, a minimal set that reaches all that was reached; NAME.defects.json."""
+"""Inputs of fuzzers that are kept as tests: NAME.json, a minimal set that reaches all that was
+reached; NAME.defects.json.
+"""
 
 import json
 from pathlib import Path
@@ -9,10 +11,15 @@ KEPT = Path(__file__).parent.parent / "data" / "fuzz"
 def kept(name: str) -> list[bytes]:
     """The inputs in the file of that name; none without it."""
     file = KEPT / f"{name}.json"
-    return [text.encode("latin-1") for text in json.loads(file.read_text())] if file.exists() else []
+    return (
+        [text.encode("latin-1") for text in json.loads(file.read_text())] if file.exists() else []
+    )
 
 
 def keep(name: str, inputs: list[bytes]) -> None:
     """Write the inputs to keep, the shortest first, a line each."""
-    lines = ",\n".join(json.dumps(each.decode("latin-1")) for each in sorted(set(inputs), key=lambda each: (len(each), each)))
+    lines = ",\n".join(
+        json.dumps(each.decode("latin-1"))
+        for each in sorted(set(inputs), key=lambda each: (len(each), each))
+    )
     (KEPT / f"{name}.json").write_text(f"[\n{lines}\n]\n")

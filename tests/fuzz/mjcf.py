@@ -1,4 +1,6 @@
-"""MJCF models; what the command line says of them, --drive and --hold, stands in a comment of the input."""
+"""MJCF models; what the command line says of them, --drive and --hold, stands in a comment of the
+input.
+"""
 
 import re
 from pathlib import Path
@@ -90,7 +92,12 @@ def seeds() -> list[bytes]:
     """A gripper, a linkage, sliders and a rod."""
     gripper = (Path(__file__).parent.parent / "data" / "mjcf" / "robotiq_2f85.xml").read_bytes()
     springs = b"right_driver_joint:0:0.8:17 hold right_spring_link_joint left_spring_link_joint "
-    return [FOUR_BAR, SLIDERS, ROD, re.sub(rb'model="[^"]*"', b'model="drive ' + springs + b'"', gripper, count=1)]
+    return [
+        FOUR_BAR,
+        SLIDERS,
+        ROD,
+        re.sub(rb'model="[^"]*"', b'model="drive ' + springs + b'"', gripper, count=1),
+    ]
 
 
 mutate = changing(changed_xml, words=WORDS)

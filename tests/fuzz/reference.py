@@ -34,7 +34,11 @@ PROVED = {
             "signs": "",
         }
     },
-    "samples": [{"proved": True}, {"proved": True, "alone": 0.1}, {"proved": False, "reason": "singular"}],
+    "samples": [
+        {"proved": True},
+        {"proved": True, "alone": 0.1},
+        {"proved": False, "reason": "singular"},
+    ],
     "seconds": 0.1,
 }
 SUSPENSION = "mcpherson_suspension"
@@ -58,7 +62,9 @@ WORDS = (
 
 
 def one(data: bytes) -> None:
-    """Read one input as the table of a case with one output, or of a suspension where it is about one."""
+    """Read one input as the table of a case with one output, or of a suspension where it is about
+    one.
+    """
     name = "table.json" if data.lstrip().startswith(b"{") else "table.csv"
     written(name, data)
     read_or_refused(lambda: load_case(case(name, b"camber" in data)))
@@ -75,8 +81,13 @@ def case(table: str, suspension: bool) -> Path:
 def seeds() -> list[bytes]:
     """A table, a proved reference, and five rows of a suspension's."""
     lines = (kincheck.cases.FOLDER / f"{SUSPENSION}.csv").read_text().splitlines()
-    comments, (head, *rows) = [x for x in lines if x.startswith("#")], [x for x in lines if not x.startswith("#")]
-    few = "\n".join([*(each for each in comments if "signs" in each), head, *rows[:: (len(rows) - 1) // 4]])
+    comments, (head, *rows) = (
+        [x for x in lines if x.startswith("#")],
+        [x for x in lines if not x.startswith("#")],
+    )
+    few = "\n".join(
+        [*(each for each in comments if "signs" in each), head, *rows[:: (len(rows) - 1) // 4]]
+    )
     return [CSV.encode(), json.dumps(PROVED).encode(), few.encode()]
 
 

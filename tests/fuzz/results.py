@@ -34,11 +34,26 @@ SAID = [
     "ground",
     "half_track_change",
 ]
-WORDS = (*SAID, "time", "wheel", "point_coordinate", "joint_angle", "rad", "m", "1", "rad/m", "dof_account", "program", "signs")
+WORDS = (
+    *SAID,
+    "time",
+    "wheel",
+    "point_coordinate",
+    "joint_angle",
+    "rad",
+    "m",
+    "1",
+    "rad/m",
+    "dof_account",
+    "program",
+    "signs",
+)
 
 
 def one(data: bytes) -> None:
-    """Read one input and report it; what is a script or a style of ours, and the same in all reports, is left out."""
+    """Read one input and report it; what is a script or a style of ours, and the same in all
+    reports, is left out.
+    """
     file = written("results.json", data)
 
     def read() -> None:
@@ -49,7 +64,10 @@ def one(data: bytes) -> None:
         for show in (print_table, print_matrix):
             show(found, text := io.StringIO())
             assert "\x1b" not in text.getvalue()
-        with mock.patch("plotly.offline.get_plotlyjs", return_value=""), mock.patch.object(Path, "read_text", return_value=""):
+        with (
+            mock.patch("plotly.offline.get_plotlyjs", return_value=""),
+            mock.patch.object(Path, "read_text", return_value=""),
+        ):
             render(Material(found, {}, {})).encode()
 
     read_or_refused(read)
@@ -57,7 +75,11 @@ def one(data: bytes) -> None:
 
 def seeds() -> list[bytes]:
     """Results of two engines, of few samples, with a scene."""
-    made = [results(), results("consensus_only", "crank"), results("closed_form", driver={"name": "stroke", "type": "time"})]
+    made = [
+        results(),
+        results("consensus_only", "crank"),
+        results("closed_form", driver={"name": "stroke", "type": "time"}),
+    ]
     drawn = scene(kincheck.cases.load("planar_slider_crank"))
     drawn = msgspec.structs.replace(
         drawn,

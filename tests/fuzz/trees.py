@@ -1,4 +1,6 @@
-"""Changes of documents that keep them documents: of tables and lists, of XML elements, of lines of cells."""
+"""Changes of documents that keep them documents: of tables and lists, of XML elements, of lines of
+cells.
+"""
 
 import copy
 import json
@@ -94,16 +96,26 @@ def keys_and_values(value: Any, words: tuple[str, ...], rng: random.Random) -> A
         case 3 if isinstance(inside, list):
             inside.insert(rng.randrange(len(inside) + 1), inside[key])
         case 3 | 4 if isinstance(inside, dict):
-            inside[rng.choice((*words, f"{key}2"))] = inside[key] if rng.random() < 0.5 else inside.pop(key)
+            inside[rng.choice((*words, f"{key}2"))] = (
+                inside[key] if rng.random() < 0.5 else inside.pop(key)
+            )
         case _ if isinstance(inside[key], int | float):
-            inside[key] = rng.choice((-inside[key], 10 * inside[key], inside[key] + 1, rng.choice(NUMBERS)))
+            inside[key] = rng.choice(
+                (-inside[key], 10 * inside[key], inside[key] + 1, rng.choice(NUMBERS))
+            )
         case _ if isinstance(inside[key], str):
             inside[key] = rng.choice((*words, inside[key] + "2", inside[key][:-1]))
     return value
 
 
 def _keys(value: Any) -> list[Any]:
-    return [*value] if isinstance(value, dict) else [*range(len(value))] if isinstance(value, list) else []
+    return (
+        [*value]
+        if isinstance(value, dict)
+        else [*range(len(value))]
+        if isinstance(value, list)
+        else []
+    )
 
 
 def changed_json(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
@@ -119,13 +131,27 @@ def changed_toml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> byt
 
 def _toml(tables: dict[str, Any]) -> str:
     """Tables two deep under headers, everything further inside in lines."""
-    lines = [f"{_name(key)} = {_inline(value)}" for key, value in tables.items() if not isinstance(value, dict)]
+    lines = [
+        f"{_name(key)} = {_inline(value)}"
+        for key, value in tables.items()
+        if not isinstance(value, dict)
+    ]
     for key, table in tables.items():
         if isinstance(table, dict):
-            lines += [f"[{_name(key)}]", *(f"{_name(k)} = {_inline(v)}" for k, v in table.items() if not isinstance(v, dict))]
+            lines += [
+                f"[{_name(key)}]",
+                *(
+                    f"{_name(k)} = {_inline(v)}"
+                    for k, v in table.items()
+                    if not isinstance(v, dict)
+                ),
+            ]
             for name, below in table.items():
                 if isinstance(below, dict):
-                    lines += [f"[{_name(key)}.{_name(name)}]", *(f"{_name(k)} = {_inline(v)}" for k, v in below.items())]
+                    lines += [
+                        f"[{_name(key)}.{_name(name)}]",
+                        *(f"{_name(k)} = {_inline(v)}" for k, v in below.items()),
+                    ]
     return "\n".join(lines) + "\n"
 
 
@@ -138,11 +164,19 @@ def _inline(value: Any) -> str:
         return "{" + ", ".join(f"{_name(k)} = {_inline(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(map(_inline, value)) + "]"
-    return {None: '""', True: "true", False: "false"}[value] if value is None or isinstance(value, bool) else _scalar(value)
+    return (
+        {None: '""', True: "true", False: "false"}[value]
+        if value is None or isinstance(value, bool)
+        else _scalar(value)
+    )
 
 
 def _scalar(value: Any) -> str:
-    return repr(value) if isinstance(value, int | float) and not isinstance(value, bool) else json.dumps(str(value))
+    return (
+        repr(value)
+        if isinstance(value, int | float) and not isinstance(value, bool)
+        else json.dumps(str(value))
+    )
 
 
 def changed_xml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
@@ -159,7 +193,11 @@ def changed_xml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> byte
         parent = rng.choice(parents)
         child = rng.choice([*parent])
         if k:
-            target = other if k == 1 and child not in (other, *other.iter()) and other not in child.iter() else parent
+            target = (
+                other
+                if k == 1 and child not in (other, *other.iter()) and other not in child.iter()
+                else parent
+            )
             target.insert(rng.randrange(len(target) + 1), copy.deepcopy(child))
         if k < 2:
             parent.remove(child)

@@ -1,4 +1,6 @@
-"""Engines are asked for their versions in processes of their own: whatever loading them does, it does not do to ours."""
+"""Engines are asked for their versions in processes of their own: whatever loading them does, it
+does not do to ours.
+"""
 
 import os
 import subprocess
@@ -35,19 +37,37 @@ class Loading(Fake):
 
 
 def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))  # where the processes find the engines
-    found = versions([*map(Loading, DEEDS), Unloadable("gone", "no module", "projection")], patience=10.0)
+    # where the processes find the engines
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
+    found = versions(
+        [*map(Loading, DEEDS), Unloadable("gone", "no module", "projection")], patience=10.0
+    )
     assert found == ["1.2", "3", *[None] * 6]
 
 
 @pytest.mark.parametrize("deed", ["import sys; sys.exit(0)", "import os; os.abort()"])
 def test_a_run_with_a_history_outlives_a_simulator_that_cannot_be_loaded(deed, tmp_path):
     (tmp_path / "exudyn.py").write_text(deed)
-    command = ["run", "rssr", "--engine", "native", "exudyn", "--history", "h.sqlite", "--json", "r.json"]
+    command = [
+        "run",
+        "rssr",
+        "--engine",
+        "native",
+        "exudyn",
+        "--history",
+        "h.sqlite",
+        "--json",
+        "r.json",
+    ]
     code = "import sys; from kincheck.core.harness import cli; sys.exit(cli.main(sys.argv[1:]))"
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
     found = subprocess.run(
-        [sys.executable, "-c", code, *command], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120.0
+        [sys.executable, "-c", code, *command],
+        cwd=tmp_path,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=120.0,
     )
     assert "[1/2] rssr native: pass" in found.stderr
     assert (tmp_path / "r.json").exists()

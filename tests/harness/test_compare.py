@@ -8,7 +8,14 @@ import pytest
 from kincheck import cases
 from kincheck.core.case.case import NO_SIZE, ORDERS, Output, Series, size
 from kincheck.core.errors import CaseError
-from kincheck.core.harness.compare import as_numbers, describe, deviation, deviations, output_series, pace
+from kincheck.core.harness.compare import (
+    as_numbers,
+    describe,
+    deviation,
+    deviations,
+    output_series,
+    pace,
+)
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism.drivers import PointCoordinate
@@ -40,7 +47,11 @@ def test_unsolved_samples_are_nan_even_where_the_engine_left_numbers():
     case = crank()
     solved = np.arange(SAMPLES) != 4
     series = output_series(case, case.outputs[0], solution(case, solved=solved))
-    assert np.isnan(series.position).tolist() == np.isnan(series.acceleration).tolist() == (~solved).tolist()
+    assert (
+        np.isnan(series.position).tolist()
+        == np.isnan(series.acceleration).tolist()
+        == (~solved).tolist()
+    )
     numbers = as_numbers(series, case.outputs[0])
     assert numbers.position[4] is None
     assert numbers.position[3] == series.position[3]
@@ -94,7 +105,9 @@ def test_derivatives_scale_with_the_rate_per_radian():
     assert pace(crank(rate=2.0)) == 2.0
     assert pace(crank(rate=-2.0)) == 2.0
     case = crank(rate=3.0)
-    found = deviations(case, case.outputs[0], case.reference["x"], [("closed_form", case.reference["x"])])
+    found = deviations(
+        case, case.outputs[0], case.reference["x"], [("closed_form", case.reference["x"])]
+    )
     assert [each.tolerance for _, each in found.items()] == pytest.approx([1e-9, 3e-9, 9e-9])
 
 
@@ -102,11 +115,15 @@ def test_points_that_coincide_to_rounding_have_no_size():
     case = crank()
     m, at = case.mechanism, (0.1, 0.2, 0.3)
     joints = [joint.changed(point=at) for joint in m.joints]
-    for tip, expected in ((at, NO_SIZE), ((0.1, 0.2, 0.1 + 0.2), NO_SIZE), ((0.1, 0.2, 0.3 + 1e-9), 1e-9)):
+    for tip, expected in (
+        (at, NO_SIZE),
+        ((0.1, 0.2, 0.1 + 0.2), NO_SIZE),
+        ((0.1, 0.2, 0.3 + 1e-9), 1e-9),
+    ):
         points = [replace(point, position=tip) for point in m.points]
-        assert size(replace(case, mechanism=Mechanism(m.name, m.bodies, joints, points, m.drivers))) == pytest.approx(
-            expected, rel=1e-6
-        )
+        assert size(
+            replace(case, mechanism=Mechanism(m.name, m.bodies, joints, points, m.drivers))
+        ) == pytest.approx(expected, rel=1e-6)
 
 
 def test_derivatives_scale_with_the_rate_over_the_size_of_the_mechanism():
@@ -117,9 +134,13 @@ def test_derivatives_scale_with_the_rate_over_the_size_of_the_mechanism():
     case = replace(case, sweep=replace(case.sweep, driver="lift", values=np.linspace(-0.1, 0.1, 3)))
     assert pace(case) == pytest.approx(1.0 / RADIUS)
     # a slide of 2 m makes a mechanism of 2 m
-    assert pace(replace(case, sweep=replace(case.sweep, values=np.array([-1.0, 1.0])))) == pytest.approx(0.5)
+    assert pace(
+        replace(case, sweep=replace(case.sweep, values=np.array([-1.0, 1.0])))
+    ) == pytest.approx(0.5)
     # a sweep of nothing, as of one sample, leaves the tolerance as it is
-    assert pace(replace(case, sweep=replace(case.sweep, values=np.zeros(1)))) == pytest.approx(1.0 / RADIUS)
+    assert pace(replace(case, sweep=replace(case.sweep, values=np.zeros(1)))) == pytest.approx(
+        1.0 / RADIUS
+    )
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-2, 1e6])
@@ -127,7 +148,9 @@ def test_derivatives_scale_with_the_rate_over_the_size_of_the_mechanism():
 def test_a_relative_error_of_a_millionth_in_an_acceleration_is_out_of_tolerance(scale, rate):
     case = crank(rate=rate, atol=1e-9 * scale)
     right = case.reference["x"]
-    wrong = Series(scale * right.position, scale * right.velocity, scale * right.acceleration * (1 + 1e-6))
+    wrong = Series(
+        scale * right.position, scale * right.velocity, scale * right.acceleration * (1 + 1e-6)
+    )
     truth = Series(scale * right.position, scale * right.velocity, scale * right.acceleration)
     found = deviations(case, case.outputs[0], wrong, [("closed_form", truth)])
     assert [each.within for _, each in found.items()] == [True, True, False]
@@ -136,7 +159,12 @@ def test_a_relative_error_of_a_millionth_in_an_acceleration_is_out_of_tolerance(
 def test_each_quantity_takes_the_first_standard_that_has_it():
     case = crank()
     positions = Series(case.reference["x"].position)
-    found = deviations(case, case.outputs[0], case.reference["x"], [("closed_form", positions), ("native", case.reference["x"])])
+    found = deviations(
+        case,
+        case.outputs[0],
+        case.reference["x"],
+        [("closed_form", positions), ("native", case.reference["x"])],
+    )
     assert [(name, each.against) for name, each in found.items()] == [
         ("position", "closed_form"),
         ("velocity", "native"),
@@ -152,7 +180,12 @@ def test_each_quantity_takes_the_first_standard_that_has_it():
 def test_no_common_sample_is_null_with_a_reason():
     case = crank()
     unknown = Series(np.full(SAMPLES, np.nan))
-    found = deviations(case, case.outputs[0], output_series(case, case.outputs[0], partial(case)), [("closed_form", unknown)])
+    found = deviations(
+        case,
+        case.outputs[0],
+        output_series(case, case.outputs[0], partial(case)),
+        [("closed_form", unknown)],
+    )
     assert found.position is None
     assert "position: no sample is known to both the engine and closed_form" in found.reason
 
@@ -160,7 +193,11 @@ def test_no_common_sample_is_null_with_a_reason():
 @pytest.mark.parametrize("complete", [True, False])
 def test_a_sample_without_a_value_is_out_of_tolerance_where_all_were_solved(complete):
     case, right = crank(), crank().reference["x"]
-    holed = Series(right.position, np.where(np.arange(SAMPLES) == 3, np.nan, right.velocity), right.acceleration)
+    holed = Series(
+        right.position,
+        np.where(np.arange(SAMPLES) == 3, np.nan, right.velocity),
+        right.acceleration,
+    )
     found = deviations(case, case.outputs[0], holed, [("closed_form", right)], complete=complete)
     assert found.position.within
     assert found.velocity.within is not complete
@@ -169,14 +206,18 @@ def test_a_sample_without_a_value_is_out_of_tolerance_where_all_were_solved(comp
         said = describe("x", "velocity", found.velocity, "angle", [0.0] * SAMPLES)
         assert said == "x: velocity has no value at samples where closed_form has one"
     # what the standard does not have either is no loss
-    assert deviations(case, case.outputs[0], holed, [("closed_form", holed)], complete=True).velocity.within
+    assert deviations(
+        case, case.outputs[0], holed, [("closed_form", holed)], complete=True
+    ).velocity.within
 
 
 def test_a_deviation_is_described_by_output_quantity_sample_driver_and_tolerance():
     found = deviation(REFERENCE + [0.0, 0.0, 4e-3, 0.0], REFERENCE, 1e-3, 0.0, "closed_form")
     said = describe("half_track_change", "velocity", found, "stroke", [-0.1, 0.0, 0.1, 0.2])
-    assert said == (
-        "half_track_change: velocity is off by 0.004 m/s at sample 2 (stroke = 0.1), tolerance 0.001 m/s, against closed_form"
+    assert (
+        said
+        == "half_track_change: velocity is off by 0.004 m/s at sample 2 (stroke = 0.1), tolerance"
+        " 0.001 m/s, against closed_form"
     )
 
 
@@ -212,15 +253,23 @@ def test_an_output_without_any_value_fails_where_all_samples_were_solved(complet
     assert record.outcome is Outcome.FAIL
     assert record.errors["x"].position is None
     assert record.errors["x"].lost == (SAMPLES if complete else UNSET)
-    assert headline(results) == f"1 of 1 comparisons {'has outputs without a value' if complete else 'lacks samples'}"
-    assert (f"x: position: {SAMPLES} samples without a value where closed_form has one" in record.message) is complete
+    assert (
+        headline(results)
+        == f"1 of 1 comparisons {'has outputs without a value' if complete else 'lacks samples'}"
+    )
+    assert (
+        f"x: position: {SAMPLES} samples without a value where closed_form has one"
+        in record.message
+    ) is complete
     failed = ElementTree.fromstring(to_junit(results)).findall(".//testcase[failure]")
     assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
 
 
 def test_an_engine_that_solves_no_sample_is_in_the_headline_and_in_the_overview(tmp_path):
     def nothing(case):
-        return solution(case, solved=np.zeros(SAMPLES, dtype=bool), position=np.full((SAMPLES, 3), np.nan))
+        return solution(
+            case, solved=np.zeros(SAMPLES, dtype=bool), position=np.full((SAMPLES, 3), np.nan)
+        )
 
     results = run([crank()], [Fake("native"), Fake("none", answer=nothing)], tol=1e-12)
     assert headline(results) == "1 of 2 comparisons lacks samples"
@@ -230,19 +279,34 @@ def test_an_engine_that_solves_no_sample_is_in_the_headline_and_in_the_overview(
     assert "<small>nothing to compare with</small>" not in text
 
 
-@pytest.mark.parametrize("rates", [(), ("velocity",), ("velocity", "acceleration")], ids=["positions", "velocities", "all"])
+@pytest.mark.parametrize(
+    "rates",
+    [(), ("velocity",), ("velocity", "acceleration")],
+    ids=["positions", "velocities", "all"],
+)
 def test_a_derivative_has_one_less_of_what_the_engine_gives(rates):
     case = crank()
-    right, missing = case.reference["x"], {name: None for name in ("velocity", "acceleration") if name not in rates}
+    right, missing = (
+        case.reference["x"],
+        {name: None for name in ("velocity", "acceleration") if name not in rates},
+    )
     standards = [("closed_form", Series(right.velocity, right.acceleration))]
     known, lost = (
-        deviations(case, output, output_series(case, output, solution(case, **missing)), standards, complete=True)
+        deviations(
+            case,
+            output,
+            output_series(case, output, solution(case, **missing)),
+            standards,
+            complete=True,
+        )
         for output in (kind(**vars(case.outputs[0])) for kind in (Rate, UndefinedRate))
     )
     assert [quantity for quantity, _ in known.items()] == ["position", "velocity"][: len(rates)]
     assert not known.lost
     assert lost.lost == (SAMPLES if rates else UNSET)
-    assert ("position: the engine gives no velocities to make it of" in (lost.reason or "")) is not bool(rates)
+    assert (
+        "position: the engine gives no velocities to make it of" in (lost.reason or "")
+    ) is not bool(rates)
 
 
 def test_a_reference_of_all_there_is_needs_no_native_engine():

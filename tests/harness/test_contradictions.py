@@ -1,4 +1,6 @@
-"""Where a standard and an engine contradict each other the pair fails, with both sides in its message."""
+"""Where a standard and an engine contradict each other the pair fails, with both sides in its
+message.
+"""
 
 from dataclasses import replace
 
@@ -23,7 +25,9 @@ def reaching(samples, message=ENDS, **changed):
     def answer(case):
         solved = np.isin(np.arange(SAMPLES), [*samples])
         p, v, a = (np.where(solved[:, None], each, np.nan) for each in exact(case))
-        found = solution(case, solved=solved, message=message, position=p, velocity=v, acceleration=a)
+        found = solution(
+            case, solved=solved, message=message, position=p, velocity=v, acceleration=a
+        )
         return replace(found, **changed) if changed else found
 
     return answer
@@ -31,7 +35,11 @@ def reaching(samples, message=ENDS, **changed):
 
 def pair(native, engine, case=None):
     """Records of the native engine and another."""
-    return run([case or crank(reference=False)], [Fake("native", answer=native), Fake(answer=engine)], tol=TOL).records
+    return run(
+        [case or crank(reference=False)],
+        [Fake("native", answer=native), Fake(answer=engine)],
+        tol=TOL,
+    ).records
 
 
 def test_values_where_native_refuses_the_sample_are_a_fail_with_both_sides():
@@ -39,9 +47,10 @@ def test_values_where_native_refuses_the_sample_are_a_fail_with_both_sides():
     assert native.outcome is Outcome.FAIL
     assert fake.outcome is Outcome.FAIL
     tip = RADIUS * np.array([np.cos(0.75) - 1.0, np.sin(0.75)])
-    assert fake.message == (
-        f"values at 2 of 9 samples that native cannot reach, first at sample 7 (angle = 0.75): x = {tip[0]:.6g} m, "
-        f"y = {tip[1]:.6g} m; native: 7 of 9 samples solved: {ENDS}"
+    assert (
+        fake.message
+        == "values at 2 of 9 samples that native cannot reach, first at sample 7 (angle = 0.75): x"
+        f" = {tip[0]:.6g} m, y = {tip[1]:.6g} m; native: 7 of 9 samples solved: {ENDS}"
     )
     # where both have values they are compared all the same
     assert fake.errors["x"].position.within
@@ -57,9 +66,13 @@ def test_an_engine_that_is_not_native_is_held_against_a_baseline_too():
 def test_motions_that_end_at_different_samples_say_who_reaches_more():
     _, further = pair(reaching(range(4)), reaching(range(6), "ends here"))
     assert further.outcome is Outcome.FAIL
-    assert further.message.startswith("6 of 9 samples solved: ends here; values at 2 of 9 samples that native cannot reach")
+    assert further.message.startswith(
+        "6 of 9 samples solved: ends here; values at 2 of 9 samples that native cannot reach"
+    )
     _, shorter = pair(reaching(range(6)), reaching(range(4), "ends here"))
-    assert shorter.message == "4 of 9 samples solved: ends here; native has values at 2 of the others"
+    assert (
+        shorter.message == "4 of 9 samples solved: ends here; native has values at 2 of the others"
+    )
     _, alike = pair(reaching(range(6)), reaching(range(6), "ends here"))
     assert alike.message == "6 of 9 samples solved: ends here"
 
@@ -79,19 +92,28 @@ def test_a_reference_without_a_value_says_nothing():
     case = crank()
     short = np.where(np.arange(SAMPLES) < 7, 1.0, np.nan)
     for name, series in case.reference.items():
-        case.reference[name] = Series(*(short * each for each in (series.position, series.velocity, series.acceleration)))
+        case.reference[name] = Series(
+            *(short * each for each in (series.position, series.velocity, series.acceleration))
+        )
     native, fake = pair(solution, solution, case)
     assert [native.outcome, fake.outcome] == [Outcome.PASS, Outcome.PASS]
     assert "not judged: position: closed_form has no value at 2 of 9 samples; " in fake.message
     # native refuses what the reference does not have
     _, fake = pair(reaching(range(7)), solution, case)
-    assert (fake.outcome, "values at 2 of 9 samples that native cannot reach" in fake.message) == (Outcome.FAIL, True)
-    (alone,) = run([case], [Fake()], tol=TOL, baseline=Fake("native", answer=reaching(range(7)))).records
+    assert (fake.outcome, "values at 2 of 9 samples that native cannot reach" in fake.message) == (
+        Outcome.FAIL,
+        True,
+    )
+    (alone,) = run(
+        [case], [Fake()], tol=TOL, baseline=Fake("native", answer=reaching(range(7)))
+    ).records
     assert alone.outcome is Outcome.FAIL
 
 
 def test_a_reference_is_believed_before_native():
-    """Native refuses samples that the closed form has: native is wrong there, and the others are not."""
+    """Native refuses samples that the closed form has: native is wrong there, and the others are
+    not.
+    """
     case = crank()
     case.reference["y"] = Series(case.reference["y"].position)  # the rates of y are native's
     native, fake = pair(reaching(range(7)), solution, case)
@@ -108,20 +130,29 @@ def test_a_standard_that_has_no_answer_judges_nothing(outcome):
             else:
                 yield index, attempt(each)
 
-    native, fake = run([crank(reference=False)], [Fake("native"), Fake()], tol=TOL, solver=solver).records
+    native, fake = run(
+        [crank(reference=False)], [Fake("native"), Fake()], tol=TOL, solver=solver
+    ).records
     assert native.outcome is outcome
-    why = f"the case has no reference, and the native engine has no answer ({outcome}: it went down)"
+    why = (
+        f"the case has no reference, and the native engine has no answer ({outcome}: it went down)"
+    )
     assert (fake.outcome, fake.message) == (Outcome.UNJUDGED, why)
 
 
 def test_derivatives_that_an_engine_lacks_are_in_its_message():
     def answer(case):
         found = solution(case)
-        return replace(found, points={"tip": replace(found.points["tip"], velocity=None, acceleration=None)})
+        return replace(
+            found, points={"tip": replace(found.points["tip"], velocity=None, acceleration=None)}
+        )
 
     (fake,) = run([crank()], [Fake(answer=answer)], tol=TOL).records
     assert fake.outcome is Outcome.PASS
-    assert fake.message == "not judged: velocity: the engine gives none; acceleration: the engine gives none"
+    assert (
+        fake.message
+        == "not judged: velocity: the engine gives none; acceleration: the engine gives none"
+    )
 
 
 # Residuals
@@ -134,16 +165,24 @@ def leaving(residual, **changed):
 def test_a_residual_above_the_tolerance_is_no_solution():
     (fake,) = run([crank()], [leaving(1e-6)], tol=TOL).records
     assert fake.outcome is Outcome.FAIL
-    assert fake.message.startswith("the residual of samples that the engine calls solved is 1e-06, tolerance 1e-12")
-    assert "1 of 1 comparisons has a residual above the tolerance" in headline(run([crank()], [leaving(1e-6)], tol=TOL))
+    assert fake.message.startswith(
+        "the residual of samples that the engine calls solved is 1e-06, tolerance 1e-12"
+    )
+    assert "1 of 1 comparisons has a residual above the tolerance" in headline(
+        run([crank()], [leaving(1e-6)], tol=TOL)
+    )
 
 
 def test_a_residual_within_the_tolerance_passes_whoever_leaves_it():
     assert run([crank()], [leaving(1e-6)], tol=1e-5).records[0].outcome is Outcome.PASS
     assert run([crank()], [leaving(1e-12)], tol=TOL).records[0].outcome is Outcome.PASS
     # a simulation promises no residual, and an effort leaves one on purpose
-    assert run([crank()], [leaving(1e-6, mode="simulate")], tol=TOL).records[0].outcome is Outcome.PASS
-    assert run([crank()], [leaving(1e-6)], tol=TOL, residuals=False).records[0].outcome is Outcome.PASS
+    assert (
+        run([crank()], [leaving(1e-6, mode="simulate")], tol=TOL).records[0].outcome is Outcome.PASS
+    )
+    assert (
+        run([crank()], [leaving(1e-6)], tol=TOL, residuals=False).records[0].outcome is Outcome.PASS
+    )
 
 
 def test_a_residual_fails_what_could_not_be_compared_too():
@@ -165,21 +204,31 @@ def test_simulators_keep_their_promise_at_any_size(name):
 
 def test_uncertain_samples_contradict_nobody():
     others = [k for k in range(SAMPLES) if k != 4]
-    uncertain = reaching(others, "refused at angle = 0: so near a singular pose", details={"uncertain_samples": [4]})
+    uncertain = reaching(
+        others, "refused at angle = 0: so near a singular pose", details={"uncertain_samples": [4]}
+    )
     native, fake = pair(uncertain, solution)
     assert [native.outcome, fake.outcome] == [Outcome.FAIL, Outcome.PASS]
     assert "not judged: position: native has no value at 1 of 9 samples" in fake.message
-    assert fake.message.endswith("native: 8 of 9 samples solved: refused at angle = 0: so near a singular pose")
+    assert fake.message.endswith(
+        "native: 8 of 9 samples solved: refused at angle = 0: so near a singular pose"
+    )
 
 
 def test_contradictions_are_written_and_read():
-    results = run([crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL)
+    results = run(
+        [crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL
+    )
     assert from_json(to_json(results)) == results
     assert "contradict" in headline(results)
 
 
 def test_a_standard_is_read_back_from_a_record_when_a_run_is_resumed():
-    results = run([crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL)
+    results = run(
+        [crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL
+    )
     engines = [Fake("native", answer=raising(AssertionError("not again"))), Fake()]
-    again = run([crank(reference=False)], engines, tol=TOL, made=from_json(to_json(results)).records[:1])
+    again = run(
+        [crank(reference=False)], engines, tol=TOL, made=from_json(to_json(results)).records[:1]
+    )
     assert again.records[1].message == results.records[1].message

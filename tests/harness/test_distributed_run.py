@@ -1,4 +1,6 @@
-"""Runs on a dask.distributed cluster: a real scheduler and workers on loopback, and what happens when they are lost."""
+"""Runs on a dask.distributed cluster: a real scheduler and workers on loopback, and what happens
+when they are lost.
+"""
 
 import importlib
 import os
@@ -24,14 +26,23 @@ TOL = 1e-12
 LIMITS = Limits(timeout=60.0, memory=1.0)
 pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
-pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
 
 
 def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost(cluster):
-    """Killed in the middle, with a pair on it: another has it, nothing is lost and nothing comes twice."""
+    """Killed in the middle, with a pair on it: another has it, nothing is lost and nothing comes
+    twice.
+    """
     cases = [crank(f"c{k}", reference=k % 2 == 0) for k in range(6)]
     cases[3] = crank("segfault")
-    engines = [Slow("native", seconds=0.03), Fake(), Bad(), Fake("lambda", answer=raising(ValueError()))]
+    engines = [
+        Slow("native", seconds=0.03),
+        Fake(),
+        Bad(),
+        Fake("lambda", answer=raising(ValueError())),
+    ]
     heard = Counter()
     victims = [nanny.pid for nanny in cluster.workers.values()]
 
@@ -40,15 +51,26 @@ def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost(cluster):
         if done == 8:
             os.kill(victims[0], signal.SIGKILL)
 
-    there = run(cases, engines[:3], tol=TOL, solver=on_cluster(cluster.scheduler_address, LIMITS), progress=hear)
+    there = run(
+        cases,
+        engines[:3],
+        tol=TOL,
+        solver=on_cluster(cluster.scheduler_address, LIMITS),
+        progress=hear,
+    )
     assert victims[0] not in [nanny.pid for nanny in cluster.workers.values()]
     here = run(cases, engines[:3], tol=TOL, solver=in_workers(2, LIMITS))
     assert timeless(there.records) == timeless(here.records)
     assert set(heard.values()) == {1}
     assert len(heard) == 18
-    assert {each.outcome for each in there.records if each.case == "segfault"} == {Outcome.PASS, Outcome.CRASHED}
+    assert {each.outcome for each in there.records if each.case == "segfault"} == {
+        Outcome.PASS,
+        Outcome.CRASHED,
+    }
     # what cannot be sent, or is another kincheck there, errs
-    (record,) = run(cases[:1], engines[3:], tol=TOL, solver=on_cluster(cluster.scheduler_address, LIMITS)).records
+    (record,) = run(
+        cases[:1], engines[3:], tol=TOL, solver=on_cluster(cluster.scheduler_address, LIMITS)
+    ).records
     assert record.message.startswith("cannot be sent to a cluster: ")
 
 
@@ -59,7 +81,13 @@ def test_a_cluster_that_goes_is_a_message(cluster):
 
     cases = [crank(f"c{k}") for k in range(20)]
     with pytest.raises(ClusterError, match="has gone"):
-        run(cases, [Slow("slow", seconds=0.05)], tol=TOL, solver=on_cluster(cluster.scheduler_address, LIMITS), progress=hear)
+        run(
+            cases,
+            [Slow("slow", seconds=0.05)],
+            tol=TOL,
+            solver=on_cluster(cluster.scheduler_address, LIMITS),
+            progress=hear,
+        )
 
 
 def forbid_clients(monkeypatch):
@@ -72,17 +100,31 @@ def forbid_clients(monkeypatch):
 def test_no_scheduler_is_a_message(monkeypatch):
     """Where nobody listens, and where somebody does who is none and says nothing."""
     monkeypatch.setattr(ours, "ANSWER", 0.25)
-    with pytest.raises(ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"):
+    with pytest.raises(
+        ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"
+    ):
         run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
-        with pytest.raises(ClusterError, match=rf"scheduler {address}: does not answer \(TimeoutError"):
+        with pytest.raises(
+            ClusterError, match=rf"scheduler {address}: does not answer \(TimeoutError"
+        ):
             run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
 
 
 @pytest.mark.parametrize(
     "address",
-    ["foo", "", "nonsense://", "nonsense://a:1", "tcp://:8786", "127.0.0.1:99999", "127.0.0.1:0", "127.0.0.1:a", "inproc://x"],
+    [
+        "foo",
+        "",
+        "nonsense://",
+        "nonsense://a:1",
+        "tcp://:8786",
+        "127.0.0.1:99999",
+        "127.0.0.1:0",
+        "127.0.0.1:a",
+        "inproc://x",
+    ],
 )
 def test_what_cannot_be_an_address_is_said_at_once(address, monkeypatch):
     """Who had waited in vain would be told that nobody answers."""
@@ -91,17 +133,25 @@ def test_what_cannot_be_an_address_is_said_at_once(address, monkeypatch):
         run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
     message = str(caught.value)
     assert message.startswith(f"scheduler {address}: found no address (")
-    assert message.endswith("), expected HOST:PORT or tcp://HOST:PORT; write it as `dask scheduler` prints it")
+    assert message.endswith(
+        "), expected HOST:PORT or tcp://HOST:PORT; write it as `dask scheduler` prints it"
+    )
 
 
 @pytest.mark.parametrize("command", ["run", "sweep"])
-def test_a_command_without_its_cluster_is_one_message(kincheck_main, capsys, tmp_path, monkeypatch, command):
+def test_a_command_without_its_cluster_is_one_message(
+    kincheck_main, capsys, tmp_path, monkeypatch, command
+):
     """And no client is made, for whose end the process would wait."""
     forbid_clients(monkeypatch)
     (tmp_path / "vary.toml").write_text(
-        'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nat = "tip"\nsigma = 1\n'
+        'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nat = "tip"\nsigma'
+        " = 1\n"
     )
-    more = {"run": ["--history", tmp_path / "h.db"], "sweep": ["--vary", tmp_path / "vary.toml", "--samples", 3]}[command]
+    more = {
+        "run": ["--history", tmp_path / "h.db"],
+        "sweep": ["--vary", tmp_path / "vary.toml", "--samples", 3],
+    }[command]
     assert kincheck_main(command, "crank", "--scheduler", "foo", *more, jobs=None) == 2
     captured = capsys.readouterr()
     assert captured.out == ""

@@ -1,4 +1,6 @@
-"""Every built-in case in every engine, against its truth; and what must not pass: a moved hardpoint, a stroke out of reach."""
+"""Every built-in case in every engine, against its truth; and what must not pass: a moved
+hardpoint, a stroke out of reach.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +18,17 @@ from kincheck.core.harness.run import run
 
 from ..support.mechanisms import placed
 
-# What each engine reaches on the strut, per unit stroke rate [m, m/s, m/s^2]: round-off of metre-sized coordinates through its own
-# arithmetic; Exudyn's accelerations come from differences of its Jacobian.
+# What each engine reaches on the strut, per unit stroke rate [m, m/s, m/s^2]: round-off of
+# metre-sized coordinates through its own arithmetic; Exudyn's accelerations come from differences
+# of its Jacobian.
 STRUT = {
     "native": (5e-16, 1e-14, 1e-13),
     "mujoco": (1e-14, 1e-13, 1e-12),
     "pinocchio": (1e-14, 1e-13, 1e-12),
     "exudyn": (1e-12, 1e-11, 1e-8),
 }
-# Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in geometry cannot hide.
+# Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in
+# geometry cannot hide.
 CLOSED_FORM = 1e-11
 
 
@@ -89,20 +93,30 @@ def test_a_stroke_out_of_reach_gives_the_last_sample_and_no_numbers_beyond(name)
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
 def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
-    """Bodies without an origin of their own, as case files leave them: no engine may hang them on arms of a hundred metres."""
+    """Bodies without an origin of their own, as case files leave them: no engine may hang them on
+    arms of a hundred metres.
+    """
     case = cases.load("mcpherson_strut")
     turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
     far = np.array([100.0, -50.0, 20.0])
-    moved = placed(case.mechanism, lambda q: tuple(turn @ np.array(q) + far), lambda a: tuple(turn @ np.array(a)))
+    moved = placed(
+        case.mechanism,
+        lambda q: tuple(turn @ np.array(q) + far),
+        lambda a: tuple(turn @ np.array(a)),
+    )
     (stroke,) = moved.drivers
     moved = replace(
         moved,
         bodies=[replace(body, origin=(0.0, 0.0, 0.0)) for body in moved.bodies],
         drivers=[replace(stroke, direction=tuple(turn @ np.array(stroke.direction)))],
     )
-    outputs = tuple(replace(output, direction=tuple(turn @ np.array(output.direction))) for output in case.outputs)
+    outputs = tuple(
+        replace(output, direction=tuple(turn @ np.array(output.direction)))
+        for output in case.outputs
+    )
     found = record(replace(case, mechanism=moved, outputs=outputs), name)
-    # coordinates of a hundred metres are rounded at 1e-14 m; the limits leave ten times that, and Exudyn's its differences
+    # coordinates of a hundred metres are rounded at 1e-14 m; the limits leave ten times that, and
+    # Exudyn's its differences
     limits = (5e-13, 5e-12, 1e-9)
     for deviations in found.errors.values():
         worst = [deviation.max_abs for _, deviation in deviations.items()]
@@ -114,9 +128,13 @@ def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
 # of it there is depends on the steps that lead to the pose.
 @pytest.mark.parametrize("name", ["pinocchio", "exudyn"])
 def test_round_off_near_a_singular_pose_is_within_the_default_tolerance(name):
-    """It is a nanometre at the driver's pace, or nearly: there the end of the rod goes seven thousand times as fast."""
+    """It is a nanometre at the driver's pace, or nearly: there the end of the rod goes seven
+    thousand times as fast.
+    """
     case = load_case(Path(__file__).parents[1] / "data" / "fast_loop.toml")
     _, found = run([case], [engine("native"), engine(name)], tol=1e-12).records
-    worst = max((each.acceleration for each in found.errors.values()), key=lambda each: each.max_abs)
+    worst = max(
+        (each.acceleration for each in found.errors.values()), key=lambda each: each.max_abs
+    )
     assert 0.1 * DEFAULT_ATOL * case.sweep.rate**2 < worst.max_abs < 1e-12 * 1855.0
     assert worst.within

@@ -1,4 +1,6 @@
-"""Validated is said with evidence only: a citation, the digest of what was judged against, and data that are not kincheck's own."""
+"""Validated is said with evidence only: a citation, the digest of what was judged against, and data
+that are not kincheck's own.
+"""
 
 import hashlib
 import json
@@ -49,8 +51,14 @@ def test_the_digest_of_a_file_is_that_of_its_bytes(tmp_path):
     (tmp_path / "x.csv").write_bytes(b"\xef\xbb\xbf" + CSV.encode())
     _, results = results_of(tmp_path, BASE + f'[reference]\nfile = "x.csv"{CITED}')
     evidence = results.records[0].evidence
-    assert (evidence.of, evidence.sha256) == ("x.csv", hashlib.sha256((tmp_path / "x.csv").read_bytes()).hexdigest())
-    assert json.loads((tmp_path / "r.json").read_bytes())["records"][0]["evidence"]["sha256"] == evidence.sha256
+    assert (evidence.of, evidence.sha256) == (
+        "x.csv",
+        hashlib.sha256((tmp_path / "x.csv").read_bytes()).hexdigest(),
+    )
+    assert (
+        json.loads((tmp_path / "r.json").read_bytes())["records"][0]["evidence"]["sha256"]
+        == evidence.sha256
+    )
 
 
 def test_a_pinned_file_must_be_that_file(tmp_path):
@@ -59,13 +67,20 @@ def test_a_pinned_file_must_be_that_file(tmp_path):
     text = BASE + '[reference]\nfile = "x.csv"\ndigest = "sha256:DIGEST"'
     assert load_case(write(tmp_path, text.replace("DIGEST", right))).origin.sha256 == right
     complains(write(tmp_path, text.replace("DIGEST", "0" * 64)), ["reference.digest", right])
-    complains(write(tmp_path, text.replace("DIGEST", "12")), ["reference.digest", "64 hexadecimal digits"])
-    complains(write(tmp_path, BASE + INLINE + f'digest = "sha256:{right}"'), ["reference.digest", "rows"])
+    complains(
+        write(tmp_path, text.replace("DIGEST", "12")), ["reference.digest", "64 hexadecimal digits"]
+    )
+    complains(
+        write(tmp_path, BASE + INLINE + f'digest = "sha256:{right}"'), ["reference.digest", "rows"]
+    )
 
 
 @pytest.mark.parametrize("citation", ['""', '"  "', "3"])
 def test_a_citation_says_something(tmp_path, citation):
-    complains(write(tmp_path, BASE + INLINE + f"citation = {citation}"), ["reference.citation", "where the true values come from"])
+    complains(
+        write(tmp_path, BASE + INLINE + f"citation = {citation}"),
+        ["reference.citation", "where the true values come from"],
+    )
 
 
 def test_the_digest_tells_values_apart():
@@ -93,7 +108,12 @@ OWN = [Fake("native"), Fake("other")]
 def third_party(change=lambda series: series, **changes):
     case = crank(truth=Truth.THIRD_PARTY_DATA)
     origin = Origin("somebody")
-    return replace(case, reference={name: change(each) for name, each in case.reference.items()}, origin=origin, **changes)
+    return replace(
+        case,
+        reference={name: change(each) for name, each in case.reference.items()},
+        origin=origin,
+        **changes,
+    )
 
 
 @pytest.mark.parametrize("engines", [OWN, OWN[::-1]])
@@ -144,11 +164,20 @@ def test_a_driven_coordinate_tells_nothing(tmp_path):
 
 def test_feeding_back_what_was_computed_is_not_called_validated(tmp_path, capsys):
     strut = (cases.FOLDER / "mcpherson_strut.toml").read_text()
-    assert main.main(["run", "mcpherson_strut", "--engine", "native", "--json", str(tmp_path / "r.json")]) == 0
+    assert (
+        main.main(
+            ["run", "mcpherson_strut", "--engine", "native", "--json", str(tmp_path / "r.json")]
+        )
+        == 0
+    )
     record = from_json((tmp_path / "r.json").read_bytes()).records[0]
     columns = {"stroke": record.driver["stroke"]}
     for name, series in record.outputs.items():
-        columns |= {name: series.position, f"{name}.velocity": series.velocity, f"{name}.acceleration": series.acceleration}
+        columns |= {
+            name: series.position,
+            f"{name}.velocity": series.velocity,
+            f"{name}.acceleration": series.acceleration,
+        }
     rows = [",".join(map(repr, row)) for row in zip(*columns.values(), strict=True)]
     (tmp_path / "mcpherson_strut.csv").write_text("\n".join([",".join(columns), *rows]))
     write(tmp_path, edited(('"in_house_oracle"', '"third_party_data"'), base=strut) + CITED)

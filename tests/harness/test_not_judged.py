@@ -1,4 +1,6 @@
-"""`unjudged`: a solved pair that nothing was compared with, neither a pass nor a fault, in the same words on every surface."""
+"""`unjudged`: a solved pair that nothing was compared with, neither a pass nor a fault, in the same
+words on every surface.
+"""
 
 import json
 import re
@@ -28,7 +30,10 @@ from ..support.nights import changed, keep, records, reported
 
 TOL = 1e-12
 RIGHT, MISSING = Fake("native"), Fake("missing", installed=None)
-UNABLE, WRONG = Fake("unable", refusal="no counterpart"), Fake("wrong", answer=off("position", lambda p: p + 1e-3))
+UNABLE, WRONG = (
+    Fake("unable", refusal="no counterpart"),
+    Fake("wrong", answer=off("position", lambda p: p + 1e-3)),
+)
 WHY = "the case has no reference"
 UNREFERENCED = {"crank": crank(reference=False)}
 
@@ -73,14 +78,21 @@ def test_an_output_that_was_not_judged_is_skipped_beside_those_that_were():
     case = crank()
     del case.reference["y"]
     (record,) = run([case], [RIGHT], tol=TOL).records
-    assert (record.outcome, record.message) == (Outcome.PASS, "not judged: y: the reference does not have it")
+    assert (record.outcome, record.message) == (
+        Outcome.PASS,
+        "not judged: y: the reference does not have it",
+    )
     results = run([case], [RIGHT, WRONG], tol=TOL)
     tests = {
-        (test.get("classname"), test.get("name")): [(child.tag, child.get("message")) for child in test]
+        (test.get("classname"), test.get("name")): [
+            (child.tag, child.get("message")) for child in test
+        ]
         for test in ET.fromstring(junit.to_junit(results)).iter("testcase")
     }
     assert tests["crank.native.projection", "x"] == []
-    assert tests["crank.native.projection", "y"] == [("skipped", "not judged: the reference does not have it")]
+    assert tests["crank.native.projection", "y"] == [
+        ("skipped", "not judged: the reference does not have it")
+    ]
     assert [tag for tag, _ in tests["crank.wrong.projection", "x"]] == ["failure"]
 
 
@@ -91,7 +103,9 @@ def test_a_fault_of_the_whole_pair_fails_every_output():
         return found
 
     root = ET.fromstring(junit.to_junit(run([crank()], [Fake(answer=answer)], tol=TOL)))
-    assert [failure.get("message", "")[:12] for failure in root.iter("failure")] == ["the residual"] * 2
+    assert [failure.get("message", "")[:12] for failure in root.iter("failure")] == [
+        "the residual"
+    ] * 2
 
 
 # Exit status
@@ -111,7 +125,9 @@ def test_a_fault_of_the_whole_pair_fails_every_output():
 )
 def test_a_run_that_compares_nothing_has_not_done_its_work(kincheck_main, capsys, engines, status):
     assert kincheck_main("run", engines=engines, cases=UNREFERENCED) == status
-    assert ("kincheck: nothing was compared (1 not judged" in capsys.readouterr().err) is (status == 2)
+    assert ("kincheck: nothing was compared (1 not judged" in capsys.readouterr().err) is (
+        status == 2
+    )
 
 
 def test_a_case_that_is_not_judged_beside_one_that_is_changes_no_status(kincheck_main, capsys):
@@ -126,12 +142,22 @@ def test_an_engine_that_is_named_is_required(kincheck_main, capsys):
     assert kincheck_main("run", "--engine", "native", engines=engines) == 0
     capsys.readouterr()
     assert kincheck_main("run", "--engine", "native", "missing", engines=engines) == 2
-    assert "kincheck: engine 'missing' is named and missing: missing is not installed" in capsys.readouterr().err
+    assert (
+        "kincheck: engine 'missing' is named and missing: missing is not installed"
+        in capsys.readouterr().err
+    )
     assert kincheck_main("run", "--engine", "missing", engines=engines) == 2
     assert kincheck_main("run", "--engine", "native", "unable", engines=[RIGHT, UNABLE]) == 0
     capsys.readouterr()
-    assert kincheck_main("run", "--engine", "native", "missing", "--require", "missing", engines=engines) == 2
-    told = [line for line in capsys.readouterr().err.splitlines() if "missing is not installed" in line]
+    assert (
+        kincheck_main(
+            "run", "--engine", "native", "missing", "--require", "missing", engines=engines
+        )
+        == 2
+    )
+    told = [
+        line for line in capsys.readouterr().err.splitlines() if "missing is not installed" in line
+    ]
     assert len(told) == 1  # not once for each option
 
 
@@ -139,7 +165,10 @@ def test_native_that_breaks_leaves_the_others_unjudged(kincheck_main, capsys):
     def broken(case):
         raise ValueError("no")
 
-    assert kincheck_main("run", engines=[Fake("native", answer=broken), Fake()], cases=UNREFERENCED) == 2
+    assert (
+        kincheck_main("run", engines=[Fake("native", answer=broken), Fake()], cases=UNREFERENCED)
+        == 2
+    )
     assert "nothing was compared (1 not judged, 1 error)" in capsys.readouterr().err
 
 
@@ -149,7 +178,8 @@ def test_native_that_breaks_leaves_the_others_unjudged(kincheck_main, capsys):
 def as_of_before(results):
     """Results as older versions wrote them: a pass, compared with nothing."""
     passed = [
-        msgspec.structs.replace(each, outcome=Outcome.PASS) if each.outcome == "unjudged" else each for each in results.records
+        msgspec.structs.replace(each, outcome=Outcome.PASS) if each.outcome == "unjudged" else each
+        for each in results.records
     ]
     return msgspec.structs.replace(results, records=passed)
 
@@ -177,13 +207,22 @@ def bare(all_records, engine="mujoco", *, outcome=Outcome.UNJUDGED):
 
 
 def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
-    keep(path, [each for each in bare(records(), outcome=Outcome.PASS) if (each.case, each.engine) == ("first", "mujoco")])
+    keep(
+        path,
+        [
+            each
+            for each in bare(records(), outcome=Outcome.PASS)
+            if (each.case, each.engine) == ("first", "mujoco")
+        ],
+    )
     with sqlite3.connect(path) as raw:  # it is as the older version left it
         ((outcome, record),) = raw.execute("SELECT outcome, record FROM records")
     assert (outcome, json.loads(zlib.decompress(record))["outcome"]) == ("pass", "pass")
     with Store(path) as store:
         assert [each.outcome for each in store.records(1)] == ["unjudged"]
-        assert [entry.outcome for entries in read(store).pairs.values() for entry in entries] == ["unjudged"]
+        assert [entry.outcome for entries in read(store).pairs.values() for entry in entries] == [
+            "unjudged"
+        ]
         assert green(store) == []
     assert main.main(["history", "--history", str(path)]) == 0
     assert "1 not judged" in capsys.readouterr().out
@@ -193,8 +232,12 @@ def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
 
 def test_names_that_look_like_deviations_are_none(path):
     nothing = {"position": None, "velocity": None, "acceleration": None}
-    odd = msgspec.structs.replace(next(iter(records()[0].errors.values())), **nothing, reason='"max_abs":1')
-    keep(path, changed(records(), outcome=Outcome.PASS, errors={'"max_abs":1': odd, "max_abs": odd}))
+    odd = msgspec.structs.replace(
+        next(iter(records()[0].errors.values())), **nothing, reason='"max_abs":1'
+    )
+    keep(
+        path, changed(records(), outcome=Outcome.PASS, errors={'"max_abs":1': odd, "max_abs": odd})
+    )
     with Store(path) as store:
         outcomes = {pair[:2]: entries[0].outcome for pair, entries in read(store).pairs.items()}
     assert outcomes["first", "mujoco"] == "unjudged"
@@ -226,7 +269,9 @@ def test_a_pair_that_is_no_longer_judged_is_a_regression(path):
     assert "1 no longer judged" in to_markdown(found)
     with Store(path) as store:
         suite = ET.fromstring(to_regression_junit(store.results(2), found))
-    assert [failure.get("message") for failure in suite.iter("failure")] == [f"no longer judged: pass → not judged: {WHY}"]
+    assert [failure.get("message") for failure in suite.iter("failure")] == [
+        f"no longer judged: pass → not judged: {WHY}"
+    ]
     # as long as it is so, it is told: the run that compared most is the one to compare with
     keep(path, bare(records()))
     assert [each.kind for each in reported(path).findings] == [Kind.UNJUDGED]
@@ -244,11 +289,15 @@ def test_what_is_judged_again_says_so_and_is_no_regression(path):
     keep(path, bare(records()))
     keep(path, records())
     found = reported(path, against="1")
-    assert [(each.kind, each.message) for each in found.findings] == [(Kind.JUDGED, "not judged → pass")]
+    assert [(each.kind, each.message) for each in found.findings] == [
+        (Kind.JUDGED, "not judged → pass")
+    ]
     assert not found.regressed
     assert "1 judged again" in to_markdown(found)
     keep(path, changed(records(), outcome=Outcome.FAIL, message="off"))
-    assert [each.message for each in reported(path, against="1").findings] == ["not judged → fail: off"]
+    assert [each.message for each in reported(path, against="1").findings] == [
+        "not judged → fail: off"
+    ]
 
 
 def test_an_upgrade_is_no_regression(path):

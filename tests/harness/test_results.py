@@ -21,26 +21,61 @@ TOL = 1e-12
 def test_json_has_the_keys_of_the_schema_and_every_digit():
     p = exact(crank())[0]
     results = run(
-        [crank()], [Fake(), Fake("partial", answer=partial), Fake("missing", installed=None)], tol=TOL, command="kincheck run"
+        [crank()],
+        [Fake(), Fake("partial", answer=partial), Fake("missing", installed=None)],
+        tol=TOL,
+        command="kincheck run",
     )
     text = to_json(results)
     read = json.loads(text)
     assert list(read) == ["schema", "run", "records", "references", "scenes", "suspects"]
     assert read["schema"] == "kincheck-results/1"
-    assert {"kincheck", "python", "numpy", "engines", "platform", "processor", "started", "tol", "command"} <= set(read["run"])
+    assert {
+        "kincheck",
+        "python",
+        "numpy",
+        "engines",
+        "platform",
+        "processor",
+        "started",
+        "tol",
+        "command",
+    } <= set(read["run"])
     assert read["run"]["engines"] == {"fake": "1.2", "partial": "1.2", "missing": None}
     for record in read["records"]:
         assert {
-            *("case", "engine", "mode", "loop", "version", "outcome", "message", "driver", "outputs", "errors", "residual_max"),
+            *(
+                "case",
+                "engine",
+                "mode",
+                "loop",
+                "version",
+                "outcome",
+                "message",
+                "driver",
+                "outputs",
+                "errors",
+                "residual_max",
+            ),
             *("rank", "dof", "iterations", "seconds", "us_per_step"),
         } <= set(record)
     first = read["records"][0]
     assert set(first["outputs"]["x"]) >= {"position", "velocity", "acceleration", "unit"}
-    assert set(first["errors"]["x"]["position"]) == {"max_abs", "rms", "worst_step", "tolerance", "against", "within"}
+    assert set(first["errors"]["x"]["position"]) == {
+        "max_abs",
+        "rms",
+        "worst_step",
+        "tolerance",
+        "against",
+        "within",
+    }
     assert set(first["seconds"]) == {"build", "first", "warm", "compare", "waited"}
     bits = [struct.pack("d", value) for value in first["outputs"]["y"]["position"]]
     assert bits == [struct.pack("d", value) for value in p[:, 1]]
-    assert read["references"]["crank"]["x"]["acceleration"] == crank().reference["x"].acceleration.tolist()
+    assert (
+        read["references"]["crank"]["x"]["acceleration"]
+        == crank().reference["x"].acceleration.tolist()
+    )
     assert read["run"]["cases"]["crank"]["driver"]["type"] == "joint_angle"
     assert from_json(text) == results
 
@@ -61,7 +96,12 @@ def test_foreign_results_are_refused():
 
 
 def test_undecodable_messages_still_give_json_and_xml():
-    results = run([crank()], [Fake(answer=raising(ValueError("bad \udcff and \x00")))], tol=TOL, command="kincheck \udcff")
+    results = run(
+        [crank()],
+        [Fake(answer=raising(ValueError("bad \udcff and \x00")))],
+        tol=TOL,
+        command="kincheck \udcff",
+    )
     assert from_json(to_json(results)) == results
     ET.fromstring(to_junit(results))
 
@@ -78,18 +118,41 @@ def test_junit_has_a_test_case_per_case_engine_and_output():
     root = ET.fromstring(to_junit(run([crank("a"), crank("b")], engines, tol=TOL)))
     tests = root.findall(".//testcase")
     assert len(tests) == 2 * 6 * 2
-    assert root.find("testsuite").attrib == {"name": "a", "tests": "12", "failures": "3", "errors": "2", "skipped": "4"}
-    found = {(test.get("classname"), test.get("name")): [(child.tag, child.get("message")) for child in test] for test in tests}
+    assert root.find("testsuite").attrib == {
+        "name": "a",
+        "tests": "12",
+        "failures": "3",
+        "errors": "2",
+        "skipped": "4",
+    }
+    found = {
+        (test.get("classname"), test.get("name")): [
+            (child.tag, child.get("message")) for child in test
+        ]
+        for test in tests
+    }
     assert found["a.right.projection", "x"] == []
     assert found["a.wrong.projection", "x"] == []  # only y is wrong
     assert found["a.wrong.projection", "y"][0][0] == "failure"
     assert "y: position is off by" in found["a.wrong.projection", "y"][0][1]
     assert found["a.partial.projection", "x"] == [
-        ("failure", "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2 of the others")
+        (
+            "failure",
+            (
+                "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2"
+                " of the others"
+            ),
+        )
     ]
     assert found["b.broken.projection", "y"] == [("error", "error: ValueError: no")]
     assert found["b.missing.projection", "y"] == [
-        ("skipped", "unavailable: missing is not installed, or cannot be imported: kincheck doctor says which")
+        (
+            "skipped",
+            (
+                "unavailable: missing is not installed, or cannot be imported: kincheck doctor says"
+                " which"
+            ),
+        )
     ]
     assert found["b.unable.projection", "y"] == [("skipped", "unsupported: no such joint")]
 
@@ -109,7 +172,11 @@ def test_the_table_names_modes_where_there_are_several(capsys):
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [('{"run": {"a": ' + "[" * 100_000, "recursion"), ("{}", "expected results"), ('{"schema": "other"}', "expected results")],
+    [
+        ('{"run": {"a": ' + "[" * 100_000, "recursion"),
+        ("{}", "expected results"),
+        ('{"schema": "other"}', "expected results"),
+    ],
     ids=["nested", "empty", "another schema"],
 )
 def test_a_file_that_holds_no_results_is_refused_in_one_line(tmp_path, capsys, text, said):

@@ -41,7 +41,12 @@ def test_the_right_answer_passes_and_is_recorded():
     assert names == ("crank", "fake", "projection", "python", "1.2")
     assert record.driver == {"angle": np.linspace(-1.0, 1.0, SAMPLES).tolist()}
     assert record.outputs["y"].position == exact(crank())[0][:, 1].tolist()
-    assert (record.rank, record.dof, record.iterations, record.residual_max) == (6, 1, 3 * SAMPLES, 1e-15)
+    assert (record.rank, record.dof, record.iterations, record.residual_max) == (
+        6,
+        1,
+        3 * SAMPLES,
+        1e-15,
+    )
     assert (record.solved, record.samples) == (SAMPLES, SAMPLES)
     assert record.details == {"condition": 0.1, "pivots": [0, 1, 2]}
     assert record.settings == {"scheme": 0.5}
@@ -60,18 +65,26 @@ def test_the_sign_of_an_output_matters():
     record = record_of(Fake(answer=off("position", lambda p: p * [1.0, -1.0, 1.0])))
     assert record.outcome is Outcome.FAIL
     # y = 0.5 sin, at -1 rad and wrong by its double
-    assert record.message == (
-        f"y: position is off by {math.sin(1.0):.3g} m at sample 0 (angle = -1), tolerance 1e-09 m, against closed_form"
+    assert (
+        record.message
+        == f"y: position is off by {math.sin(1.0):.3g} m at sample 0 (angle = -1), tolerance 1e-09"
+        " m, against closed_form"
     )
     assert record.errors["x"].position.within
 
 
-@pytest.mark.parametrize(("quantity", "unit", "tolerance"), [("velocity", "m/s", "2e-09"), ("acceleration", "m/s^2", "4e-09")])
+@pytest.mark.parametrize(
+    ("quantity", "unit", "tolerance"),
+    [("velocity", "m/s", "2e-09"), ("acceleration", "m/s^2", "4e-09")],
+)
 def test_a_relative_error_of_a_millionth_is_caught_and_named(quantity, unit, tolerance):
     record = record_of(Fake(answer=off(quantity, lambda values: values * (1.0 + 1e-6))))
     assert record.outcome is Outcome.FAIL
     assert f"{quantity} is off by" in record.message
-    assert f"tolerance {tolerance} {unit}, against closed_form (worst of 2 quantities out of tolerance)" in record.message
+    assert (
+        f"tolerance {tolerance} {unit}, against closed_form (worst of 2 quantities out of"
+        " tolerance)" in record.message
+    )
 
 
 def test_a_deviation_at_one_sample_is_located():
@@ -143,7 +156,10 @@ def test_missing_and_unable_engines_have_records_with_reasons():
     said = "fake is not installed, or cannot be imported: kincheck doctor says which"
     assert (missing.outcome, missing.message, missing.version) == (Outcome.UNAVAILABLE, said, None)
     unable = record_of(Fake(refusal="joint 'cv' (universal) has no counterpart"))
-    assert (unable.outcome, unable.message) == (Outcome.UNSUPPORTED, "joint 'cv' (universal) has no counterpart")
+    assert (unable.outcome, unable.message) == (
+        Outcome.UNSUPPORTED,
+        "joint 'cv' (universal) has no counterpart",
+    )
     assert unable.version == "1.2"
     for record in (missing, unable):
         assert not record.outcome.bad
@@ -155,7 +171,11 @@ def test_missing_and_unable_engines_have_records_with_reasons():
 def test_missing_samples_fail_and_the_others_are_kept_and_compared():
     record = record_of(Fake(answer=partial))
     assert record.outcome is Outcome.FAIL
-    assert record.message == "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2 of the others"
+    assert (
+        record.message
+        == "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2 of"
+        " the others"
+    )
     assert (record.solved, record.samples) == (7, 9)
     assert record.outputs["x"].position[7:] == [None, None]
     assert record.outputs["x"].position[:7] == record_of(Fake()).outputs["x"].position[:7]
@@ -174,7 +194,10 @@ def test_missing_samples_fail_and_the_others_are_kept_and_compared():
             Fake(answer=lambda case: solution(case, solved=np.zeros(SAMPLES, dtype=bool))),
             {key: UNTOLD[key] for key in ("residual_max", "iterations", "us_per_step")},
         ),
-        (Fake(answer=lambda case: replace(solution(case), details={})), {key: UNTOLD[key] for key in ("rank", "dof")}),
+        (
+            Fake(answer=lambda case: replace(solution(case), details={})),
+            {key: UNTOLD[key] for key in ("rank", "dof")},
+        ),
         (Fake(answer=raising(ValueError("no"))), dict.fromkeys(UNTOLD, "error: see message")),
         (Fake(installed=None), dict.fromkeys(UNTOLD, "unavailable: see message")),
     ],
@@ -199,12 +222,20 @@ def test_missing_samples_do_not_hide_a_deviation():
 
 def test_nothing_solved_is_a_failure_without_numbers():
     nan = np.full((SAMPLES, 3), np.nan)
-    answer = lambda case: solution(case, solved=np.zeros(SAMPLES, dtype=bool), position=nan, velocity=None, acceleration=None)  # noqa: E731
+    answer = lambda case: solution(
+        case, solved=np.zeros(SAMPLES, dtype=bool), position=nan, velocity=None, acceleration=None
+    )
     record = record_of(Fake(answer=answer))
     assert (
-        record.message == "0 of 9 samples solved: the engine does not say why; ask it to; closed_form has values at 9 of the others"
+        record.message
+        == "0 of 9 samples solved: the engine does not say why; ask it to; closed_form has values"
+        " at 9 of the others"
     )
-    assert (record.residual_max, record.iterations, record.errors["x"].position) == (None, None, None)
+    assert (record.residual_max, record.iterations, record.errors["x"].position) == (
+        None,
+        None,
+        None,
+    )
 
 
 def test_without_a_reference_engines_are_compared_with_the_native_one():
@@ -230,9 +261,14 @@ def test_without_reference_and_native_engine_the_record_is_not_judged():
         Outcome.UNJUDGED,
         "the case has no reference, and the native engine is not in this run",
     )
-    _, fake = run([case], [Fake("native", answer=raising(ValueError("no"))), Fake()], tol=TOL).records
+    _, fake = run(
+        [case], [Fake("native", answer=raising(ValueError("no"))), Fake()], tol=TOL
+    ).records
     assert fake.outcome is Outcome.UNJUDGED
-    assert fake.message == "the case has no reference, and the native engine has no answer (error: ValueError: no)"
+    assert (
+        fake.message
+        == "the case has no reference, and the native engine has no answer (error: ValueError: no)"
+    )
 
 
 def test_a_baseline_is_compared_with_and_not_recorded():
@@ -247,7 +283,12 @@ def test_a_baseline_is_compared_with_and_not_recorded():
     for lacking in ("velocity", "acceleration"):
         case = crank()
         case.reference["y"] = replace(case.reference["y"], **{lacking: None})
-        (record,) = run([case], [Fake(answer=off(lacking, lambda values: 1.001 * values))], tol=TOL, baseline=native).records
+        (record,) = run(
+            [case],
+            [Fake(answer=off(lacking, lambda values: 1.001 * values))],
+            tol=TOL,
+            baseline=native,
+        ).records
         assert getattr(record.errors["y"], lacking).against == "native"
         assert not getattr(record.errors["y"], lacking).within
 
@@ -257,10 +298,17 @@ def test_what_the_reference_lacks_is_compared_with_the_native_engine():
     case.reference.pop("y")
     case.reference["x"] = Series(case.reference["x"].position)
     native, fake = run([case], [Fake("native"), Fake()], tol=TOL).records
-    assert [each.against for _, each in fake.errors["x"].items()] == ["closed_form", "native", "native"]
+    assert [each.against for _, each in fake.errors["x"].items()] == [
+        "closed_form",
+        "native",
+        "native",
+    ]
     assert [each.against for _, each in fake.errors["y"].items()] == ["native"] * 3
     missing = "velocity: closed_form gives none; acceleration: closed_form gives none"
-    assert (native.outcome, native.message) == (Outcome.PASS, f"not judged: x: {missing}; y: the reference does not have it")
+    assert (native.outcome, native.message) == (
+        Outcome.PASS,
+        f"not judged: x: {missing}; y: the reference does not have it",
+    )
     # one output met a truth, the other only another engine
     assert not fake.validated
     assert native.truth == "closed_form"
@@ -272,9 +320,12 @@ def test_an_output_that_has_no_value_where_the_reference_has_one_is_no_pass(monk
         return replace(series, position=np.where(np.arange(SAMPLES) == 3, np.nan, series.position))
 
     monkeypatch.setattr("kincheck.core.harness.execution.output_series", holed)
-    record, missing = record_of(Fake()), record_of(Fake(answer=partial))  # of the second it is said why samples are missing
+    # of the second it is said why samples are missing
+    record, missing = record_of(Fake()), record_of(Fake(answer=partial))
     assert record.outcome is Outcome.FAIL
-    assert record.message.startswith("x: position has no value at samples where closed_form has one")
+    assert record.message.startswith(
+        "x: position has no value at samples where closed_form has one"
+    )
     assert "has no value" not in missing.message
 
 
@@ -291,5 +342,7 @@ def test_a_reference_that_does_not_fit_is_an_error_not_a_pass():
 
 def test_progress_hears_of_every_record():
     heard = []
-    results = run([crank("a"), crank("b")], [Fake()], tol=TOL, progress=lambda *news: heard.append(news))
+    results = run(
+        [crank("a"), crank("b")], [Fake()], tol=TOL, progress=lambda *news: heard.append(news)
+    )
     assert heard == [(results.records[0], 1, 2), (results.records[1], 2, 2)]

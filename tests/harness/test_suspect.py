@@ -1,4 +1,6 @@
-"""Where all engines agree and the reference does not fit, it is the reference that is suspected, with the slip that explains it."""
+"""Where all engines agree and the reference does not fit, it is the reference that is suspected,
+with the slip that explains it.
+"""
 
 import math
 from dataclasses import replace
@@ -24,11 +26,18 @@ WAVY = 0.3 * np.sin(1.7 * S + 0.4) + 0.1 * S**2
 def with_reference(change):
     """The crank with its references changed: a function of the series of each output."""
     case = crank()
-    return replace(case, reference={name: change(name, series, case.reference) for name, series in case.reference.items()})
+    return replace(
+        case,
+        reference={
+            name: change(name, series, case.reference) for name, series in case.reference.items()
+        },
+    )
 
 
 def every(series, change):
-    return Series(*(change(each) for each in (series.position, series.velocity, series.acceleration)))
+    return Series(
+        *(change(each) for each in (series.position, series.velocity, series.acceleration))
+    )
 
 
 def suspected(change, engines=ENGINES):
@@ -44,7 +53,9 @@ CHANGES = {
     "times 25.4": lambda name, x, _: every(x, lambda a: a / 25.4),
     "with the other sign and times 1000": lambda name, x, _: every(x, lambda a: -a / 1000.0),
     "minus 0.7 m": lambda name, x, _: Series(x.position + 0.7, x.velocity, x.acceleration),
-    "shifted by one sample": lambda name, x, _: every(x, lambda a: np.roll(a, 1)[[1, *range(1, len(a))]]),
+    "shifted by one sample": lambda name, x, _: every(
+        x, lambda a: np.roll(a, 1)[[1, *range(1, len(a))]]
+    ),
     "taken as that of output": lambda name, x, all_: all_["y" if name == "x" else "x"],
 }
 
@@ -65,13 +76,18 @@ def test_a_slip_is_named_with_how_well_it_explains(words):
 
 
 def test_reversed_samples_are_told_from_another_sign_by_the_derivatives():
-    """The crank's y is odd: its reversed positions are its negative ones, its velocities are even."""
-    _, found = suspected(lambda name, x, _: every(x, lambda a: a[::-1].copy()) if name == "y" else x)
-    words = {each.change for each in found.explanations}
-    assert words == {"with the other sign, or with its samples in reversed order"}  # velocities are within
-    assert suspected(lambda name, x, _: every(x, np.negative) if name == "y" else x)[1].explanations[0].change == (
-        "with the other sign"
+    """The crank's y is odd: its reversed positions are its negative ones, its velocities are
+    even.
+    """
+    _, found = suspected(
+        lambda name, x, _: every(x, lambda a: a[::-1].copy()) if name == "y" else x
     )
+    words = {each.change for each in found.explanations}
+    # velocities are within
+    assert words == {"with the other sign, or with its samples in reversed order"}
+    assert suspected(lambda name, x, _: every(x, np.negative) if name == "y" else x)[
+        1
+    ].explanations[0].change == ("with the other sign")
 
 
 def test_it_is_said_once_on_every_surface(tmp_path):
@@ -93,14 +109,20 @@ def test_the_command_says_it_once(kincheck_main, capsys):
     case = with_reference(CHANGES["with the other sign"])
     assert kincheck_main("run", "crank", engines=ENGINES, cases={"crank": case}) == 1
     out = capsys.readouterr().out
-    assert out.count("suspect: crank: all 3 engines agree") == out.count("suspect the reference") == 1
+    assert (
+        out.count("suspect: crank: all 3 engines agree") == out.count("suspect the reference") == 1
+    )
     assert "fail: crank" not in out
 
 
 def test_what_no_slip_explains_is_said_to_be_unexplained():
     bump = np.zeros(9)
     bump[4] = 0.01
-    _, found = suspected(lambda name, x, _: Series(x.position + bump, x.velocity, x.acceleration) if name == "y" else x)
+    _, found = suspected(
+        lambda name, x, _: (
+            Series(x.position + bump, x.velocity, x.acceleration) if name == "y" else x
+        )
+    )
     assert found.explanations == []
     assert found.unexplained == ["y (position)"]
     assert (found.output, found.sample) == ("y", 4)
@@ -116,7 +138,12 @@ def test_engines_that_disagree_are_to_blame_themselves():
 
 
 def test_a_right_reference_and_a_wrong_engine_are_not_suspected():
-    assert run([crank()], [Fake("native"), Fake("wrong", off("position", lambda p: -p))], tol=1e-12).suspects == {}
+    assert (
+        run(
+            [crank()], [Fake("native"), Fake("wrong", off("position", lambda p: -p))], tol=1e-12
+        ).suspects
+        == {}
+    )
     assert run([crank()], ENGINES, tol=1e-12).suspects == {}
     assert run([crank(reference=False)], ENGINES, tol=1e-12).suspects == {}
 
@@ -125,7 +152,12 @@ def test_one_engine_alone_agrees_with_nobody():
     """It is told only what a slip explains wholly."""
     _, found = suspected(CHANGES["times 1000"], [Fake("native")])
     assert "native is the only engine that solved it" in found.message
-    assert suspected(lambda name, x, _: every(x, lambda a: a + 1e-3 * np.arange(9.0) ** 2), [Fake("native")])[1] is None
+    assert (
+        suspected(
+            lambda name, x, _: every(x, lambda a: a + 1e-3 * np.arange(9.0) ** 2), [Fake("native")]
+        )[1]
+        is None
+    )
 
 
 def held(values, atol=1e-9):
@@ -133,28 +165,39 @@ def held(values, atol=1e-9):
 
 
 def words(values, reference, others=None):
-    return [each.change for each in slips(held(values), np.asarray(reference, dtype=float), others or {})]
+    return [
+        each.change
+        for each in slips(held(values), np.asarray(reference, dtype=float), others or {})
+    ]
 
 
 @pytest.mark.parametrize("name", FACTORS)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_every_factor_is_found_with_either_sign(name, sign):
-    assert words(WAVY, sign * WAVY / FACTORS[name]) == [f"{'with the other sign and ' if sign < 0 else ''}times {name}"]
+    assert words(WAVY, sign * WAVY / FACTORS[name]) == [
+        f"{'with the other sign and ' if sign < 0 else ''}times {name}"
+    ]
 
 
 def test_pairs_are_tried_where_nothing_alone_fits():
     assert words(WAVY, 0.4 - WAVY) == ["with the other sign and plus 0.4 m"]
-    assert words(WAVY, -WAVY[::-1]) == ["with the other sign and with its samples in reversed order"]
+    assert words(WAVY, -WAVY[::-1]) == [
+        "with the other sign and with its samples in reversed order"
+    ]
     assert words(WAVY, 1000.0 * (WAVY + 0.2)) == ["times 1/1000 and minus 0.2 m"]
     other = held(np.cos(3.0 * S))
-    assert words(WAVY, -other.values, {"z": other}) == ["with the other sign taken as that of output z"]
+    assert words(WAVY, -other.values, {"z": other}) == [
+        "with the other sign taken as that of output z"
+    ]
 
 
 def test_a_shift_by_one_sample_is_found_both_ways():
     later, earlier = np.r_[WAVY[1:], 7.0], np.r_[7.0, WAVY[:-1]]
     assert words(WAVY, later) == ["shifted by one sample, each taken from the one before"]
     assert words(WAVY, earlier) == ["shifted by one sample, each taken from the next"]
-    assert words(WAVY, np.r_[0.0, WAVY[:-1]] * 1000.0) == ["times 1/1000 and shifted by one sample, each taken from the next"]
+    assert words(WAVY, np.r_[0.0, WAVY[:-1]] * 1000.0) == [
+        "times 1/1000 and shifted by one sample, each taken from the next"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -169,7 +212,16 @@ def test_a_shift_by_one_sample_is_found_both_ways():
         (WAVY, -WAVY + 1e-8 * S),
         (WAVY, WAVY * 1.01),
     ],
-    ids=["zeros", "as good as zeros", "constant", "two", "two, off", "two known", "nearly", "another factor"],
+    ids=[
+        "zeros",
+        "as good as zeros",
+        "constant",
+        "two",
+        "two, off",
+        "two known",
+        "nearly",
+        "another factor",
+    ],
 )
 def test_nothing_is_invented(values, reference):
     assert words(values, reference) == []

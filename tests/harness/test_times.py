@@ -34,7 +34,9 @@ def test_times_are_of_warm_solves_and_the_answer_is_the_timed_one():
     assert record.us_per_step == pytest.approx(1e6 * record.seconds.warm / SAMPLES)
     assert record.seconds.build is not None
     stale = Fake()
-    stale.answer = lambda case: (solution if stale.solves == 1 else off("position", lambda p: p + 1.0))(case)
+    stale.answer = lambda case: (
+        solution if stale.solves == 1 else off("position", lambda p: p + 1.0)
+    )(case)
     assert record_of(stale).outcome is Outcome.FAIL
 
 

@@ -1,4 +1,6 @@
-"""Runs that ended before all was made, engines that are gone for long: no report says that all is well."""
+"""Runs that ended before all was made, engines that are gone for long: no report says that all is
+well.
+"""
 
 import os
 import shutil
@@ -36,11 +38,14 @@ def path(tmp_path):
 
 
 def killed(path, made, *, owner="a-host-that-is-no-more|1|1"):
-    """A run of all pairs that ended by force after so many; with an owner of None, one that goes on."""
+    """A run of all pairs that ended by force after so many; with an owner of None, one that goes
+    on.
+    """
     run = keep(path, records(), status="running")
     with Store(path) as store:
         store.connection.execute(
-            "DELETE FROM records WHERE run_id = ? AND rowid > (SELECT max(rowid) FROM records) - ?", (run, 4 - made)
+            "DELETE FROM records WHERE run_id = ? AND rowid > (SELECT max(rowid) FROM records) - ?",
+            (run, 4 - made),
         )
         if owner is not None:
             store.connection.execute("UPDATE runs SET owner = ? WHERE id = ?", (owner, run))
@@ -59,7 +64,10 @@ def test_a_run_that_was_killed_is_judged_and_not_the_one_before(path, capsys):
         (Kind.LOST, "second", "mujoco", UNMADE)
     ]
     assert main.main(["report", "--history", str(path)]) == 1
-    assert "run 3, without an end against run 2 (last green): 1 with something lost" in capsys.readouterr().out
+    assert (
+        "run 3, without an end against run 2 (last green): 1 with something lost"
+        in capsys.readouterr().out
+    )
 
 
 def test_a_run_that_goes_on_is_left_alone(path):
@@ -73,7 +81,9 @@ def test_a_run_of_which_nothing_was_made_is_judged_too(path):
     killed(path, 0)
     found = reported(path)
     assert len(found.regressions) == 4
-    assert to_markdown(found).startswith("## run 2, without an end against run 1 (last green): 4 with something lost")
+    assert to_markdown(found).startswith(
+        "## run 2, without an end against run 1 (last green): 4 with something lost"
+    )
 
 
 def test_what_was_never_made_counts_with_nothing_to_compare_with(path, capsys):
@@ -94,14 +104,23 @@ def test_every_format_tells_of_pairs_that_were_never_made(path):
     ]
     assert headline(results).endswith("; the run ended before 3 more")
     said = dict(caveats(results))["Never made: 3"]
-    assert said.endswith("nothing is said about mujoco on first; native on second; mujoco on second.")
+    assert said.endswith(
+        "nothing is said about mujoco on first; native on second; mujoco on second."
+    )
     for text in (to_junit(results), to_regression_junit(results, reported(path))):
         root = ET.fromstring(text)
-        assert [(suite.get("name"), suite.get("tests"), suite.get("errors"), suite.get("failures")) for suite in root] == [
+        assert [
+            (suite.get("name"), suite.get("tests"), suite.get("errors"), suite.get("failures"))
+            for suite in root
+        ] == [
             ("first", "3", "1", "0"),
             ("second", "2", "2", "0"),
         ]
-        assert {test.find("error").get("message") for test in root.iter("testcase") if test.get("name") == "never made"} == {UNMADE}
+        assert {
+            test.find("error").get("message")
+            for test in root.iter("testcase")
+            if test.get("name") == "never made"
+        } == {UNMADE}
 
 
 def test_a_file_of_a_run_that_ended_early_is_judged_likewise(path, tmp_path):
@@ -109,9 +128,13 @@ def test_a_file_of_a_run_that_ended_early_is_judged_likewise(path, tmp_path):
     nights(path, 1)
     pairs = [[each.case, each.engine, each.mode] for each in records()[1:]]
     file = tmp_path / "results.json"
-    file.write_bytes(to_json(Results(run={**FACTS, "started": "now", "missing": pairs}, records=records()[:1])))
+    file.write_bytes(
+        to_json(Results(run={**FACTS, "started": "now", "missing": pairs}, records=records()[:1]))
+    )
     assert kinds(reported(path, str(file), "1")) == [(Kind.LOST, *pair[:2]) for pair in pairs]
-    file.write_bytes(to_json(Results(run={**FACTS, "missing": [["first", "mujoco"]]}, records=records()[:1])))
+    file.write_bytes(
+        to_json(Results(run={**FACTS, "missing": [["first", "mujoco"]]}, records=records()[:1]))
+    )
     with pytest.raises(CaseError, match=r"run.missing"):
         reported(path, str(file), "1")
 
@@ -136,7 +159,9 @@ def test_an_engine_that_stays_away_is_told_every_night(path):
         keep(path, changed(changed(records(), **GONE), case="second", **GONE))
         found = reported(path)
         assert found.against.name == "run 2 (last green)"
-        assert {(each.kind, each.engine) for each in found.regressions} == {(Kind.LOST, "mujoco")}, night
+        assert {(each.kind, each.engine) for each in found.regressions} == {
+            (Kind.LOST, "mujoco")
+        }, night
     keep(path, records())
     assert not reported(path).regressed
     keep(path, records())
@@ -152,8 +177,10 @@ def test_an_engine_that_was_never_there_is_no_regression(path):
 
 def test_a_branch_that_is_not_there_is_told_those_that_are(path):
     nights(path, 2)
-    assert reported(path, against="mian-baseline").reason == (
-        "no earlier run of branch 'mian', without changes to its files, with any of its pairs; the history has branches main"
+    assert (
+        reported(path, against="mian-baseline").reason
+        == "no earlier run of branch 'mian', without changes to its files, with any of its pairs;"
+        " the history has branches main"
     )
 
 
@@ -195,7 +222,10 @@ def test_a_history_where_nothing_can_be_written_is_read_whole_or_not_at_all(path
                 with Store(there, writable=False) as store:
                     assert len(store.runs()) == 2
             else:
-                with pytest.raises(HistoryError, match=r"its latest records are in history.sqlite-wal still, .* copy both files"):
+                with pytest.raises(
+                    HistoryError,
+                    match=r"its latest records are in history.sqlite-wal still, .* copy both files",
+                ):
                     Store(there, writable=False)
 
 
@@ -215,4 +245,6 @@ def test_a_step_has_the_unit_of_its_output(path, capsys):
 
 
 def _grown(deviations):
-    return msgspec.structs.replace(deviations, acceleration=msgspec.structs.replace(deviations.acceleration, max_abs=1e-10))
+    return msgspec.structs.replace(
+        deviations, acceleration=msgspec.structs.replace(deviations.acceleration, max_abs=1e-10)
+    )

@@ -1,4 +1,6 @@
-"""Isolation: whatever an engine does in a worker process, its pair gets the right record and no other pair is touched."""
+"""Isolation: whatever an engine does in a worker process, its pair gets the right record and no
+other pair is touched.
+"""
 
 import os
 import signal
@@ -32,8 +34,14 @@ EXPECTED = {
     "segfault": (Outcome.CRASHED, "the process died of SIGSEGV in "),
     "abort": (Outcome.CRASHED, "the process died of SIGABRT in "),
     "system_exit": (Outcome.ERROR, "SystemExit: 0"),
-    "exit": (Outcome.CRASHED, "the process ended with status 3 before it had an answer; it last printed: solving exit"),
-    "spinning": (Outcome.TIMEOUT, "no answer within 2 s; the process was killed; it last printed: solving spinning"),
+    "exit": (
+        Outcome.CRASHED,
+        "the process ended with status 3 before it had an answer; it last printed: solving exit",
+    ),
+    "spinning": (
+        Outcome.TIMEOUT,
+        "no answer within 2 s; the process was killed; it last printed: solving spinning",
+    ),
     "deaf": (Outcome.TIMEOUT, "no answer within 2 s"),
     "memory": (Outcome.ERROR, "this process may have 1 GB"),
     "shapes": (Outcome.ERROR, "position of point 'tip' has shape (8, 3), expected (9, 3)"),
@@ -130,32 +138,53 @@ def test_linear_algebra_has_one_thread_unless_it_is_told_how_many(monkeypatch, g
 
 
 def test_what_a_pair_leaves_behind_is_not_charged_to_another():
-    """Each pair keeps 0.3 GB of the half that there is: the second fails in the process of the first, and passes in its own."""
-    results = run([crank(name) for name in "ab"], [Leaking()], tol=TOL, solver=in_workers(1, Limits(memory=0.5)))
+    """Each pair keeps 0.3 GB of the half that there is: the second fails in the process of the
+    first, and passes in its own.
+    """
+    results = run(
+        [crank(name) for name in "ab"],
+        [Leaking()],
+        tol=TOL,
+        solver=in_workers(1, Limits(memory=0.5)),
+    )
     assert [each.message for each in results.records] == ["", ""]
 
 
 def test_records_are_the_same_however_many_jobs():
-    """Without a reference the others wait for the native engine, which is the last to be through."""
+    """Without a reference the others wait for the native engine, which is the last to be
+    through.
+    """
     cases = [crank("a", reference=False), crank("b"), crank("c", reference=False)]
     engines = [Fake(), Fake("missing", installed=None), Slow("native", seconds=0.05)]
     three, one, none = (
-        run(cases, engines, tol=TOL, solver=solver).records for solver in (in_workers(3, PATIENT), in_workers(1, PATIENT), here)
+        run(cases, engines, tol=TOL, solver=solver).records
+        for solver in (in_workers(3, PATIENT), in_workers(1, PATIENT), here)
     )
     assert timeless(three) == timeless(one) == timeless(none)
-    assert [each.errors["x"].position.against for each in three if each.engine == "fake"] == ["native", "closed_form", "native"]
+    assert [each.errors["x"].position.against for each in three if each.engine == "fake"] == [
+        "native",
+        "closed_form",
+        "native",
+    ]
 
 
 def test_a_baseline_is_solved_in_a_worker_too_and_a_crash_of_it_is_told():
     case = crank("segfault", reference=False)
-    (record,) = run([case], [Fake()], tol=TOL, baseline=Bad("native"), solver=in_workers(2, PATIENT)).records
+    (record,) = run(
+        [case], [Fake()], tol=TOL, baseline=Bad("native"), solver=in_workers(2, PATIENT)
+    ).records
     assert record.outcome is Outcome.UNJUDGED
-    why = "the case has no reference, and the native engine has no answer (crashed: the process died of SIGSEGV"
+    why = (
+        "the case has no reference, and the native engine has no answer (crashed: the process died"
+        " of SIGSEGV"
+    )
     assert record.message.startswith(why)
 
 
 def test_an_engine_that_cannot_be_sent_says_what_to_do():
-    (record,) = run([crank()], [Fake(answer=raising(ValueError()))], tol=TOL, solver=in_workers(1, PATIENT)).records
+    (record,) = run(
+        [crank()], [Fake(answer=raising(ValueError()))], tol=TOL, solver=in_workers(1, PATIENT)
+    ).records
     assert record.outcome is Outcome.ERROR
     assert record.message.startswith("cannot be sent to a worker process: ")
     assert "--jobs 0" in record.message
@@ -185,7 +214,13 @@ def test_an_interrupt_ends_the_workers_at_once(deaf):
     marker = mark()
     begin = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        run([crank("deaf")], [Bad(), Fake()], tol=TOL, solver=in_workers(2, Limits()), progress=interrupt)
+        run(
+            [crank("deaf")],
+            [Bad(), Fake()],
+            tol=TOL,
+            solver=in_workers(2, Limits()),
+            progress=interrupt,
+        )
     assert marked(marker) == []
     assert time.monotonic() - begin < Limits().timeout
 
@@ -193,7 +228,10 @@ def test_an_interrupt_ends_the_workers_at_once(deaf):
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere only between pairs")
 def test_a_worker_that_hangs_dies_with_its_parent(deaf):
     marker = mark()
-    code = "from tests.test_workers import *; run([crank('deaf')], [Bad()], tol=TOL, solver=in_workers(1, Limits()))"
+    code = (
+        "from tests.test_workers import *; run([crank('deaf')], [Bad()], tol=TOL,"
+        " solver=in_workers(1, Limits()))"
+    )
     with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT) as parent:
         assert deaf()
         assert len(marked(marker)) == 2
@@ -208,7 +246,9 @@ def mark():
 
 
 def marked(marker):
-    """The processes that are there and have the mark: others than this one, whose environment was read before it."""
+    """The processes that are there and have the mark: others than this one, whose environment was
+    read before it.
+    """
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:

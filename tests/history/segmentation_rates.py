@@ -1,8 +1,10 @@
-"""How often levels are found that are none, and how often those are found that are: python -m tests.history.segmentation_rates --series 1000
+"""How often levels are found that are none, and how often those are found that are: python -m
+tests.history.segmentation_rates --series 1000
 
-Noise: the share of series without any step in which one is found, and in which one stands at the end, for the worse. Steps: the
-share of series whose changes are found, all, at the right places and no others; sizes are in standard deviations of the noise, a
-step is a factor of two in time. To measure another rule, give a module that has a function `change_points`:
+Noise: the share of series without any step in which one is found, and in which one stands at the
+end, for the worse. Steps: the share of series whose changes are found, all, at the right places and
+no others; sizes are in standard deviations of the noise, a step is a factor of two in time. To
+measure another rule, give a module that has a function `change_points`:
 
     git show HEAD~1:core/harness/regression/steps.py > core/harness/regression/old_steps.py
     python -m tests.history.segmentation_rates --rule kincheck.core.history.regression.old_steps
@@ -48,7 +50,9 @@ NOISE = {
     "noisier at the end": lambda rng: normal(rng) * np.where(np.arange(RUNS) >= 27, 5.0, 1.0),
     "load: correlated": correlated,
     "load: random walk": lambda rng: normal(rng) + np.cumsum(normal(rng) / 2),
-    "load: waves": lambda rng: normal(rng) + 0.4 * np.sin(2 * np.pi * (np.arange(RUNS) / 25 + rng.random())),
+    "load: waves": lambda rng: (
+        normal(rng) + 0.4 * np.sin(2 * np.pi * (np.arange(RUNS) / 25 + rng.random()))
+    ),
     "load: slowly grows": lambda rng: normal(rng) + np.linspace(0.0, math.log(4.0), RUNS),
 }
 STEPS = {
@@ -64,7 +68,9 @@ SIZES = (3, 5, 7, 10)
 def main(argv: Sequence[str]) -> int:
     """Print both tables."""
     parser = argparse.ArgumentParser(
-        prog="python -m tests.history.segmentation_rates", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="python -m tests.history.segmentation_rates",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--series", type=int, default=1000)
     parser.add_argument("--rule", default="kincheck.core.history.regression.segmentation")
@@ -77,8 +83,13 @@ def main(argv: Sequence[str]) -> int:
             values = make(rng)
             places = [0, *rule(values, least=LEAST, lasting=LASTING)]
             found += len(places) > 1
-            standing += len(places) > 1 and np.median(values[places[-1] :]) > np.median(values[places[-2] : places[-1]])
-        print(f"{name:34}{100 * found / options.series:8.1f}{100 * standing / options.series:8.1f}", flush=True)
+            standing += len(places) > 1 and np.median(values[places[-1] :]) > np.median(
+                values[places[-2] : places[-1]]
+            )
+        print(
+            f"{name:34}{100 * found / options.series:8.1f}{100 * standing / options.series:8.1f}",
+            flush=True,
+        )
     print(f"\n{'found of steps [%]':34}" + "".join(f"{f'{size} sd':>8}" for size in SIZES))
     for name, lengths in STEPS.items():
         level = np.repeat([STEP * (k % 2) for k in range(len(lengths))], lengths)

@@ -42,7 +42,10 @@ def history(path, *argv):
 def test_a_file_of_the_first_schema_is_migrated_and_keeps_all_it_had(path):
     old = sqlite3.connect(FIRST_SCHEMA)
     assert old.execute("PRAGMA user_version").fetchone() == (1,)
-    before = {name: old.execute(f"SELECT * FROM {name}").fetchall() for name in ("runs", "records", "documents", "attachments")}
+    before = {
+        name: old.execute(f"SELECT * FROM {name}").fetchall()
+        for name in ("runs", "records", "documents", "attachments")
+    }
     old.close()
     assert [len(rows) for rows in before.values()] == [2, 7, 1, 2]
     shutil.copy(FIRST_SCHEMA, path)
@@ -59,7 +62,9 @@ def test_a_file_of_the_first_schema_is_migrated_and_keeps_all_it_had(path):
         assert results.records[1].seconds.waited is None
         assert results.references["crank"]["x"].unit == "m"
         assert read(store).pairs["crank", "native", "projection"][0].seconds > 0
-        assert store.connection.execute("SELECT count(*), max(max_abs) > 0 FROM measured WHERE run = 2").fetchone() == (18, 1)
+        assert store.connection.execute(
+            "SELECT count(*), max(max_abs) > 0 FROM measured WHERE run = 2"
+        ).fetchone() == (18, 1)
 
 
 def test_a_migrated_file_goes_on(path):
@@ -67,7 +72,9 @@ def test_a_migrated_file_goes_on(path):
     assert keep(path, records()) == 3
     with Store(path) as store:
         assert store.records(3) == records()
-        assert store.connection.execute("SELECT count(waited_seconds), count(*) FROM records").fetchone() == (4, 11)
+        assert store.connection.execute(
+            "SELECT count(waited_seconds), count(*) FROM records"
+        ).fetchone() == (4, 11)
 
 
 def test_a_later_schema_is_refused_by_every_command(path, capsys):
@@ -84,7 +91,12 @@ def test_a_later_schema_is_refused_by_every_command(path, capsys):
 
 def test_runs_are_listed_the_latest_first(path, capsys):
     nights(path, 2)
-    keep(path, changed(records(), outcome=Outcome.CRASHED), status="running", git={"commit": "abcdef" * 7, "changed": True})
+    keep(
+        path,
+        changed(records(), outcome=Outcome.CRASHED),
+        status="running",
+        git={"commit": "abcdef" * 7, "changed": True},
+    )
     assert history(path) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["run", "3", "2", "1"]
@@ -152,7 +164,11 @@ def test_the_plot_holds_the_numbers_of_the_history(path, tmp_path):
     with Store(path) as store:
         past = trends(read(store))["first"]
     mine = [each for each in past if each.engine == "mujoco"]
-    assert figures["error-1"]["data"][0]["y"] == [each.max_error for each in mine] == pytest.approx([5e-13] * 4, rel=1e-3)
+    assert (
+        figures["error-1"]["data"][0]["y"]
+        == [each.max_error for each in mine]
+        == pytest.approx([5e-13] * 4, rel=1e-3)
+    )
     assert figures["time-1"]["data"][0]["y"] == [each.us_per_step for each in mine]
     assert figures["time-1"]["data"][0]["x"] == [each.run for each in mine]
     assert mine[0].run == "2026-11-01 03:00 #1"
@@ -180,39 +196,65 @@ def exported(path, file):
 
 def test_exports_hold_every_number(path, tmp_path):
     nights(path, 2)
-    keep(path, changed(records(), outcome=Outcome.UNAVAILABLE, errors={}, seconds=None, version=None), git=None)
+    keep(
+        path,
+        changed(records(), outcome=Outcome.UNAVAILABLE, errors={}, seconds=None, version=None),
+        git=None,
+    )
     table, text = exported(path, tmp_path / "all.parquet"), exported(path, tmp_path / "all.csv")
     # two runs of 4 pairs, 2 outputs, 3 motions, and one in which a pair has nothing but its outcome
     assert len(table) == len(text) == 2 * 24 + 18 + 3
     for typed, plain in zip(table, text, strict=True):
         for name, value in typed.items():
-            assert plain[name] == ("" if value is None else str(value).lower() if isinstance(value, bool) else str(value))
+            assert plain[name] == (
+                ""
+                if value is None
+                else str(value).lower()
+                if isinstance(value, bool)
+                else str(value)
+            )
             assert isinstance(value, float | None) is (name in NUMBERS) or value is None
     expected = records()[1].errors["x"].velocity
-    row = next(row for row in table if (row["run"], row["engine"], row["output"], row["motion"]) == (1, "mujoco", "x", "velocity"))
-    assert (row["max_abs"], row["rms"], row["tolerance"]) == (expected.max_abs, expected.rms, expected.tolerance)
+    row = next(
+        row
+        for row in table
+        if (row["run"], row["engine"], row["output"], row["motion"])
+        == (1, "mujoco", "x", "velocity")
+    )
+    assert (row["max_abs"], row["rms"], row["tolerance"]) == (
+        expected.max_abs,
+        expected.rms,
+        expected.tolerance,
+    )
     assert (row["within"], row["git_branch"], row["calibration_seconds"]) == (True, "main", 0.02)
     missing = [row for row in table if row["outcome"] == "unavailable"]
-    assert {(row["max_abs"], row["warm_seconds"], row["git_commit"], row["output"]) for row in missing} == {
-        (None, None, None, None)
-    }
+    assert {
+        (row["max_abs"], row["warm_seconds"], row["git_commit"], row["output"]) for row in missing
+    } == {(None, None, None, None)}
 
 
 def test_an_export_can_be_of_a_case_and_an_engine(path, tmp_path):
     nights(path, 1)
     with Store(path) as store:
-        assert export(store, tmp_path / "some.csv", cases=["first"], engines=["native", "mujoco"]) == 12
+        assert (
+            export(store, tmp_path / "some.csv", cases=["first"], engines=["native", "mujoco"])
+            == 12
+        )
 
 
 def test_what_cannot_be_exported_is_a_message(path, tmp_path, monkeypatch):
     nights(path, 1)
     with Store(path) as store:
-        with pytest.raises(KincheckError, match=r"ends in '.xlsx'; give a file that ends in .parquet or .csv"):
+        with pytest.raises(
+            KincheckError, match=r"ends in '.xlsx'; give a file that ends in .parquet or .csv"
+        ):
             export(store, tmp_path / "all.xlsx")
         with pytest.raises(KincheckError, match="cannot be written"):
             export(store, tmp_path / "no" / "all.csv")
         monkeypatch.setitem(sys.modules, "pyarrow", None)
-        with pytest.raises(KincheckError, match=r"pip install 'kincheck\[parquet\]'; or give a .csv"):
+        with pytest.raises(
+            KincheckError, match=r"pip install 'kincheck\[parquet\]'; or give a .csv"
+        ):
             export(store, tmp_path / "all.parquet")
         store.connection.execute("DROP VIEW measured")
         with pytest.raises(HistoryError, match="no such table: measured"):
@@ -220,7 +262,10 @@ def test_what_cannot_be_exported_is_a_message(path, tmp_path, monkeypatch):
 
 
 def test_a_run_keeps_how_long_it_was_kept_waiting(path):
-    made = [msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, waited=0.004)) for each in records()]
+    made = [
+        msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, waited=0.004))
+        for each in records()
+    ]
     keep(path, made)
     with Store(path) as store:
         (entry,) = read(store).pairs["first", "mujoco", "projection"]
@@ -229,7 +274,9 @@ def test_a_run_keeps_how_long_it_was_kept_waiting(path):
 
 def test_what_has_no_value_in_any_run_is_not_drawn(path, tmp_path):
     def past(error, time):
-        return [Past(run=run, engine="native", max_error=error, us_per_step=time) for run in ("1", "2")]
+        return [
+            Past(run=run, engine="native", max_error=error, us_per_step=time) for run in ("1", "2")
+        ]
 
     assert [*trend_figures(past(None, 2.0), {})] == ["time"]
     assert [*trend_figures(past(0.0, None), {})] == ["error"]
@@ -245,7 +292,10 @@ def test_what_has_no_value_in_any_run_is_not_drawn(path, tmp_path):
 def test_times_that_are_close_are_drawn_over_a_decade():
     """Else a tenth looks like a step; a decade or more is drawn as it is."""
     for factor, spread, ticks in ((1.1, 1.0, "D2"), (20.0, None, "D2"), (2000.0, None, 1)):
-        past = [Past(run=str(k), engine="native", max_error=None, us_per_step=time) for k, time in enumerate((2.0, 2.0 * factor))]
+        past = [
+            Past(run=str(k), engine="native", max_error=None, us_per_step=time)
+            for k, time in enumerate((2.0, 2.0 * factor))
+        ]
         axis = trend_figures(past, {})["time"]["layout"]["yaxis"]
         assert axis["dtick"] == ticks  # 1, 2 and 5 of a few decades
         if spread is None:

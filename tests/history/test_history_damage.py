@@ -1,4 +1,6 @@
-"""A history with a fault costs one message and status 2: never a result, and where one run is damaged, never the others."""
+"""A history with a fault costs one message and status 2: never a result, and where one run is
+damaged, never the others.
+"""
 
 import json
 import sqlite3
@@ -74,7 +76,18 @@ WHOLE_FILE = [directory, no_database, of_another_program, of_a_later_version, cu
 def test_a_history_that_cannot_be_used_costs_no_result(path, tmp_path, capsys, monkeypatch, fault):
     fault(path, monkeypatch)
     out, junit = tmp_path / "out", tmp_path / "junit.xml"
-    command = ["run", "rssr", "--engine", "native", "--history", str(path), "--out", str(out), "--junit", str(junit)]
+    command = [
+        "run",
+        "rssr",
+        "--engine",
+        "native",
+        "--history",
+        str(path),
+        "--out",
+        str(out),
+        "--junit",
+        str(junit),
+    ]
     assert main(command) == 2
     while HELD:
         HELD.pop().close()
@@ -89,10 +102,15 @@ def test_a_history_that_cannot_be_used_costs_no_result(path, tmp_path, capsys, m
 
 
 DAMAGE = {
-    "circumstances": """UPDATE runs SET circumstances = replace(circumstances, '"kincheck":', '"kincheck"!') WHERE id = 2""",
+    "circumstances": (
+        """UPDATE runs SET circumstances = replace(circumstances, '"kincheck":', '"kincheck"!') WHERE id = 2"""
+    ),
     "plan": "UPDATE runs SET plan = replace(plan, '[', '(') WHERE id = 2",
     "a byte of a run": "UPDATE runs SET command = cast(x'61ff62' as text) WHERE id = 2",
-    "a byte of an engine": "UPDATE records SET engine = cast(x'6e61ff697665' as text) WHERE run_id = 2 AND engine = 'native'",
+    "a byte of an engine": (
+        "UPDATE records SET engine = cast(x'6e61ff697665' as text) WHERE run_id = 2 AND engine ="
+        " 'native'"
+    ),
     "a byte of a message": "UPDATE records SET message = cast(x'61ff62' as text) WHERE run_id = 2",
     "errors": "UPDATE records SET errors = substr(errors, 2) WHERE run_id = 2",
     "an outcome": "UPDATE records SET outcome = 'pasd' WHERE run_id = 2",
@@ -118,7 +136,10 @@ def passed_over(capsys, path):
 
 def test_the_other_runs_are_drawn_and_the_new_one_is_kept(damaged, tmp_path, capsys):
     out = tmp_path / "out"
-    assert main(["run", "rssr", "--engine", "native", "--history", str(damaged), "--out", str(out)]) == 2
+    assert (
+        main(["run", "rssr", "--engine", "native", "--history", str(damaged), "--out", str(out)])
+        == 2
+    )
     assert "1 pass" in passed_over(capsys, damaged)
     assert NO_TRENDS not in (out / "report.html").read_text()
     with Store(damaged, writable=False) as store:
@@ -160,7 +181,9 @@ def test_a_run_that_is_removed_is_passed_over_no_more(damaged, capsys):
     assert "run 2 is removed" in capsys.readouterr().out
     with Store(damaged) as store:
         assert [row.id for row in store.runs()] == [3, 1]
-        assert store.connection.execute("SELECT count(*) FROM records WHERE run_id = 2").fetchone() == (0,)
+        assert store.connection.execute(
+            "SELECT count(*) FROM records WHERE run_id = 2"
+        ).fetchone() == (0,)
         assert len(store.records(3)) == 4
     assert main(["history", "--history", str(damaged), "--remove", "2"]) == 2
     assert "there is no run 2" in capsys.readouterr().err
@@ -175,7 +198,9 @@ def test_many_damaged_runs_are_not_told_one_by_one(path, capsys):
     assert "3 more runs cannot be read: 4, 3, 2" in said[-1]
 
 
-def test_damage_that_comes_while_records_are_added_costs_no_result(path, tmp_path, capsys, monkeypatch):
+def test_damage_that_comes_while_records_are_added_costs_no_result(
+    path, tmp_path, capsys, monkeypatch
+):
     add = Store.add_record
 
     def damage_then_add(self, run, record):
@@ -185,7 +210,23 @@ def test_damage_that_comes_while_records_are_added_costs_no_result(path, tmp_pat
 
     monkeypatch.setattr(Store, "add_record", damage_then_add)
     out = tmp_path / "out"
-    assert main(["run", "rssr", "bennett", "four_bar", "--engine", "native", "--history", str(path), "--out", str(out)]) == 2
+    assert (
+        main(
+            [
+                "run",
+                "rssr",
+                "bennett",
+                "four_bar",
+                "--engine",
+                "native",
+                "--history",
+                str(path),
+                "--out",
+                str(out),
+            ]
+        )
+        == 2
+    )
     said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("[")]
     assert len(said) == 1
     assert "the records before bennett native are kept there as run 1" in said[0]

@@ -1,4 +1,6 @@
-"""Runs of the command line that are kept in a history: killed at any moment, on a bad disk, and how they are told apart."""
+"""Runs of the command line that are kept in a history: killed at any moment, on a bad disk, and how
+they are told apart.
+"""
 
 import os
 import random
@@ -29,21 +31,39 @@ def path(tmp_path):
 
 
 def kincheck(*arguments, limit=None, **environment):
-    """The command line with made-up cases and engines: see drill.py. limit: on the size of files [bytes]."""
-    restrict = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit})); " if limit else ""
-    command = [sys.executable, "-c", f"{restrict}import sys; from tests.drill import main; sys.exit(main())", *map(str, arguments)]
+    """The command line with made-up cases and engines: see drill.py. limit: on the size of files
+    [bytes].
+    """
+    restrict = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit})); "
+        if limit
+        else ""
+    )
+    command = [
+        sys.executable,
+        "-c",
+        f"{restrict}import sys; from tests.drill import main; sys.exit(main())",
+        *map(str, arguments),
+    ]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, cwd=ROOT, env={**os.environ, "KINCHECK_HISTORY": "", **environment}, **pipes)
+    return subprocess.Popen(
+        command, cwd=ROOT, env={**os.environ, "KINCHECK_HISTORY": "", **environment}, **pipes
+    )
 
 
 @pytest.mark.skipif(os.name != "posix", reason="limits the size of files as POSIX does")
 def test_a_disk_that_fails_in_the_middle_is_a_message_and_the_results_are_delivered(path):
     """The limit leaves room for some records."""
     Store(path).close()
-    process = kincheck("run", "--jobs", 0, "--engine", "native", "--history", path, "--json", "-", limit=52_000)
+    process = kincheck(
+        "run", "--jobs", 0, "--engine", "native", "--history", path, "--json", "-", limit=52_000
+    )
     out, err = process.communicate()
     assert process.returncode == 2
-    assert f"kincheck: history {path}: cannot be written: disk I/O error; look at the disk: it may be full" in err
+    assert (
+        f"kincheck: history {path}: cannot be written: disk I/O error; look at the disk: it may be"
+        " full" in err
+    )
     assert len(msgspec.json.decode(out)["records"]) == 4
     with Store(path) as store:
         (row,) = store.runs()
@@ -51,17 +71,28 @@ def test_a_disk_that_fails_in_the_middle_is_a_message_and_the_results_are_delive
 
 
 def test_a_history_that_cannot_be_opened_costs_no_result(path):
-    process = kincheck("run", "--engine", "native", "--jobs", 0, "--history", path.parent, "--json", "-")
+    process = kincheck(
+        "run", "--engine", "native", "--jobs", 0, "--history", path.parent, "--json", "-"
+    )
     out, err = process.communicate()
     assert process.returncode == 2
-    expected = "cannot be opened: unable to open database file; give a file in a folder that exists and can be written"
-    assert err.splitlines()[-1] == f"kincheck: history {path.parent}: {expected}; the run is not in the history"
+    expected = (
+        "cannot be opened: unable to open database file; give a file in a folder that exists and"
+        " can be written"
+    )
+    assert (
+        err.splitlines()[-1]
+        == f"kincheck: history {path.parent}: {expected}; the run is not in the history"
+    )
     assert len(msgspec.json.decode(out)["records"]) == 4
 
 
 def test_resume_needs_a_history_and_the_environment_can_name_it(path):
     process = kincheck("run", "--resume")
-    assert "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY" in process.communicate()[1]
+    assert (
+        "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"
+        in process.communicate()[1]
+    )
     assert process.returncode == 2
     process = kincheck("run", "first", "--engine", "native", "--resume", KINCHECK_HISTORY=str(path))
     assert "no run of the same kind without an end: run 1 is new" in process.communicate()[1]
@@ -74,7 +105,9 @@ def test_resume_needs_a_history_and_the_environment_can_name_it(path):
 
 
 def test_a_run_killed_at_any_moment_is_resumed_to_the_same_records(tmp_path):
-    """The moments are drawn over the whole of a run and its ways in and out; one run in three is killed twice."""
+    """The moments are drawn over the whole of a run and its ways in and out; one run in three is
+    killed twice.
+    """
     arguments = ["run", "--jobs", "2", "--history"]
     begin = time.monotonic()
     undisturbed = kincheck(*arguments, tmp_path / "undisturbed.sqlite")
@@ -118,14 +151,20 @@ def test_a_digest_is_of_content():
 def test_the_state_of_a_repository(tmp_path):
     def git(*arguments):
         name = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "init.defaultBranch=trunk"]
-        return subprocess.run(["git", "-C", tmp_path, *name, *arguments], check=True, capture_output=True, text=True).stdout.strip()
+        return subprocess.run(
+            ["git", "-C", tmp_path, *name, *arguments], check=True, capture_output=True, text=True
+        ).stdout.strip()
 
     assert git_state(tmp_path) is None
     git("init")
     (tmp_path / "case.toml").write_text("a")
     git("add", ".")
     git("commit", "-m", "first")
-    assert git_state(tmp_path) == {"commit": git("rev-parse", "HEAD"), "branch": "trunk", "changed": False}
+    assert git_state(tmp_path) == {
+        "commit": git("rev-parse", "HEAD"),
+        "branch": "trunk",
+        "changed": False,
+    }
     (tmp_path / "case.toml").write_text("b")
     git("checkout", "--detach")
     found = git_state(tmp_path)

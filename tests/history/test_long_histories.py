@@ -1,4 +1,6 @@
-"""Reports over many nights: what stays wrong is told every night, what grows slowly is told, and nothing is made up."""
+"""Reports over many nights: what stays wrong is told every night, what grows slowly is told, and
+nothing is made up.
+"""
 
 import os
 from pathlib import Path
@@ -30,11 +32,15 @@ def held_to(factor):
     """A change of errors: all tolerances grow."""
 
     def one(deviation):
-        return deviation and msgspec.structs.replace(deviation, tolerance=factor * deviation.tolerance)
+        return deviation and msgspec.structs.replace(
+            deviation, tolerance=factor * deviation.tolerance
+        )
 
     def change(errors):
         return {
-            output: msgspec.structs.replace(each, **{motion: one(deviation) for motion, deviation in each.items()})
+            output: msgspec.structs.replace(
+                each, **{motion: one(deviation) for motion, deviation in each.items()}
+            )
             for output, each in errors.items()
         }
 
@@ -43,7 +49,12 @@ def held_to(factor):
 
 def without(motion):
     """A change of errors: a motion is not compared any more."""
-    return {"errors": lambda errors: {output: msgspec.structs.replace(each, **{motion: None}) for output, each in errors.items()}}
+    return {
+        "errors": lambda errors: {
+            output: msgspec.structs.replace(each, **{motion: None})
+            for output, each in errors.items()
+        }
+    }
 
 
 def told(found):
@@ -51,7 +62,9 @@ def told(found):
 
 
 def test_another_tolerance_is_no_step_of_the_error(path):
-    """Errors far below the floor, and a tolerance that makes the floor higher than they ever were."""
+    """Errors far below the floor, and a tolerance that makes the floor higher than they ever
+    were.
+    """
     tiny = worse(1e-4)
     for _ in range(3):
         keep(path, changed(records(), **tiny))
@@ -82,9 +95,12 @@ def test_a_file_is_the_run_of_the_history_that_it_came_from(path, tmp_path):
         file.write_bytes(to_json(store.results(2)))
         subject = find(str(file), store)
         assert (subject.number, find_against("last-green", subject, store)[0].number) == (2, 1)
-        other = msgspec.structs.replace(store.results(2), run=store.results(2).run | {"host": "elsewhere"})
+        other = msgspec.structs.replace(
+            store.results(2), run=store.results(2).run | {"host": "elsewhere"}
+        )
         file.write_bytes(to_json(other))
-        subject = find(str(file), store)  # of another machine, and begun when run 2 was: run 3 is later
+        # of another machine, and begun when run 2 was: run 3 is later
+        subject = find(str(file), store)
         assert (subject.number, subject.before) == (None, 3)
     assert told(reported(path, str(file), "1")) == {(Kind.DRIFTED, *FIRST)}
 
@@ -109,7 +125,10 @@ def test_what_is_gone_is_told_for_as_long_as_it_is(path, gone):
 
 def test_an_output_that_the_case_has_no_more_is_told_once(path):
     nights(path, 1)
-    fewer = {"errors": lambda errors: {"x": errors["x"]}, "outputs": lambda outputs: {"x": outputs["x"]}}
+    fewer = {
+        "errors": lambda errors: {"x": errors["x"]},
+        "outputs": lambda outputs: {"x": outputs["x"]},
+    }
     for _ in range(2):
         keep(path, changed(records(), **fewer))
     assert told(reported(path, "2")) == {(Kind.LOST, *FIRST)}
@@ -140,7 +159,11 @@ def test_a_step_that_was_told_is_not_told_again(path):
     nights(path, 3)
     for _ in range(3):
         keep(path, changed(records(), **worse(100.0)))
-    assert [told(reported(path, run)) for run in ("4", "5", "6")] == [{(Kind.DRIFTED, *FIRST)}, set(), set()]
+    assert [told(reported(path, run)) for run in ("4", "5", "6")] == [
+        {(Kind.DRIFTED, *FIRST)},
+        set(),
+        set(),
+    ]
     assert [(step.first, step.last) for step in reported(path).steps] == [(4, 3)]
     assert [each.since for each in reported(path, "4").regressions] == [4]
 
@@ -148,7 +171,9 @@ def test_a_step_that_was_told_is_not_told_again(path):
 def test_a_wide_tolerance_later_does_not_hide_a_step(path):
     for factor, wide in ((1.0, 1.0), (1.0, 1.0), (100.0, 1.0), (100.0, 1e4)):
         keep(path, changed(changed(records(), **worse(factor)), **held_to(wide)))
-    assert [(step.first, step.now / step.before) for step in reported(path).steps] == [(3, pytest.approx(100.0))]
+    assert [(step.first, step.now / step.before) for step in reported(path).steps] == [
+        (3, pytest.approx(100.0))
+    ]
 
 
 def test_the_first_bad_run_may_be_one_that_was_killed(path, capsys):
@@ -156,7 +181,9 @@ def test_the_first_bad_run_may_be_one_that_was_killed(path, capsys):
     bad = changed(records(), outcome=Outcome.FAIL)
     run = keep(path, bad, status="running")
     with Store(path) as store:
-        store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1' WHERE id = ?", (run,))
+        store.connection.execute(
+            "UPDATE runs SET owner = 'a-host-that-is-no-more|1|1' WHERE id = ?", (run,)
+        )
     keep(path, bad)
     (finding,) = reported(path).regressions
     assert finding.since == run
@@ -176,7 +203,15 @@ def test_a_run_that_is_being_made_is_not_reported(path, capsys):
 
 def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_references(path, tmp_path):
     case, engines = crank("first"), [Fake("native"), Fake("mujoco")]
-    kept = begin(path, [case, crank("second")], engines, tol=1e-12, command="kincheck run", settings={}, resume=False)
+    kept = begin(
+        path,
+        [case, crank("second")],
+        engines,
+        tol=1e-12,
+        command="kincheck run",
+        settings={},
+        resume=False,
+    )
     kept.add(next(each for each in records() if (each.case, each.engine) == ("first", "native")))
     kept.store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1'")
     kept.store.close()
@@ -213,7 +248,9 @@ def test_errors_of_zero_leave_any_tolerance_loose(path):
 
 
 def test_an_interrupt_is_no_traceback(capsys, monkeypatch):
-    monkeypatch.setattr("kincheck.core.cli.list._list", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(
+        "kincheck.core.cli.list._list", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
     assert main.main(["list"]) == 130
     assert capsys.readouterr().err == "kincheck: interrupted\n"
 
@@ -225,7 +262,9 @@ def test_a_file_that_cannot_be_finished_leaves_what_stood_there(tmp_path):
 
     file = tmp_path / "report.html"
     file.write_text("yesterday's")
-    assert written(file, half) == [f"{file}: cannot be written (No space left on device); what else was asked for is tried"]
+    assert written(file, half) == [
+        f"{file}: cannot be written (No space left on device); what else was asked for is tried"
+    ]
     assert (file.read_text(), [*tmp_path.iterdir()]) == ("yesterday's", [file])
     link = tmp_path / "latest.html"
     link.symlink_to(file)

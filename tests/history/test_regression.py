@@ -40,11 +40,17 @@ def test_quiet_and_noisy_nights_are_not_reported(path):
 
 def test_one_slow_machine_is_no_slow_engine(path):
     nights(path, 8)
-    slow = [msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, warm=0.04)) for each in records()]
+    slow = [
+        msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, warm=0.04))
+        for each in records()
+    ]
     keep(path, slow, calibration_seconds=0.08)
     assert kinds(reported(path)) == []
     waiting = [
-        msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, warm=0.04, waited=0.03)) for each in records()
+        msgspec.structs.replace(
+            each, seconds=msgspec.structs.replace(each.seconds, warm=0.04, waited=0.03)
+        )
+        for each in records()
     ]
     keep(path, waiting)
     assert kinds(reported(path)) == []
@@ -54,7 +60,13 @@ def test_a_machine_whose_times_scatter_is_given_more(path):
     noise = random.Random(1)
     for _ in range(10):
         keep(
-            path, [changed([each], case=each.case, engine=each.engine, **times(noise.choice((1.0, 2.0))))[0] for each in records()]
+            path,
+            [
+                changed(
+                    [each], case=each.case, engine=each.engine, **times(noise.choice((1.0, 2.0)))
+                )[0]
+                for each in records()
+            ],
         )
     keep(path, changed(records(), **times(3.0)))
     found = reported(path)
@@ -66,7 +78,9 @@ def test_a_machine_whose_times_scatter_is_given_more(path):
 def test_microseconds_are_no_regression(path, warm):
     """From 20 us: the excess is below the floor, then above it."""
     quick = [
-        msgspec.structs.replace(each, seconds=Seconds(build=0.1, first=0.1, warm=2e-5, waited=0.0, compare=0.1))
+        msgspec.structs.replace(
+            each, seconds=Seconds(build=0.1, first=0.1, warm=2e-5, waited=0.0, compare=0.1)
+        )
         for each in records()
     ]
     for _ in range(6):
@@ -87,7 +101,9 @@ def test_on_another_processor_only_the_calibration_loop_is_compared_with(path):
     keep(path, changed(records(), **times(3.0)), processor="another", calibration_seconds=0.06)
     slower = [each.engine + each.case for each in reported(path).findings]
     assert slower == []
-    quick = [changed([each], case=each.case, engine=each.engine, **times(0.25))[0] for each in records()]
+    quick = [
+        changed([each], case=each.case, engine=each.engine, **times(0.25))[0] for each in records()
+    ]
     keep(path, changed(quick, **times(4.0)), processor="another", calibration_seconds=0.005)
     assert kinds(reported(path, against="6")) == [(Kind.SLOWER, *FIRST)]  # 10 ms, as before
 
@@ -99,12 +115,25 @@ PLANTED = {
     "error": (worse(20.0), Kind.DRIFTED, "x position error 5e-13 → 1e-11 m (×20, tolerance 1e-9)"),
     "time": (times(2.0), Kind.SLOWER, " → 20 ms a sweep (×2; by the spread"),
     "phase": (
-        {"outcome": Outcome.ERROR, "message": "no licence", "seconds": Seconds(build=0.1, first=0.05)},
+        {
+            "outcome": Outcome.ERROR,
+            "message": "no licence",
+            "seconds": Seconds(build=0.1, first=0.05),
+        },
         Kind.LOST,
         "warm, compare no longer reached: error: no licence",
     ),
     "acceleration": (
-        {"errors": lambda e: e | {"y": msgspec.structs.replace(e["y"], acceleration=None, reason="the engine gives none")}},
+        {
+            "errors": lambda e: (
+                e
+                | {
+                    "y": msgspec.structs.replace(
+                        e["y"], acceleration=None, reason="the engine gives none"
+                    )
+                }
+            )
+        },
         Kind.LOST,
         "y: acceleration no longer compared: the engine gives none",
     ),
@@ -114,7 +143,11 @@ PLANTED = {
         Kind.LOST,
         "no longer validated: judged against consensus only, before closed form",
     ),
-    "failure": ({"outcome": Outcome.FAIL, "message": "x is off"}, Kind.FAILURE, "pass → fail: x is off"),
+    "failure": (
+        {"outcome": Outcome.FAIL, "message": "x is off"},
+        Kind.FAILURE,
+        "pass → fail: x is off",
+    ),
     "engine": (
         {"outcome": Outcome.UNAVAILABLE, "message": "not installed", "seconds": None},
         Kind.LOST,
@@ -138,14 +171,20 @@ def test_what_is_planted_is_reported_and_named(path, what):
 
 def test_a_changed_engine_version_is_named(path):
     nights(path, 2)
-    newer = [msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in records()]
+    newer = [
+        msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each
+        for each in records()
+    ]
     keep(path, changed(newer, **worse(20.0)), numpy="2.1.0")
     found = reported(path)
     changes = [(each.what, each.before, each.now) for each in found.changes]
     assert changes[:2] == [("mujoco", "4.0.0", "4.1.0"), ("numpy", "2.0.0", "2.1.0")]
     assert [each[0] for each in changes[2:]] == ["commit"]
     text = to_markdown(found)
-    assert text.startswith("## run 3 against run 2 (last green): 1 less accurate; mujoco 4.0.0 → 4.1.0, numpy 2.0.0 → 2.1.0\n")
+    assert text.startswith(
+        "## run 3 against run 2 (last green): 1 less accurate; mujoco 4.0.0 → 4.1.0, numpy 2.0.0 →"
+        " 2.1.0\n"
+    )
     (step,) = found.steps
     assert (step.first, step.last, step.quantity, step.output) == (3, 2, "position", "x")
     assert [str(each) for each in step.changes[:1]] == ["mujoco 4.0.0 → 4.1.0"]
@@ -156,7 +195,11 @@ def test_fixed_added_and_absent_are_said_and_no_regression(path):
     keep(path, broken[:3])
     keep(path, records()[:2] + records()[3:])
     found = reported(path, against="1")
-    assert kinds(found) == [(Kind.FIXED, *FIRST), (Kind.ADDED, "second", "mujoco"), (Kind.ABSENT, "second", "native")]
+    assert kinds(found) == [
+        (Kind.FIXED, *FIRST),
+        (Kind.ADDED, "second", "mujoco"),
+        (Kind.ABSENT, "second", "native"),
+    ]
     assert not found.regressed
 
 
@@ -165,7 +208,9 @@ def test_a_changed_tolerance_is_said(path):
 
     def loosened(errors):
         return errors | {
-            "x": msgspec.structs.replace(errors["x"], position=msgspec.structs.replace(errors["x"].position, tolerance=1e-6))
+            "x": msgspec.structs.replace(
+                errors["x"], position=msgspec.structs.replace(errors["x"].position, tolerance=1e-6)
+            )
         }
 
     keep(path, changed(records(), errors=loosened))
@@ -180,16 +225,24 @@ def test_a_changed_reference_is_said_and_no_regression(tmp_path, capsys):
     edited = [truth.position[0] + 1e-10, *truth.position[1:]]
     references = {
         **RESULTS.references,
-        "first": RESULTS.references["first"] | {"x": msgspec.structs.replace(truth, position=edited)},
+        "first": (
+            RESULTS.references["first"] | {"x": msgspec.structs.replace(truth, position=edited)}
+        ),
     }
     for file, changes in zip(files, ({}, {"references": references}), strict=True):
-        file.write_bytes(to_json(msgspec.structs.replace(RESULTS, run={**FACTS, "started": file.name}, **changes)))
+        file.write_bytes(
+            to_json(
+                msgspec.structs.replace(RESULTS, run={**FACTS, "started": file.name}, **changes)
+            )
+        )
     assert main.main(["report", str(files[0]), "--against", str(files[0])]) == 0
     assert "Reference changed" not in capsys.readouterr().out
     assert main.main(["report", str(files[1]), "--against", str(files[0])]) == 0
     said = capsys.readouterr().out
     assert "Reference changed (2): what passes now is judged by other true values" in said
-    assert "| native, mujoco | first | x position differs by up to 1e-10 m from what it was |" in said
+    assert (
+        "| native, mujoco | first | x position differs by up to 1e-10 m from what it was |" in said
+    )
 
 
 def test_tolerances_that_nothing_needed_are_named_after_ten_runs(path):
@@ -202,9 +255,14 @@ def test_tolerances_that_nothing_needed_are_named_after_ten_runs(path):
         ("second", "x", 10),
         ("second", "y", 10),
     ]
-    assert reported(path).loose[0].factor == pytest.approx(200.0, rel=1e-3)  # 1e-9 over ten times 5e-13
+    # 1e-9 over ten times 5e-13
+    assert reported(path).loose[0].factor == pytest.approx(200.0, rel=1e-3)
     keep(path, changed(records(), case="second", **worse(500.0)))
-    assert [each.case + each.output for each in reported(path).loose] == ["firstx", "firsty", "secondy"]
+    assert [each.case + each.output for each in reported(path).loose] == [
+        "firstx",
+        "firsty",
+        "secondy",
+    ]
 
 
 # Against what
@@ -231,21 +289,41 @@ def test_rules_find_the_run_to_compare_with(path):
     with pytest.raises(KincheckError, match="there is no run 8"):
         reported(path, against="8")
     with pytest.raises(
-        KincheckError, match=r"there is no run 'green'; give a number of the history, a results.json, last-green or"
+        KincheckError,
+        match=(
+            r"there is no run 'green'; give a number of the history, a results.json, last-green or"
+        ),
     ):
         reported(path, against="green")
 
 
 def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
     monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
-    facts = {"host": "a-host", "processor": "a processor", "started": "now", "calibration_seconds": 0.02}
-    for name, made in {"before.json": records(), "now.json": changed(records(), **times(2.0))}.items():
+    facts = {
+        "host": "a-host",
+        "processor": "a processor",
+        "started": "now",
+        "calibration_seconds": 0.02,
+    }
+    for name, made in {
+        "before.json": records(),
+        "now.json": changed(records(), **times(2.0)),
+    }.items():
         (tmp_path / name).write_bytes(to_json(Results(run=facts, records=made)))
     before, now = str(tmp_path / "before.json"), str(tmp_path / "now.json")
     assert main.main(["report", now, "--against", before]) == 1
-    assert "10 → 20 ms a sweep (×2; by the spread from run to run, ×1.75 may be chance)" in capsys.readouterr().out
+    assert (
+        "10 → 20 ms a sweep (×2; by the spread from run to run, ×1.75 may be chance)"
+        in capsys.readouterr().out
+    )
     assert main.main(["report", before, "--against", now]) == 0
     assert main.main(["report", before]) == 0
-    assert "compared with nothing: last-green is found in a history, and there is none" in capsys.readouterr().out
+    assert (
+        "compared with nothing: last-green is found in a history, and there is none"
+        in capsys.readouterr().out
+    )
     assert main.main(["report"]) == 2
-    assert "no run without a history; give --history FILE, or a results.json" in capsys.readouterr().err
+    assert (
+        "no run without a history; give --history FILE, or a results.json"
+        in capsys.readouterr().err
+    )

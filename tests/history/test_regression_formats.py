@@ -34,7 +34,11 @@ def test_the_command_writes_every_format(path, tmp_path, capsys):
     assert "x position error 5e-13 → 1e-11 m" in page
     assert "case-0-trend-time" in page
     root = ET.parse(out / "junit.xml").getroot()
-    failed = [(test.get("classname"), test.get("name")) for test in root.iter("testcase") if test.find("failure") is not None]
+    failed = [
+        (test.get("classname"), test.get("name"))
+        for test in root.iter("testcase")
+        if test.find("failure") is not None
+    ]
     assert failed == [("first.mujoco.projection", "x")]
     assert len(list(root.iter("testcase"))) == 8
 
@@ -42,13 +46,24 @@ def test_the_command_writes_every_format(path, tmp_path, capsys):
 def test_junit_names_what_is_about_a_pair_and_keeps_skips(path):
     nights(path, 6)
     made = changed(
-        changed(records(), **times(2.0)), case="second", outcome=Outcome.UNAVAILABLE, message="not installed", seconds=None
+        changed(records(), **times(2.0)),
+        case="second",
+        outcome=Outcome.UNAVAILABLE,
+        message="not installed",
+        seconds=None,
     )
-    keep(path, changed(made, case="first", engine="native", outcome=Outcome.CRASHED, message="signal 11"))
+    keep(
+        path,
+        changed(made, case="first", engine="native", outcome=Outcome.CRASHED, message="signal 11"),
+    )
     found = reported(path)
     with Store(path) as store:
         root = ET.fromstring(to_regression_junit(store.results(7), found))
-    failed = {f"{test.get('classname')} {test.get('name')}" for test in root.iter("testcase") if test.find("failure") is not None}
+    failed = {
+        f"{test.get('classname')} {test.get('name')}"
+        for test in root.iter("testcase")
+        if test.find("failure") is not None
+    }
     assert failed == {"first.mujoco.projection slower", "second.mujoco.projection lost"}
     assert [suite.get("failures") for suite in root] == ["1", "1"]
     assert [suite.get("skipped") for suite in root] == ["0", "2"]
@@ -58,7 +73,16 @@ def test_junit_names_what_is_about_a_pair_and_keeps_skips(path):
 def test_markdown_takes_foreign_text_as_text_and_folds_what_is_alike(path):
     nights(path, 1)
     message = "</details> | `x` @team"
-    keep(path, [msgspec.structs.replace(each, outcome=Outcome.ERROR, message=message) for each in records()])
+    keep(
+        path,
+        [
+            msgspec.structs.replace(each, outcome=Outcome.ERROR, message=message)
+            for each in records()
+        ],
+    )
     text = to_markdown(reported(path))
-    assert "| native, mujoco | first, second | pass → error: &lt;/details&gt; \\| \\`x\\` @\u2060team" in text
+    assert (
+        "| native, mujoco | first, second | pass → error: &lt;/details&gt; \\| \\`x\\` @\u2060team"
+        in text
+    )
     assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")

@@ -1,4 +1,6 @@
-"""A motion that is another than it was is reported: where there is no reference nothing else would show it."""
+"""A motion that is another than it was is reported: where there is no reference nothing else would
+show it.
+"""
 
 import math
 
@@ -10,7 +12,9 @@ from kincheck.core.history.regression.findings import Kind
 from ..support.nights import changed, keep, records, worse
 from .test_regression import FIRST, reported
 
-SERIES = OutputSeries(position=[0.0, 0.5, None], velocity=[1.0, 1.0, None], acceleration=None, unit="m")
+SERIES = OutputSeries(
+    position=[0.0, 0.5, None], velocity=[1.0, 1.0, None], acceleration=None, unit="m"
+)
 DRIVER = {"turn": [0.0, 0.5, 1.0]}
 
 
@@ -30,21 +34,35 @@ def found_after(path, **now):
     night(path, unjudged=now.get("unjudged", True))
     night(path, **now)
     found = reported(path, against="1")
-    return [(each.kind, each.case, each.engine) for each in found.findings], [each.message for each in found.findings], found
+    return (
+        [(each.kind, each.case, each.engine) for each in found.findings],
+        [each.message for each in found.findings],
+        found,
+    )
 
 
-@pytest.mark.parametrize("values", [{"position": [0.0, -0.5, None]}, {"velocity": [1.0, 1.001, None]}])
+@pytest.mark.parametrize(
+    "values", [{"position": [0.0, -0.5, None]}, {"velocity": [1.0, 1.001, None]}]
+)
 def test_other_values_at_the_same_samples(path, values):
     kinds, messages, found = found_after(path, **values)
     assert kinds == [(Kind.MOVED, *FIRST)]
     assert found.regressed
-    assert f"y {next(iter(values))} differs by up to {'1 m ' if 'position' in values else '1e-3 m/s '}" in messages[0]
+    assert (
+        f"y {next(iter(values))} differs by up to {'1 m ' if 'position' in values else '1e-3 m/s '}"
+        in messages[0]
+    )
 
 
 def test_round_off_and_missing_samples_are_no_other_motion(path):
-    kinds, messages, _ = found_after(path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0])
+    kinds, messages, _ = found_after(
+        path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0]
+    )
     assert kinds == [(Kind.GONE, *FIRST)]
-    assert messages == ["y velocity has no value at 1 of 2 samples that had one, first at turn = 0.5: no reason is given"]
+    assert messages == [
+        "y velocity has no value at 1 of 2 samples that had one, first at turn = 0.5: no reason is"
+        " given"
+    ]
 
 
 @pytest.mark.parametrize(("off", "kinds"), [(1.9e-9, []), (2.1e-9, [(Kind.MOVED, *FIRST)])])

@@ -1,4 +1,6 @@
-"""What a report tells besides errors and times: dof, rank, residuals, units, values that are null now, pairs that are missing."""
+"""What a report tells besides errors and times: dof, rank, residuals, units, values that are null
+now, pairs that are missing.
+"""
 
 import xml.etree.ElementTree as ET
 
@@ -22,7 +24,10 @@ def of_output(output="x", **changes):
     """A change of outputs: of one of them."""
 
     def change(outputs):
-        values = {name: each(getattr(outputs[output], name)) if callable(each) else each for name, each in changes.items()}
+        values = {
+            name: each(getattr(outputs[output], name)) if callable(each) else each
+            for name, each in changes.items()
+        }
         return outputs | {output: msgspec.structs.replace(outputs[output], **values)}
 
     return {"outputs": change}
@@ -42,8 +47,18 @@ TOLD = {
         Kind.RESIDUAL,
         "largest residual 5e-16 → 1e-8 (×2e7)",
     ),
-    "residual of zero": ({"residual_max": 0.0}, {"residual_max": 1e-12}, Kind.RESIDUAL, "largest residual 0 → 1e-12"),
-    "three digits": ({"residual_max": 1e-15}, {"residual_max": 1e-12}, Kind.RESIDUAL, "largest residual 1e-15 → 1e-12 (×1e"),
+    "residual of zero": (
+        {"residual_max": 0.0},
+        {"residual_max": 1e-12},
+        Kind.RESIDUAL,
+        "largest residual 0 → 1e-12",
+    ),
+    "three digits": (
+        {"residual_max": 1e-15},
+        {"residual_max": 1e-12},
+        Kind.RESIDUAL,
+        "largest residual 1e-15 → 1e-12 (×1e",
+    ),
     "no residual": (
         {"residual_max": 5e-16},
         {"residual_max": None, "reasons": {"residual_max": "not asked"}},
@@ -85,7 +100,9 @@ def test_what_differs_is_told_in_every_format(path, tmp_path, capsys, what):
     assert f"{kind.capitalize()} (1)</b>: " in page
     assert message in page
     assert message in (tmp_path / "regressions.json").read_text("utf-8")
-    failures = [each.get("message") for each in ET.parse(tmp_path / "junit.xml").getroot().iter("failure")]
+    failures = [
+        each.get("message") for each in ET.parse(tmp_path / "junit.xml").getroot().iter("failure")
+    ]
     assert [each.startswith(f"{kind}: {message}") for each in failures] == [True] * kind.regression
 
 
@@ -96,7 +113,10 @@ def test_what_differs_is_told_in_every_format(path, tmp_path, capsys, what):
         ({"residual_max": 0.0}, {"residual_max": 2e-16}),
         ({"residual_max": 2e-16}, {"residual_max": 1.9e-13}),
         ({"residual_max": 1e-9}, {"residual_max": 1e-16}),
-        ({"dof": None, "rank": None, "residual_max": None}, {"dof": 1, "rank": 3, "residual_max": 1e-16}),
+        (
+            {"dof": None, "rank": None, "residual_max": None},
+            {"dof": 1, "rank": 3, "residual_max": 1e-16},
+        ),
     ],
     ids=["rounding", "the last place", "less than three digits", "better", "nothing known before"],
 )
@@ -128,20 +148,30 @@ def test_samples_that_are_lost_are_told_once(path):
 # Pairs that are missing
 
 
-def test_missing_cases_and_engines_are_told_and_status_1_where_that_is_asked(path, tmp_path, capsys):
+def test_missing_cases_and_engines_are_told_and_status_1_where_that_is_asked(
+    path, tmp_path, capsys
+):
     nights(path, 2)
     keep(path, [each for each in records() if each.case == "first" and each.engine == "native"])
     assert main.main(["report", "--history", str(path)]) == 0
     said = capsys.readouterr().out
     assert "nothing regressed; 3 not in this run" in said
     assert "| mujoco | first, second | pass there |" in said
-    assert main.main(["report", "--history", str(path), "--missing-is-failure", "--out", str(tmp_path)]) == 1
+    assert (
+        main.main(
+            ["report", "--history", str(path), "--missing-is-failure", "--out", str(tmp_path)]
+        )
+        == 1
+    )
     said = capsys.readouterr().out
     assert said.startswith("## run 3 against run 2 (last green): 3 not in this run")
     assert "**Not in this run (3): " in said
     assert "<details open>" in (tmp_path / "report.html").read_text("utf-8")
     suites = ET.parse(tmp_path / "junit.xml").getroot()
-    assert [(each.get("name"), each.get("failures")) for each in suites] == [("first", "1"), ("second", "2")]
+    assert [(each.get("name"), each.get("failures")) for each in suites] == [
+        ("first", "1"),
+        ("second", "2"),
+    ]
 
 
 def test_a_pair_that_only_the_last_run_had_is_missing_though_that_was_not_green(path, capsys):
@@ -160,7 +190,11 @@ def test_a_pair_that_only_the_last_run_had_is_missing_though_that_was_not_green(
 
 def test_a_run_of_another_command_was_asked_for_something_else(path, capsys):
     keep(path, records()[:2])
-    keep(path, [msgspec.structs.replace(each, case="mine") for each in records()], command="kincheck run mine.toml")
+    keep(
+        path,
+        [msgspec.structs.replace(each, case="mine") for each in records()],
+        command="kincheck run mine.toml",
+    )
     keep(path, records()[:2])
     assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 0
     assert "not in this run" not in capsys.readouterr().out

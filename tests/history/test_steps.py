@@ -1,4 +1,6 @@
-"""Steps in a history: the first bad run, and what else changed there; not what is noise, and not a single slow night."""
+"""Steps in a history: the first bad run, and what else changed there; not what is noise, and not a
+single slow night.
+"""
 
 import math
 import random
@@ -44,7 +46,10 @@ def test_what_comes_and_goes_is_found_exactly(shape, sign):
     """Steps of ten standard deviations, a factor of two in time, up first or down first."""
     lengths, expected = SHAPES[shape]
     level = sign * math.log(2.0) * np.repeat([k % 2 for k in range(len(lengths))], lengths)
-    found = [change_points(noisy(level, 0.0693, seed), least=math.log(1.5), lasting=3) for seed in range(100)]
+    found = [
+        change_points(noisy(level, 0.0693, seed), least=math.log(1.5), lasting=3)
+        for seed in range(100)
+    ]
     assert sum(each == expected for each in found) >= 95
 
 
@@ -84,7 +89,12 @@ def test_noise_has_no_steps():
     """Nights of which one in ten is slow by up to a factor of three."""
     noise = random.Random(7)
     for _ in range(200):
-        values = np.array([noise.gauss(0.0, 0.1) + (noise.random() < 0.1) * noise.uniform(0.0, 1.1) for _ in range(40)])
+        values = np.array(
+            [
+                noise.gauss(0.0, 0.1) + (noise.random() < 0.1) * noise.uniform(0.0, 1.1)
+                for _ in range(40)
+            ]
+        )
         assert change_points(values, least=math.log(1.5), lasting=3) == []
 
 
@@ -95,17 +105,32 @@ def test_a_step_of_time_names_its_first_run_and_the_versions_that_changed(path):
     for _ in range(4):
         keep(path, changed(records(noise=noise), **times(2.0)), python="3.13.0")
     (step,) = found(path)
-    assert (step.case, step.engine, step.quantity, step.first, step.last) == ("first", "mujoco", "time", 9, 8)
+    assert (step.case, step.engine, step.quantity, step.first, step.last) == (
+        "first",
+        "mujoco",
+        "time",
+        9,
+        8,
+    )
     assert step.started == "2026-11-09T03:00:00+00:00"
     assert step.worse
     assert step.now / step.before == pytest.approx(2.0, rel=0.1)
-    assert [str(each) for each in step.changes] == ["python 3.12.3 → 3.13.0", "commit 0808080808 → 0909090909"]
+    assert [str(each) for each in step.changes] == [
+        "python 3.12.3 → 3.13.0",
+        "commit 0808080808 → 0909090909",
+    ]
 
 
 def test_a_step_of_error_needs_one_run_and_names_the_output_that_moved_most(path):
     nights(path, 3)
     both = changed(changed(records(), **worse(20.0, "x")), **worse(200.0, "y"))
-    keep(path, [msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in both])
+    keep(
+        path,
+        [
+            msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each
+            for each in both
+        ],
+    )
     (step,) = found(path)
     assert (step.quantity, step.output, step.first) == ("position", "y", 4)
     assert step.now / step.before == pytest.approx(200.0, rel=1e-3)
@@ -116,7 +141,9 @@ def test_an_outcome_has_a_first_bad_run_and_what_is_over_does_not_stand(path):
     nights(path, 2)
     for _ in range(2):
         keep(path, changed(records(), outcome=Outcome.CRASHED, message="signal 11"))
-    assert [(each.quantity, each.first, each.worse) for each in found(path, standing=True)] == [("outcome", 3, True)]
+    assert [(each.quantity, each.first, each.worse) for each in found(path, standing=True)] == [
+        ("outcome", 3, True)
+    ]
     nights(path, 1)
     assert found(path, standing=True) == []
     assert [(each.first, each.worse) for each in found(path)] == [(5, False), (3, True)]
@@ -144,7 +171,22 @@ def test_the_present_bad_stretch_has_its_own_first_run_and_an_earlier_one_its_re
     assert " · since run 25 |" in said
     assert "ms a sweep since run 25 (" in said
     assert "since run 9" not in said
-    assert main.main(["history", "--case", "first", "--engine", "mujoco", "--last", "0", "--history", str(path)]) == 0
+    assert (
+        main.main(
+            [
+                "history",
+                "--case",
+                "first",
+                "--engine",
+                "mujoco",
+                "--last",
+                "0",
+                "--history",
+                str(path),
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr().out
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
 
@@ -153,7 +195,10 @@ def test_what_is_only_partly_repaired_stands(path):
     noise = random.Random(3)
     for night in range(24):
         keep(path, changed(records(noise=noise), **times((1.0, 8.0, 3.0)[night // 8])))
-    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [(17, False, None), (9, True, None)]
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
+        (17, False, None),
+        (9, True, None),
+    ]
     assert [each.first for each in found(path, standing=True)] == [9]
 
 
@@ -170,7 +215,10 @@ def test_outputs_that_became_worse_one_after_the_other_both_stand(path):
         keep(path, changed(records(), **worse(100.0, "x")))
     for _ in range(4):
         keep(path, changed(changed(records(), **worse(100.0, "x")), **worse(50.0, "y")))
-    assert [(each.output, each.first) for each in found(path, standing=True)] == [("y", 9), ("x", 5)]
+    assert [(each.output, each.first) for each in found(path, standing=True)] == [
+        ("y", 9),
+        ("x", 5),
+    ]
 
 
 def test_a_missing_engine_repairs_nothing(path):
@@ -180,4 +228,7 @@ def test_a_missing_engine_repairs_nothing(path):
         keep(path, changed(records(), outcome=Outcome.UNAVAILABLE, seconds=None, errors={}))
     assert [(each.first, each.repaired) for each in found(path, standing=True)] == [(3, None)]
     nights(path, 1)
-    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [(6, False, None), (3, True, 6)]
+    assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
+        (6, False, None),
+        (3, True, 6),
+    ]

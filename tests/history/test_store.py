@@ -1,4 +1,6 @@
-"""History: what was kept stays, whatever ends the run, the disk or the process; and files of another time or kind."""
+"""History: what was kept stays, whatever ends the run, the disk or the process; and files of
+another time or kind.
+"""
 
 import os
 import sqlite3
@@ -35,8 +37,12 @@ def path(tmp_path):
 
 
 def kept(path, cases, engines, *, resume=False, stop=None):
-    """A run in a history, which ends by force after so many records; the run's number and what it gave."""
-    keeping = keep(path, cases, engines, tol=TOL, command="kincheck run", settings={"jobs": 0}, resume=resume)
+    """A run in a history, which ends by force after so many records; the run's number and what it
+    gave.
+    """
+    keeping = keep(
+        path, cases, engines, tol=TOL, command="kincheck run", settings={"jobs": 0}, resume=resume
+    )
 
     def made(record, done, total):
         keeping.add(record)
@@ -44,7 +50,9 @@ def kept(path, cases, engines, *, resume=False, stop=None):
             raise KeyboardInterrupt
 
     try:
-        results = run(cases, engines, tol=TOL, progress=made, made=keeping.made, facts=keeping.facts)
+        results = run(
+            cases, engines, tol=TOL, progress=made, made=keeping.made, facts=keeping.facts
+        )
         keeping.end(results, interrupted=False)
     except KeyboardInterrupt:
         keeping.store.close()
@@ -58,7 +66,10 @@ def test_a_run_is_read_as_it_was(path):
     with Store(path, writable=False) as store:
         (row,) = store.runs()
         assert store.results(keeping.run) == results
-        columns = "outcome, validated, version, build_seconds, warm_seconds, solved, json_extract(errors, '$.y.velocity.max_abs')"
+        columns = (
+            "outcome, validated, version, build_seconds, warm_seconds, solved, json_extract(errors,"
+            " '$.y.velocity.max_abs')"
+        )
         query = f"SELECT {columns} FROM records WHERE case_name = 'a' AND engine = ?"
         assert store.connection.execute(query, ["broken"]).fetchone()[:3] == ("error", 0, "1.2")
         wrong = store.connection.execute(query, ["wrong"]).fetchone()
@@ -68,7 +79,16 @@ def test_a_run_is_read_as_it_was(path):
     assert (row.status, row.command) == ("finished", "kincheck run")
     assert row.started <= row.finished
     assert row.circumstances["calibration_seconds"] > 0
-    assert set(row.circumstances) >= {"host", "processor", "python", "numpy", "kincheck", "git", "jobs", "tol"}
+    assert set(row.circumstances) >= {
+        "host",
+        "processor",
+        "python",
+        "numpy",
+        "kincheck",
+        "git",
+        "jobs",
+        "tol",
+    }
 
 
 def test_references_are_there_once_however_many_runs_have_them(path):
@@ -105,7 +125,8 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_records(path, stop):
     assert second.run == first.run
     assert second.resumed
     assert len(second.made) == stop
-    assert (ENGINES[0].solves == solved[0]) is (stop > 5)  # both native answers are there from then on
+    # both native answers are there from then on
+    assert (ENGINES[0].solves == solved[0]) is (stop > 5)
     assert timeless(results.records) == timeless(undisturbed.records)
     assert results.run == second.facts | {"engines": undisturbed.run["engines"]}
     with Store(path) as store:
@@ -118,7 +139,14 @@ def test_only_the_same_run_without_an_end_is_resumed(path, monkeypatch):
     stopped, _ = kept(path, [case], ENGINES, stop=1)
     others = {
         "case": ([replace(case, name="other")], ENGINES),
-        "grid": ([replace(case, sweep=replace(case.sweep, values=case.sweep.values * (1 + 1e-16) + 1e-17))], ENGINES),
+        "grid": (
+            [
+                replace(
+                    case, sweep=replace(case.sweep, values=case.sweep.values * (1 + 1e-16) + 1e-17)
+                )
+            ],
+            ENGINES,
+        ),
         "engines": ([case], ENGINES[:-1]),
     }
     for cases, engines in others.values():
@@ -126,7 +154,8 @@ def test_only_the_same_run_without_an_end_is_resumed(path, monkeypatch):
     for git in ({"commit": "b" * 40, "changed": False}, None):
         with monkeypatch.context() as elsewhere:
             elsewhere.setattr("kincheck.core.harness.provenance.git_state", lambda _, git=git: git)
-            assert not kept(path, [case], ENGINES, resume=True)[0].resumed  # other code may give other records
+            # other code may give other records
+            assert not kept(path, [case], ENGINES, resume=True)[0].resumed
     assert kept(path, [crank()], ENGINES, resume=True)[0].run == stopped.run  # equal, and made anew
     assert not kept(path, [case], ENGINES, resume=True)[0].resumed  # it has an end now
 
@@ -136,12 +165,17 @@ def test_a_run_is_not_taken_from_a_process_that_is_at_it(path):
         run_number = store.begin_run("same", [], {"started": "now", "command": ""})
         other = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
         with other:
-            theirs = owner().replace(f"|{os.getpid()}|", f"|{other.pid}|").rpartition("|")[0] + "|" + begun(other.pid)
+            theirs = (
+                owner().replace(f"|{os.getpid()}|", f"|{other.pid}|").rpartition("|")[0]
+                + "|"
+                + begun(other.pid)
+            )
             assert alive(theirs)
             store.connection.execute("UPDATE runs SET owner = ?", [theirs])
             assert store.resume_run("same") is None
             other.kill()
-            os.waitid(os.P_PID, other.pid, os.WEXITED | os.WNOWAIT)  # it has ended, and nobody has asked how
+            # it has ended, and nobody has asked how
+            os.waitid(os.P_PID, other.pid, os.WEXITED | os.WNOWAIT)
             assert not alive(theirs)
         assert not alive(theirs)
         assert store.resume_run("same").id == run_number
@@ -173,7 +207,10 @@ with Store(Path(sys.argv[1])) as store:
 def test_runs_at_once_do_not_disturb_each_other(path):
     """From the making of the file on."""
     writers = [
-        subprocess.Popen([sys.executable, "-c", WRITER, path], cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(3)
+        subprocess.Popen(
+            [sys.executable, "-c", WRITER, path], cwd=ROOT, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(3)
     ]
     said = [writer.communicate()[0].split() for writer in writers]
     assert sorted(said) == [["1", "True"], ["2", "True"], ["3", "True"]]
@@ -204,7 +241,13 @@ for k in range(80):
 
 def test_a_new_file_is_opened_by_several_at_once(tmp_path):
     """A thousandth of a second apart, while one of them is making the tables."""
-    ran = subprocess.run([sys.executable, "-c", OPENERS, tmp_path], cwd=ROOT, capture_output=True, text=True, check=True)
+    ran = subprocess.run(
+        [sys.executable, "-c", OPENERS, tmp_path],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert ran.stdout == ""
     assert len(list(tmp_path.glob("*.sqlite"))) == 80
 
@@ -219,13 +262,19 @@ def test_an_older_file_is_migrated_and_keeps_its_data(path, monkeypatch):
     with Store(path) as store:
         assert store.results(keeping.run) == results
         assert store.connection.execute("SELECT note FROM runs").fetchall() == [("kept; too",)]
-        assert store.connection.execute("PRAGMA user_version").fetchone() == (len(schema.MIGRATIONS),)
+        assert store.connection.execute("PRAGMA user_version").fetchone() == (
+            len(schema.MIGRATIONS),
+        )
 
 
 def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
     keeping, results = kept(path, [crank()], ENGINES)
     with monkeypatch.context() as patch:
-        patch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"))
+        patch.setattr(
+            schema,
+            "MIGRATIONS",
+            (*schema.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"),
+        )
         with pytest.raises(HistoryError, match="table runs already exists"):
             Store(path)
     with Store(path) as store:
@@ -237,7 +286,9 @@ def test_a_file_of_a_later_version_is_left_alone(path):
     with Store(path) as store:
         store.connection.execute("PRAGMA user_version = 99")
     for writable in (True, False):
-        with pytest.raises(HistoryError, match=r"schema is version 99, this kincheck knows \d+; update kincheck"):
+        with pytest.raises(
+            HistoryError, match=r"schema is version 99, this kincheck knows \d+; update kincheck"
+        ):
             Store(path, writable=writable)
 
 
@@ -255,11 +306,16 @@ def test_a_file_of_another_program_is_left_alone(path):
 
 
 def test_places_that_cannot_be_are_messages(tmp_path):
-    with pytest.raises(HistoryError, match="unable to open database file; give a file in a folder that exists"):
+    with pytest.raises(
+        HistoryError, match="unable to open database file; give a file in a folder that exists"
+    ):
         Store(tmp_path / "no" / "history.sqlite")
     with pytest.raises(HistoryError, match="there is no such file"):
         Store(tmp_path / "none.sqlite", writable=False)
-    with Store(tmp_path / "empty.sqlite") as store, pytest.raises(HistoryError, match="there is no run 7"):
+    with (
+        Store(tmp_path / "empty.sqlite") as store,
+        pytest.raises(HistoryError, match="there is no run 7"),
+    ):
         store.results(7)
 
 
@@ -275,7 +331,9 @@ def test_a_damaged_record_is_a_message(path):
 
 
 def full_after(path, pages):
-    """A history file that can grow by so many pages: SQLite then says what it says of a full disk."""
+    """A history file that can grow by so many pages: SQLite then says what it says of a full
+    disk.
+    """
     store = Store(path)
     (count,) = store.connection.execute("PRAGMA page_count").fetchone()
     store.connection.execute(f"PRAGMA max_page_count = {count + pages}")
@@ -290,7 +348,10 @@ def test_a_full_disk_is_a_message_and_what_was_kept_stays(path):
     results = run(cases, ENGINES[:1], tol=TOL, progress=lambda record, *_: keeping.add(record))
     keeping.end(results, interrupted=False)
     (problem,) = keeping.problems
-    assert problem.startswith(f"history {path}: cannot be written: database or disk is full; make room; the records before ")
+    assert problem.startswith(
+        f"history {path}: cannot be written: database or disk is full; make room; the records"
+        " before "
+    )
     assert len(results.records) == 40  # the run went on
     with Store(path) as store:
         found = store.records(keeping.run)

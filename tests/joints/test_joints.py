@@ -1,14 +1,25 @@
-"""Every joint type against the paper's unsimplified equations, on its manifold: row space, right-hand sides, freedoms.
+"""Every joint type against the paper's unsimplified equations, on its manifold: row space,
+right-hand sides, freedoms.
 
-The joints are discovered; a type without an example here, or without its equations in naive.JOINTS, fails. Rows may differ from
-the exact ones where a joint has others to make up for it; what must agree is what they forbid.
+The joints are discovered; a type without an example here, or without its equations in naive.JOINTS,
+fails. Rows may differ from the exact ones where a joint has others to make up for it; what must
+agree is what they forbid.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from kincheck.core import Body, JointAngle, Mechanism, MechanismError, Point, PointCoordinate, SolveError, solve
+from kincheck.core import (
+    Body,
+    JointAngle,
+    Mechanism,
+    MechanismError,
+    Point,
+    PointCoordinate,
+    SolveError,
+    solve,
+)
 from kincheck.core import joints as library
 from kincheck.core.algebra import Quat, Vec3
 from kincheck.core.joints import Attachment, Joint
@@ -41,7 +52,9 @@ EXAMPLES = {
     "universal": lambda kind: kind(*NAMES, P, SQUARE),
 }
 
-TYPES = sorted(name for name, joint in Joint.registry.items() if joint.__module__.startswith(library.__name__))
+TYPES = sorted(
+    name for name, joint in Joint.registry.items() if joint.__module__.startswith(library.__name__)
+)
 
 
 def product(p, q):
@@ -62,25 +75,36 @@ def moved(body, step):
 def jacobian(residual, i, j):
     """Derivative of a residual (i, j) by (dr_i, dpi_i', dr_j, dpi_j'), by complex steps."""
     steps = 1e-30j * np.eye(12)
-    return np.column_stack([residual(moved(i, step[:6]), moved(j, step[6:])).imag / 1e-30 for step in steps])
+    return np.column_stack(
+        [residual(moved(i, step[:6]), moved(j, step[6:])).imag / 1e-30 for step in steps]
+    )
 
 
 class Example:
-    """A joint between two bodies that have moved together, and a little against each other as the joint lets them."""
+    """A joint between two bodies that have moved together, and a little against each other as the
+    joint lets them.
+    """
 
     def __init__(self, name, seed, against=0.4):
         assert name in EXAMPLES, f"joint type {name!r} is not tested: add it to EXAMPLES here"
-        assert name in naive.JOINTS, f"joint type {name!r} is not tested: add its unsimplified equations to naive.JOINTS"
+        assert name in naive.JOINTS, (
+            f"joint type {name!r} is not tested: add its unsimplified equations to naive.JOINTS"
+        )
         rng = np.random.default_rng([seed, TYPES.index(name)])
         self.joint = EXAMPLES[name](Joint.registry[name])
         self.i0, self.j0 = random_body(rng), random_body(rng)
         common = random_body(rng)
-        self.i, j = (naive.Body(common.r + common.A @ b.r, product(common.p, b.p)) for b in (self.i0, self.j0))
+        self.i, j = (
+            naive.Body(common.r + common.A @ b.r, product(common.p, b.p))
+            for b in (self.i0, self.j0)
+        )
         step = against * rng.normal(size=6)
         for _ in range(20):  # off by a random step, then back to the manifold by the shortest ones
             j = moved(j, step)
             j = naive.Body(j.r, j.p / np.linalg.norm(j.p))
-            step = -np.linalg.pinv(jacobian(self.residual, self.i, j)[:, 6:]) @ self.residual(self.i, j)
+            step = -np.linalg.pinv(jacobian(self.residual, self.i, j)[:, 6:]) @ self.residual(
+                self.i, j
+            )
             if np.abs(step).max() < 1e-14:
                 break
         self.j, self.rng = j, rng
@@ -95,34 +119,53 @@ class Example:
     @property
     def poses(self):
         """The native poses: displacement and rotation since design."""
-        turns = (product(now.p, before.p * [1, -1, -1, -1]) for before, now in ((self.i0, self.i), (self.j0, self.j)))
+        turns = (
+            product(now.p, before.p * [1, -1, -1, -1])
+            for before, now in ((self.i0, self.i), (self.j0, self.j))
+        )
         shifts = (now.r - before.r for before, now in ((self.i0, self.i), (self.j0, self.j)))
-        return [Pose.of(Vec3(*u), Quat(q[0], Vec3(*q[1:]))) for u, q in zip(shifts, turns, strict=True)]
+        return [
+            Pose.of(Vec3(*u), Quat(q[0], Vec3(*q[1:]))) for u, q in zip(shifts, turns, strict=True)
+        ]
 
     @property
     def rows(self):
         """The native rows over the paper's unknowns."""
-        blocks = [[*row.ri, *(self.i.A.T @ [*row.pi]), *row.rj, *(self.j.A.T @ [*row.pj])] for row in self.each("rows")]
+        blocks = [
+            [*row.ri, *(self.i.A.T @ [*row.pi]), *row.rj, *(self.j.A.T @ [*row.pj])]
+            for row in self.each("rows")
+        ]
         return np.array(blocks)
 
     def each(self, method, *arguments):
-        return [value for primitive in self.primitives for value in getattr(primitive, method)(*self.poses, *arguments)]
+        return [
+            value
+            for primitive in self.primitives
+            for value in getattr(primitive, method)(*self.poses, *arguments)
+        ]
 
     def gamma(self, v):
         """Native right-hand sides at the paper's velocities."""
-        motions = [Twist(Vec3(*v[k : k + 3]), Vec3(*(b.A @ v[k + 3 : k + 6]))) for k, b in ((0, self.i), (6, self.j))]
+        motions = [
+            Twist(Vec3(*v[k : k + 3]), Vec3(*(b.A @ v[k + 3 : k + 6])))
+            for k, b in ((0, self.i), (6, self.j))
+        ]
         return np.array(self.each("gamma", *motions))
 
 
 def threaded(example):
-    """The last of the naive rows of a screw couples its coordinates, which is no primitive of the joint."""
+    """The last of the naive rows of a screw couples its coordinates, which is no primitive of the
+    joint.
+    """
     return len(getattr(example.joint, "relations", ()))
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", TYPES)
 def test_joint_forbids_what_the_paper_forbids(name, seed):
-    """On the manifold: native residuals vanish, the branch is the intended one, and the rows span the exact ones."""
+    """On the manifold: native residuals vanish, the branch is the intended one, and the rows span
+    the exact ones.
+    """
     example = Example(name, seed)
     assert np.abs(example.residual(example.i, example.j)).max() < 1e-14
     assert np.abs(example.each("phi")).max() < 1e-14
@@ -141,13 +184,20 @@ def test_joint_forbids_what_the_paper_forbids(name, seed):
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", TYPES)
 def test_joint_accelerates_as_the_paper_says(name, seed):
-    """Any admissible velocity, any acceleration with rows . acceleration = gamma: the exact second derivative vanishes."""
+    """Any admissible velocity, any acceleration with rows . acceleration = gamma: the exact second
+    derivative vanishes.
+    """
     example = Example(name, seed)
     rows = example.rows
     free = np.eye(12) - np.linalg.pinv(rows) @ rows
     v = free @ example.rng.normal(size=12)
     a = np.linalg.pinv(rows) @ example.gamma(v) + free @ example.rng.normal(size=12)
-    path = naive.along({"i": (example.i.r, example.i.p, v[:6], a[:6]), "j": (example.j.r, example.j.p, v[6:], a[6:])})
+    path = naive.along(
+        {
+            "i": (example.i.r, example.i.p, v[:6], a[:6]),
+            "j": (example.j.r, example.j.p, v[6:], a[6:]),
+        }
+    )
     phi, phi_t, phi_tt = naive.taylor(lambda t: example.residual(path(t)["i"], path(t)["j"]))
     held = len(phi) - threaded(example)
     assert np.abs(phi_t[:held]).max() < 1e-13
@@ -158,13 +208,18 @@ def test_joint_accelerates_as_the_paper_says(name, seed):
 def test_freedoms_are_those_that_are_left(name):
     joint = EXAMPLES[name](Joint.registry[name])
     left = 6 - joint.rows
-    # those of a screw are two names for one freedom; a distance joint names none, as nothing drives them
-    assert len(joint.freedoms) == (0 if name == "distance" else left + len(getattr(joint, "relations", ())))
+    # those of a screw are two names for one freedom; a distance joint names none, as nothing drives
+    # them
+    assert len(joint.freedoms) == (
+        0 if name == "distance" else left + len(getattr(joint, "relations", ()))
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in TYPES if Joint.registry[name].symmetric])
 def test_exchanged_bodies(name):
-    """A joint forbids the same with its bodies exchanged, unless its geometry belongs to one of them."""
+    """A joint forbids the same with its bodies exchanged, unless its geometry belongs to one of
+    them.
+    """
     example = Example(name, 5)
     joint = example.joint
     back = joint.reversed()
@@ -178,13 +233,25 @@ def test_exchanged_bodies(name):
     assert np.abs(there.each("phi")).max() < 1e-14
 
 
-@pytest.mark.parametrize("annotation", ["tuple[float, float, float]", "Vector", tuple[float, float, float]])
+@pytest.mark.parametrize(
+    "annotation", ["tuple[float, float, float]", "Vector", tuple[float, float, float]]
+)
 def test_a_field_of_several_numbers_says_what_they_are(annotation):
     """Else it were taken for a number, and no specimen but its default tried."""
-    body = {"__annotations__": {"axis": annotation}, "axis": (0.0, 0.0, 1.0), "freedoms": ("rotation",)}
-    with pytest.raises(MechanismError, match=r"Mine: axis holds several numbers, .*; declare it as axis: ... = pos"):
+    body = {
+        "__annotations__": {"axis": annotation},
+        "axis": (0.0, 0.0, 1.0),
+        "freedoms": ("rotation",),
+    }
+    with pytest.raises(
+        MechanismError, match=r"Mine: axis holds several numbers, .*; declare it as axis: ... = pos"
+    ):
         type("Mine", (Joint,), body)
-    kept = {"__annotations__": {"axis": annotation, "known": "ClassVar[tuple[str, ...]]"}, "axis": direction(), "known": ()}
+    kept = {
+        "__annotations__": {"axis": annotation, "known": "ClassVar[tuple[str, ...]]"},
+        "axis": direction(),
+        "known": (),
+    }
     assert issubclass(type("Mine", (Joint,), kept), Joint)
 
 
@@ -201,10 +268,24 @@ def test_a_joint_that_measures_no_coordinate_cannot_be_driven(monkeypatch):
         axis: tuple[float, float, float] = direction()
 
         def primitives(self, i, j):
-            return library.Revolute(self.name, self.i, self.j, self.point, self.axis).primitives(i, j)
+            return library.Revolute(self.name, self.i, self.j, self.point, self.axis).primitives(
+                i, j
+            )
 
-    hinge, point = Unmeasured("h", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), Point("p", "a", (1.0, 0.0, 0.0))
-    with pytest.raises(SolveError, match=r"driver 't' \(joint_angle\): joint 'h' is unmeasured, which measures no .*AxialJoint"):
+    hinge, point = (
+        Unmeasured("h", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Point("p", "a", (1.0, 0.0, 0.0)),
+    )
+    with pytest.raises(
+        SolveError,
+        match=(
+            r"driver 't' \(joint_angle\): joint 'h' is unmeasured, which measures no .*AxialJoint"
+        ),
+    ):
         solve(Mechanism("m", [Body("a")], [hinge], [point], [JointAngle("t", "h")]), "t", [0.0])
-    driven = Mechanism("m", [Body("a")], [hinge], [point], [PointCoordinate("t", "p", (0.0, 1.0, 0.0))])
-    assert solve(driven, "t", [0.5]).points["p"].position[0] == pytest.approx([0.75**0.5, 0.5, 0.0], abs=1e-15)
+    driven = Mechanism(
+        "m", [Body("a")], [hinge], [point], [PointCoordinate("t", "p", (0.0, 1.0, 0.0))]
+    )
+    assert solve(driven, "t", [0.5]).points["p"].position[0] == pytest.approx(
+        [0.75**0.5, 0.5, 0.0], abs=1e-15
+    )

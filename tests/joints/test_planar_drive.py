@@ -1,4 +1,6 @@
-"""The turn of a planar joint, driven and coupled: a ladder against the wall, by its closed form, in every engine."""
+"""The turn of a planar joint, driven and coupled: a ladder against the wall, by its closed form, in
+every engine.
+"""
 
 import math
 from dataclasses import replace
@@ -27,11 +29,15 @@ from kincheck.core.kinematics.formulation.constraints import Style
 TILT, RATIO, RATE = 0.3, -1.5, 2.0
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TURNS = np.linspace(-0.25, 8.0, 34)
-"""More than one turn: what follows an angle by its sine alone, or by arctan, is off by some of them."""
+"""More than one turn: what follows an angle by its sine alone, or by arctan, is off by some of
+them.
+"""
 
 
 def ladder(bodies, axis):
-    """A ladder of 1 m that lies in a plane, its foot on the floor and its head at the wall, geared to a wheel, and turned."""
+    """A ladder of 1 m that lies in a plane, its foot on the floor and its head at the wall, geared
+    to a wheel, and turned.
+    """
     foot, head = (math.cos(TILT), 0.0, 0.0), (0.0, math.sin(TILT), 0.0)
     return Mechanism(
         "ladder",
@@ -42,13 +48,23 @@ def ladder(bodies, axis):
             InPlane("floor", "ground", "ladder", foot, Y),
             Revolute("axle", "ground", "wheel", (2.0, 0.0, 0.0), Z),
         ],
-        [Point("foot", "ladder", foot), Point("head", "ladder", head), Point("rim", "wheel", (2.5, 0.0, 0.0))],
+        [
+            Point("foot", "ladder", foot),
+            Point("head", "ladder", head),
+            Point("rim", "wheel", (2.5, 0.0, 0.0)),
+        ],
         [JointAngle("turn", "plane")],
         [Gear("gear", ("axle", "plane"), RATIO)],
     )
 
 
-@pytest.fixture(params=[(("ground", "ladder"), Z), (("ladder", "ground"), Z), (("ground", "ladder"), (0.0, 0.0, -2.0))])
+@pytest.fixture(
+    params=[
+        (("ground", "ladder"), Z),
+        (("ladder", "ground"), Z),
+        (("ground", "ladder"), (0.0, 0.0, -2.0)),
+    ]
+)
 def case(request):
     """With the angle's sense by the order of bodies and by the axis."""
     bodies, axis = request.param
@@ -61,9 +77,20 @@ def case(request):
         "head": Series(np.sin(slope), s * np.cos(slope), -(s**2) * np.sin(slope)),
         "rim": Series(0.5 * np.sin(wheel), 0.5 * w * np.cos(wheel), -0.5 * w**2 * np.sin(wheel)),
     }
-    outputs = [Output(name, name, along, False, 1e-12, 0.0, "round-off") for name, along in (("foot", X), ("head", Y), ("rim", Y))]
+    outputs = [
+        Output(name, name, along, False, 1e-12, 0.0, "round-off")
+        for name, along in (("foot", X), ("head", Y), ("rim", Y))
+    ]
     sweep = Sweep("turn", TURNS, RATE)
-    return Case("ladder", "closed form", Truth.CLOSED_FORM, ladder(bodies, axis), sweep, tuple(outputs), reference)
+    return Case(
+        "ladder",
+        "closed form",
+        Truth.CLOSED_FORM,
+        ladder(bodies, axis),
+        sweep,
+        tuple(outputs),
+        reference,
+    )
 
 
 @pytest.mark.parametrize("style", Style)
@@ -71,27 +98,39 @@ def test_every_formulation_turns_it(case, style):
     found = solve(case.mechanism, "turn", TURNS, rate=RATE, style=style)
     assert found.solved.all(), found.message
     for output in case.outputs:
-        motion, true, along = found.points[output.point], case.reference[output.name], np.array(output.direction)
+        motion, true, along = (
+            found.points[output.point],
+            case.reference[output.name],
+            np.array(output.direction),
+        )
         np.testing.assert_allclose(motion.position @ along, true.position, rtol=0, atol=1e-14)
         np.testing.assert_allclose(motion.velocity @ along, true.velocity, rtol=0, atol=1e-14)
-        np.testing.assert_allclose(motion.acceleration @ along, true.acceleration, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(
+            motion.acceleration @ along, true.acceleration, rtol=0, atol=1e-13
+        )
 
 
 def test_every_engine_turns_it(case):
-    engines = [each for each in map(adapters.engine, adapters.ENGINES) if each.version() is not None]
+    engines = [
+        each for each in map(adapters.engine, adapters.ENGINES) if each.version() is not None
+    ]
     for record in run([case], engines, tol=1e-12).records:
         assert record.outcome is Outcome.PASS, record
 
 
 @pytest.mark.parametrize("name", ["mujoco-projecting", "pinocchio", "exudyn-static"])
 def test_the_simulators_own_solvers_turn_it_too(case, name):
-    """Of those with drift by what they drift; a turn lost, or of the other sense, is off by a metre."""
+    """Of those with drift by what they drift; a turn lost, or of the other sense, is off by a
+    metre.
+    """
     engine = adapters.engine(name, "simulate")
     if engine.version() is None:
         pytest.skip("not installed")
     m = case.mechanism  # without the gear, which is beyond some of them
     alone = replace(m, bodies=m.bodies[:1], joints=m.joints[:3], points=m.points[:2], couplers=())
-    loose = replace(case, mechanism=alone, outputs=tuple(replace(each, atol=1e-2) for each in case.outputs[:2]))
+    loose = replace(
+        case, mechanism=alone, outputs=tuple(replace(each, atol=1e-2) for each in case.outputs[:2])
+    )
     (record,) = run([loose], [engine], tol=1e-12).records
     for name in ("foot", "head"):
         assert record.errors[name].position.within, record
@@ -100,6 +139,10 @@ def test_the_simulators_own_solvers_turn_it_too(case, name):
 def test_its_translations_are_none_that_a_driver_names():
     mechanism = ladder(("ground", "ladder"), Z)
     with pytest.raises(
-        MechanismError, match=r"joint 'plane' is planar and has no translation to drive; its freedoms: translation x, "
+        MechanismError,
+        match=(
+            r"joint 'plane' is planar and has no translation to drive; its freedoms:"
+            r" translation x, "
+        ),
     ):
         replace(mechanism, drivers=[JointDisplacement("shift", "plane")])

@@ -1,4 +1,6 @@
-"""Drivers that give a coordinate itself, not its change from the design: one arm, whose tip is driven, against its closed form."""
+"""Drivers that give a coordinate itself, not its change from the design: one arm, whose tip is
+driven, against its closed form.
+"""
 
 from dataclasses import replace
 
@@ -36,14 +38,19 @@ def test_values_are_the_coordinate_itself():
     found = solve(ARM, "y", HEIGHTS, rate=2.0)
     tip = found.points["tip"]
     assert found.solved.all()
-    assert tip.position[:, :2] == pytest.approx(np.stack([np.sqrt(1.0 - HEIGHTS**2), HEIGHTS], axis=1), abs=ROUND_OFF)
+    assert tip.position[:, :2] == pytest.approx(
+        np.stack([np.sqrt(1.0 - HEIGHTS**2), HEIGHTS], axis=1), abs=ROUND_OFF
+    )
     assert tip.velocity[:, 1] == pytest.approx(2.0, abs=ROUND_OFF)
     assert "beyond y = 1 (wanted y = 1.2)" in solve(ARM, "y", [1.2]).message
 
 
 def test_a_relative_one_is_measured_from_the_design():
     relative = replace(ARM, drivers=[replace(ARM.drivers[0], relative=True)])
-    one, other = solve(ARM, "y", HEIGHTS).points["tip"], solve(relative, "y", HEIGHTS - 0.6).points["tip"]
+    one, other = (
+        solve(ARM, "y", HEIGHTS).points["tip"],
+        solve(relative, "y", HEIGHTS - 0.6).points["tip"],
+    )
     assert one.position == pytest.approx(other.position, abs=ROUND_OFF)
     assert [each.design_value("y") for each in (ARM, relative)] == [pytest.approx(0.6), 0.0]
 
@@ -55,13 +62,18 @@ def test_motions_of_further_drivers_are_absolute_too():
         [Body("sleeve")],
         [Cylindrical("sleeve", "ground", "sleeve", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
         [Point("tip", "sleeve", (0.8, 0.6, 0.5))],
-        [PointCoordinate("y", "tip", (0.0, 1.0, 0.0)), PointCoordinate("z", "tip", (0.0, 0.0, 1.0), relative=False)],
+        [
+            PointCoordinate("y", "tip", (0.0, 1.0, 0.0)),
+            PointCoordinate("z", "tip", (0.0, 0.0, 1.0), relative=False),
+        ],
     )
     times = np.linspace(0.0, 0.2, 5)
     wave = Sine(0.5, 1.0, np.pi / 2.0)  # 0.5 at time zero
     for motion in (wave, Absolute(wave, 0.5)):  # as case files have it: not wrapped again
         found = solve(sleeve, "y", times, motions={"z": motion})
-        assert found.points["tip"].position[:, 2] == pytest.approx(0.5 * np.cos(2.0 * np.pi * times), abs=ROUND_OFF)
+        assert found.points["tip"].position[:, 2] == pytest.approx(
+            0.5 * np.cos(2.0 * np.pi * times), abs=ROUND_OFF
+        )
     slide = replace(sleeve, drivers=[sleeve.drivers[0], JointDisplacement("z", "sleeve")])
     found = solve(slide, "y", times, motions={"z": Ramp(1.0)})
     assert found.points["tip"].position[:, 2] == pytest.approx(0.5 + times, abs=ROUND_OFF)
@@ -69,7 +81,12 @@ def test_motions_of_further_drivers_are_absolute_too():
 
 def test_designs_that_move_the_driven_point_are_refused():
     at = {"points.tip.position": np.array([[0.8, 0.6, 0.0], [0.8, 0.5, 0.0]])}
-    with pytest.raises(SolveError, match=r"'y' gives the absolute position of a point that varies, points\.tip\.position; drive"):
+    with pytest.raises(
+        SolveError,
+        match=(
+            r"'y' gives the absolute position of a point that varies, points\.tip\.position; drive"
+        ),
+    ):
         solve_designs(ARM, "y", HEIGHTS, at)
     hinge = {"joints.hinge.point": np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])}
     found = solve_designs(ARM, "y", HEIGHTS, hinge).points["tip"].position
@@ -77,14 +94,27 @@ def test_designs_that_move_the_driven_point_are_refused():
 
 
 def test_sensitivities_hold_the_coordinate_where_the_point_moves():
-    """x = sqrt(X^2 + Y^2 - y^2): by Y it is Y / x, at a height that is given; relative, it moves along: (Y - y) / x."""
-    outputs = tuple(Output(name, "tip", along, False, 1e-9, 0.0, "test") for name, along in (("x", (1, 0, 0)), ("y", (0, 1, 0))))
+    """x = sqrt(X^2 + Y^2 - y^2): by Y it is Y / x, at a height that is given; relative, it moves
+    along: (Y - y) / x.
+    """
+    outputs = tuple(
+        Output(name, "tip", along, False, 1e-9, 0.0, "test")
+        for name, along in (("x", (1, 0, 0)), ("y", (0, 1, 0)))
+    )
     for relative, expected in ((False, {"x": 0.6, "y": 0.0}), (True, {"x": 0.6 - 0.7, "y": 1.0})):
         mechanism = replace(ARM, drivers=[replace(ARM.drivers[0], relative=relative)])
         design = mechanism.design_value("y")
         sweep = Sweep("y", np.array([0.7 - 0.6 + design]), design=design)
-        found = diagnose(Case("arm", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs), samples=1, tol=1e-12)
-        known = {each.output: each.by_sample[0] for each in found.sensitivities if each.number == "points.tip.position y"}
+        found = diagnose(
+            Case("arm", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs),
+            samples=1,
+            tol=1e-12,
+        )
+        known = {
+            each.output: each.by_sample[0]
+            for each in found.sensitivities
+            if each.number == "points.tip.position y"
+        }
         x = np.sqrt(1.0 - 0.7**2)
         assert known["x"] == pytest.approx(expected["x"] / x, abs=1e-14)
         assert known.get("y", 0.0) == pytest.approx(expected["y"], abs=1e-14)

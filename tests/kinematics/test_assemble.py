@@ -1,4 +1,6 @@
-"""Assembly from estimates: the intended pose from far, other assemblies told apart, nothing spurious."""
+"""Assembly from estimates: the intended pose from far, other assemblies told apart, nothing
+spurious.
+"""
 
 from dataclasses import replace
 
@@ -12,7 +14,9 @@ STARTS = 200
 
 
 def turned(body, angle, shift, rng):
-    """Estimates of a body: turned by the angle [rad] about random axes and shifted by about `shift` [m]."""
+    """Estimates of a body: turned by the angle [rad] about random axes and shifted by about `shift`
+    [m].
+    """
     axis = rng.normal(size=(STARTS, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     e0, e = np.cos(0.5 * angle), np.sin(0.5 * angle) * axis
@@ -23,36 +27,57 @@ def turned(body, angle, shift, rng):
 
 def at_design(mechanism):
     """The poses at design, as an estimate."""
-    return {body.name: (np.array(body.origin), np.array(body.euler_parameters)) for body in mechanism.moving}
+    return {
+        body.name: (np.array(body.origin), np.array(body.euler_parameters))
+        for body in mechanism.moving
+    }
 
 
 def perturbed(mechanism, angle, shift, rng, n=STARTS):
     """Estimates of all bodies from poses at design, turned and shifted."""
-    return {body.name: tuple(each[:n] for each in turned(body, angle, shift, rng)) for body in mechanism.moving}
+    return {
+        body.name: tuple(each[:n] for each in turned(body, angle, shift, rng))
+        for body in mechanism.moving
+    }
 
 
 def is_home(mechanism, origins):
-    """Whether the origins, of each body an array of shape (..., 3), are those at design; NaN is not."""
-    apart = [np.abs(origins[body.name] - np.array(body.origin)).max(axis=-1) for body in mechanism.moving]
+    """Whether the origins, of each body an array of shape (..., 3), are those at design; NaN is
+    not.
+    """
+    apart = [
+        np.abs(origins[body.name] - np.array(body.origin)).max(axis=-1) for body in mechanism.moving
+    ]
     return np.max(apart, axis=0) < 1e-9
 
 
 def found_from(mechanism, angle, shift, style="mixed"):
-    """Shares (that converge, that end at the design, that are spurious) from estimates perturbed in all bodies."""
-    found = assemble(mechanism, perturbed(mechanism, angle, shift, np.random.default_rng(3)), style=style)
+    """Shares (that converge, that end at the design, that are spurious) from estimates perturbed in
+    all bodies.
+    """
+    found = assemble(
+        mechanism, perturbed(mechanism, angle, shift, np.random.default_rng(3)), style=style
+    )
     home = is_home(mechanism, {name: motion.r for name, motion in found.bodies.items()})
     assert (found.residual[found.converged] <= 1e-12).all()
     return found.converged.mean(), home.mean(), found.spurious.mean()
 
 
-@pytest.mark.parametrize(("angle", "shift"), [(0.01, 0.01), (0.3, 0.03), (0.8, 0.08), (0.8, 0.2), (1.2, 0.12)])
+@pytest.mark.parametrize(
+    ("angle", "shift"), [(0.01, 0.01), (0.3, 0.03), (0.8, 0.08), (0.8, 0.2), (1.2, 0.12)]
+)
 def test_errors_up_to_a_radian_are_always_mended(angle, shift):
     assert found_from(mcpherson(), angle, shift) == (1.0, 1.0, 0.0)
 
 
-@pytest.mark.parametrize(("angle", "shift", "share"), [(0.8, 1.0, 0.7), (0.8, 2.0, 0.5), (1.2, 1.0, 0.6), (2.0, 0.2, 0.4)])
+@pytest.mark.parametrize(
+    ("angle", "shift", "share"),
+    [(0.8, 1.0, 0.7), (0.8, 2.0, 0.5), (1.2, 1.0, 0.6), (2.0, 0.2, 0.4)],
+)
 def test_metres_of_offset_are_mostly_mended_and_the_rest_are_other_assemblies(angle, shift, share):
-    """Measured 81, 60, 68 and 46 %; the rest ends in other assemblies or, rarely, nowhere: never on a zero that is none."""
+    """Measured 81, 60, 68 and 46 %; the rest ends in other assemblies or, rarely, nowhere: never on
+    a zero that is none.
+    """
     converged, home, spurious = found_from(mcpherson(), angle, shift)
     assert converged >= 0.95
     assert home >= share
@@ -60,8 +85,13 @@ def test_metres_of_offset_are_mostly_mended_and_the_rest_are_other_assemblies(an
 
 
 def test_what_contradicts_redundant_rows_is_no_assembly(monkeypatch):
-    """A hinge 2e-10 out of line is accepted as rounding; with a limit below that, it is told as spurious."""
-    tilted = [replace(each, axis=(2e-10, 1.0, 0.0)) if each.name == "C" else each for each in four_bar().joints]
+    """A hinge 2e-10 out of line is accepted as rounding; with a limit below that, it is told as
+    spurious.
+    """
+    tilted = [
+        replace(each, axis=(2e-10, 1.0, 0.0)) if each.name == "C" else each
+        for each in four_bar().joints
+    ]
     mechanism = replace(four_bar(), joints=tilted)
     start = perturbed(mechanism, 0.1, 0.0, np.random.default_rng(1), 4)
     assert assemble(mechanism, start, {"turn": 1.0}).converged.all()
@@ -98,12 +128,15 @@ def test_damping_is_what_mends_offsets(monkeypatch):
 def test_poses_close_in_the_papers_variables():
     mechanism = mcpherson()
     rng = np.random.default_rng(5)
-    found = assemble(mechanism, {b.name: turned(b, 0.4, 0.05, rng) for b in mechanism.moving}, {"stroke": 0.05})
+    found = assemble(
+        mechanism, {b.name: turned(b, 0.4, 0.05, rng) for b in mechanism.moving}, {"stroke": 0.05}
+    )
     assert found.converged.all()
     expected = solve(mechanism, "stroke", [0.05], bodies=[b.name for b in mechanism.moving])
     for body in mechanism.moving:
         assert np.abs(found.bodies[body.name].r - expected.bodies[body.name].r).max() <= 1e-14
-        products = np.abs(found.bodies[body.name].p @ expected.bodies[body.name].p[0])  # p and -p are one rotation
+        # p and -p are one rotation
+        products = np.abs(found.bodies[body.name].p @ expected.bodies[body.name].p[0])
         assert np.abs(products - 1.0).max() <= 1e-14
 
 
@@ -121,7 +154,11 @@ def test_a_driven_joint_may_be_turns_away(angle):
 def test_estimates_that_lead_nowhere_are_nan():
     mechanism = mcpherson()
     knuckle = mechanism.body("knuckle")
-    found = assemble(mechanism, {"knuckle": (np.array([knuckle.origin]), np.array([knuckle.euler_parameters]))}, {"stroke": 0.6})
+    found = assemble(
+        mechanism,
+        {"knuckle": (np.array([knuckle.origin]), np.array([knuckle.euler_parameters]))},
+        {"stroke": 0.6},
+    )
     assert not found.converged.any()
     assert np.isnan(found.bodies["knuckle"].r).all()
 
@@ -133,9 +170,14 @@ def test_without_estimates_it_closes_from_the_design():
 
 @pytest.mark.parametrize("close", [assemble, find_assemblies])
 def test_names_that_are_not_there_are_told(close):
-    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no moving body 'crnk'; did you mean 'crank'\?"):
+    with pytest.raises(
+        SolveError,
+        match=rf"{close.__name__}: there is no moving body 'crnk'; did you mean 'crank'\?",
+    ):
         close(four_bar(), {"crnk": (np.zeros((1, 3)), np.zeros((1, 4)))})
-    with pytest.raises(SolveError, match=rf"{close.__name__}: there is no driver 'trn'; did you mean 'turn'\?"):
+    with pytest.raises(
+        SolveError, match=rf"{close.__name__}: there is no driver 'trn'; did you mean 'turn'\?"
+    ):
         close(four_bar(), {}, {"trn": 0.1})
 
 
@@ -148,11 +190,19 @@ def test_estimates_of_what_does_not_move_or_of_other_shapes_are_refused():
     with pytest.raises(SolveError, match="find_assemblies: there is no moving body 'wall'"):
         find_assemblies(mechanism, {"wall": (r[0], p[0])})
     first, second = (body.name for body in mechanism.moving[:2])
-    with pytest.raises(SolveError, match=rf"origin r of body '{second}': shape \(3, 3\), expected \(2, 3\)"):
+    with pytest.raises(
+        SolveError, match=rf"origin r of body '{second}': shape \(3, 3\), expected \(2, 3\)"
+    ):
         assemble(mechanism, {first: (r, p), second: (np.zeros((3, 3)), np.ones((3, 4)))})
-    with pytest.raises(SolveError, match=rf"Euler parameters p of body '{first}': shape \(2, 3\), expected \(2, 4\)"):
+    with pytest.raises(
+        SolveError,
+        match=rf"Euler parameters p of body '{first}': shape \(2, 3\), expected \(2, 4\)",
+    ):
         assemble(mechanism, {first: (r, r)})
-    with pytest.raises(SolveError, match=rf"find_assemblies: origin r of body '{first}': shape \(2, 3\), expected \(3,\)"):
+    with pytest.raises(
+        SolveError,
+        match=rf"find_assemblies: origin r of body '{first}': shape \(2, 3\), expected \(3,\)",
+    ):
         find_assemblies(mechanism, {first: (r, p)})
 
 
@@ -160,7 +210,11 @@ def test_estimates_of_what_does_not_move_or_of_other_shapes_are_refused():
 def test_a_tolerance_that_is_none_is_refused(tol):
     """All that is not closed would be, or nothing."""
     for close in (assemble, find_assemblies):
-        with pytest.raises(SolveError, match=f"{close.__name__}: tol is {tol}, expected a positive number"):
+        with pytest.raises(
+            SolveError, match=f"{close.__name__}: tol is {tol}, expected a positive number"
+        ):
             close(four_bar(), {}, tol=tol)
-    with pytest.raises(SolveError, match="find_assemblies: samples is -1, expected a positive number"):
+    with pytest.raises(
+        SolveError, match="find_assemblies: samples is -1, expected a positive number"
+    ):
         find_assemblies(four_bar(), {}, samples=-1)

@@ -1,4 +1,6 @@
-"""All assemblies of a mechanism: as many as geometry says, each closed by the paper's own equations, ranked, and exported."""
+"""All assemblies of a mechanism: as many as geometry says, each closed by the paper's own
+equations, ranked, and exported.
+"""
 
 import json
 import re
@@ -14,17 +16,22 @@ from ..support.exported import READERS, read
 from ..support.mechanisms import four_bar, mcpherson
 from .test_assemble import at_design, is_home, perturbed
 
-# Residuals of 1e-12 at the most, through the lever of a mechanism: the paper's equations differ from ours by a factor of size one.
+# Residuals of 1e-12 at the most, through the lever of a mechanism: the paper's equations differ
+# from ours by a factor of size one.
 CLOSED = 1e-11
 
 
 def closes(mechanism, assembly):
-    """Whether the poses satisfy the paper's equations, which know nothing of the code that found them."""
+    """Whether the poses satisfy the paper's equations, which know nothing of the code that found
+    them.
+    """
     now = {name: naive.Body(r, p) for name, (r, p) in assembly.poses.items()}
     return np.abs(naive.residuals(mechanism, now)).max() <= CLOSED
 
 
-@pytest.mark.parametrize("mechanism", [four_bar(), cases.load("rssr").mechanism], ids=["four_bar", "rssr"])
+@pytest.mark.parametrize(
+    "mechanism", [four_bar(), cases.load("rssr").mechanism], ids=["four_bar", "rssr"]
+)
 def test_a_four_bar_has_two_assemblies_that_its_branch_tells_apart(mechanism):
     found = find_assemblies(mechanism, at_design(mechanism), samples=40, spread=None)
     assert len(found.found) == 2
@@ -36,7 +43,8 @@ def test_a_four_bar_has_two_assemblies_that_its_branch_tells_apart(mechanism):
     assert -1 in other.signs.values()
     assert here.starts + other.starts + found.lost == found.starts
     assert found.spurious == 0
-    assert min(here.starts, other.starts) >= 5  # of 40, half of which may be anywhere: both are found easily
+    # of 40, half of which may be anywhere: both are found easily
+    assert min(here.starts, other.starts) >= 5
 
 
 def test_the_other_assembly_of_the_four_bar_is_its_mirror_image():
@@ -51,14 +59,23 @@ def test_the_other_assembly_of_the_four_bar_is_its_mirror_image():
 
 
 def test_nearest_of_many_starts_is_the_intended_assembly():
-    """0.8 rad and a metre of offset: one start ends elsewhere every fifth time; the nearest of many hardly ever."""
+    """0.8 rad and a metre of offset: one start ends elsewhere every fifth time; the nearest of many
+    hardly ever.
+    """
     mechanism, rng = mcpherson(), np.random.default_rng(11)
     estimates, right = perturbed(mechanism, 0.8, 1.0, rng, 30), 0
     for k in range(30):
-        found = find_assemblies(mechanism, {name: (r[k], p[k]) for name, (r, p) in estimates.items()}, samples=24, seed=k)
+        found = find_assemblies(
+            mechanism,
+            {name: (r[k], p[k]) for name, (r, p) in estimates.items()},
+            samples=24,
+            seed=k,
+        )
         assert found.spurious == 0
         assert all(closes(mechanism, each) for each in found.found)
-        assert [each.distance for each in found.found] == sorted(each.distance for each in found.found)
+        assert [each.distance for each in found.found] == sorted(
+            each.distance for each in found.found
+        )
         right += is_home(mechanism, {name: r for name, (r, _) in found.found[0].poses.items()})
     assert right >= 27
 
@@ -73,19 +90,24 @@ def test_a_body_of_unknown_pose_may_be_anywhere():
 
 def test_the_same_seed_finds_the_same():
     mechanism = mcpherson()
-    one, same, other = (find_assemblies(mechanism, {}, samples=30, seed=seed, spread=None) for seed in (4, 4, 5))
+    one, same, other = (
+        find_assemblies(mechanism, {}, samples=30, seed=seed, spread=None) for seed in (4, 4, 5)
+    )
     assert [each.starts for each in one.found] == [each.starts for each in same.found]
     assert [each.starts for each in one.found] != [each.starts for each in other.found]
 
 
 def test_the_delta_robot_has_two_assemblies_with_a_level_platform_and_others():
-    """A level platform is where three spheres meet, above or below; with the rods of a pair crossed it is tilted."""
+    """A level platform is where three spheres meet, above or below; with the rods of a pair crossed
+    it is tilted.
+    """
     mechanism = cases.load("delta_robot").mechanism
     found = find_assemblies(mechanism, at_design(mechanism), samples=150, spread=None).found
     assert all(closes(mechanism, each) for each in found)
     level = np.array(mechanism.body("platform").euler_parameters)
     assert sum(abs(abs(each.poses["platform"][1] @ level) - 1.0) < 1e-9 for each in found) == 2
-    assert 10 <= len(found) <= 40  # measured 16; a platform on six rods has 40 at most (Dietmaier 1998)
+    # measured 16; a platform on six rods has 40 at most (Dietmaier 1998)
+    assert 10 <= len(found) <= 40
 
 
 def test_a_gough_platform_has_several():
@@ -97,9 +119,13 @@ def test_a_gough_platform_has_several():
 
 
 def test_assemblies_that_meet_are_one_and_singular():
-    """A chain of four-bars on one side of which a loop has folded flat: poses there are known to half the digits only."""
+    """A chain of four-bars on one side of which a loop has folded flat: poses there are known to
+    half the digits only.
+    """
     case = cases.load("iftomm_n_four_bar")
-    found = find_assemblies(case.mechanism, at_design(case.mechanism), {case.sweep.driver: 0.3}, samples=60, spread=None)
+    found = find_assemblies(
+        case.mechanism, at_design(case.mechanism), {case.sweep.driver: 0.3}, samples=60, spread=None
+    )
     singular = [each for each in found.found if each.smallest < 1e-5]
     assert singular
     assert all(closes(case.mechanism, each) for each in found.found)
@@ -107,7 +133,21 @@ def test_assemblies_that_meet_are_one_and_singular():
 
 
 def test_the_command_lists_and_writes_them(tmp_path, capsys):
-    assert main(["assemblies", "rssr", "--at", "0.5", "--samples", "40", "--json", str(tmp_path / "found.json")]) == 0
+    assert (
+        main(
+            [
+                "assemblies",
+                "rssr",
+                "--at",
+                "0.5",
+                "--samples",
+                "40",
+                "--json",
+                str(tmp_path / "found.json"),
+            ]
+        )
+        == 0
+    )
     out = capsys.readouterr().out
     assert "rssr at crank = 0.5: 2 assemblies from 40 starts (seed 0)" in out
     assert out.count("intended ") >= 1
@@ -132,13 +172,32 @@ def test_beyond_its_reach_it_has_none(capsys):
 def test_a_simulator_starts_in_the_assembly_that_was_chosen(to, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mechanism = cases.load("four_bar").mechanism
-    argv = ["assemblies", "four_bar", "--at", "1.0", "--samples", "30", "--json", "found.json", "--export", to, "--number", "2"]
+    argv = [
+        "assemblies",
+        "four_bar",
+        "--at",
+        "1.0",
+        "--samples",
+        "30",
+        "--json",
+        "found.json",
+        "--export",
+        to,
+        "--number",
+        "2",
+    ]
     assert main([*argv, "--out", "model"]) == 0
     main_ending = {"mjcf": ".xml", "exudyn": ".py", "urdf": ".urdf"}[to]
-    texts = {file.name.removeprefix("model") or main_ending: file.read_text() for file in tmp_path.glob("model*")}
+    texts = {
+        file.name.removeprefix("model") or main_ending: file.read_text()
+        for file in tmp_path.glob("model*")
+    }
     found = read(to, texts, mechanism, tmp_path)
     if to == "mjcf":  # hinges have turned the short way
-        assert all(abs(float(each)) <= np.pi for each in re.search('qpos="([^"]*)"', texts[".xml"])[1].split())
+        assert all(
+            abs(float(each)) <= np.pi
+            for each in re.search('qpos="([^"]*)"', texts[".xml"])[1].split()
+        )
     assert np.abs(found.residuals).max() <= 1e-12
     chosen = json.loads((tmp_path / "found.json").read_text())["assemblies"][1]
     for name, pose in chosen["bodies"].items():

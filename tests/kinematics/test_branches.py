@@ -1,8 +1,20 @@
-"""Which zeros of a primitive are meant, and whether Newton's iteration finds them (formulation sections 3 and 4)."""
+"""Which zeros of a primitive are meant, and whether Newton's iteration finds them (formulation
+sections 3 and 4).
+"""
 
 import numpy as np
 import pytest
-from kincheck.core import Body, ConstantVelocity, Gear, JointAngle, JointDisplacement, Mechanism, Point, Revolute, Translational
+from kincheck.core import (
+    Body,
+    ConstantVelocity,
+    Gear,
+    JointAngle,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    Revolute,
+    Translational,
+)
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
 from kincheck.core.kinematics.solve import solve
@@ -28,9 +40,14 @@ SPURIOUS = [rotation(axis, np.pi) for axis in (X, Y, Z)] + [
 
 @pytest.mark.parametrize("turn", SPURIOUS)
 def test_dot12_has_none_of_the_papers_spurious_zeros(turn):
-    """(17) vanishes at seven wrong rotations, of 180 and 120 degrees; the Euler parameters do not (formulation section 3)."""
+    """(17) vanishes at seven wrong rotations, of 180 and 120 degrees; the Euler parameters do not
+    (formulation section 3).
+    """
     at = naive.Body(np.zeros(3), np.array([*turn]))
-    wrong = min(np.abs(naive.dot12(naive.GROUND, other, np.eye(3), np.eye(3))).max() for other in (at, transposed(at)))
+    wrong = min(
+        np.abs(naive.dot12(naive.GROUND, other, np.eye(3), np.eye(3))).max()
+        for other in (at, transposed(at))
+    )
     assert wrong <= 1e-15
     assert np.linalg.norm(p.Dot12().phi(GROUND_POSE, Pose.of(ZERO, turn))) > 1.7
 
@@ -61,10 +78,18 @@ def test_branch_of_dot11(rng):
 
 
 def test_branch_of_constant_velocity():
-    """A half turn about an axis near the shaft has no twist either; bent to 175 degrees the branch is still the intended one."""
+    """A half turn about an axis near the shaft has no twist either; bent to 175 degrees the branch
+    is still the intended one.
+    """
     shafts = p.ConstantVelocity(X, Y, X, Y)
-    bends = [rotation(axis, angle) for axis in (X, Y, Vec3(0.6, 0.8, 0.0)) for angle in (0.0, 1.5, -1.5, 2.2, 3.05)]
-    half_turns = [rotation(axis, np.pi) for axis in (Z, Vec3(0.6, 0.0, 0.8), Vec3(0.0, -0.96, 0.28))]
+    bends = [
+        rotation(axis, angle)
+        for axis in (X, Y, Vec3(0.6, 0.8, 0.0))
+        for angle in (0.0, 1.5, -1.5, 2.2, 3.05)
+    ]
+    half_turns = [
+        rotation(axis, np.pi) for axis in (Z, Vec3(0.6, 0.0, 0.8), Vec3(0.0, -0.96, 0.28))
+    ]
     for turn, right in [*((turn, True) for turn in bends), *((turn, False) for turn in half_turns)]:
         over = Pose.of(ZERO, turn)
         assert abs(shafts.phi(GROUND_POSE, over)[0]) < 1e-15
@@ -72,16 +97,22 @@ def test_branch_of_constant_velocity():
 
 
 def test_a_shaft_is_bent_up_to_where_it_is_folded():
-    """Two shafts of one speed, the second on a carrier that is turned from straight to 175 degrees: their turns stay the same."""
+    """Two shafts of one speed, the second on a carrier that is turned from straight to 175 degrees:
+    their turns stay the same.
+    """
     joints = [
         Revolute("spin", "ground", "first", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         Revolute("bend", "ground", "carrier", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         Revolute("bearing", "carrier", "second", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        ConstantVelocity("cv", "first", "second", (0.0, 0.0, 0.0), ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))),
+        ConstantVelocity(
+            "cv", "first", "second", (0.0, 0.0, 0.0), ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+        ),
     ]
     bodies = [Body(name) for name in ("first", "carrier", "second")]
     drivers = [JointAngle("turn", "spin"), JointAngle("fold", "bend")]
-    mechanism = Mechanism("shafts", bodies, joints, [Point("rim", "second", (1.0, 0.0, 0.0))], drivers)
+    mechanism = Mechanism(
+        "shafts", bodies, joints, [Point("rim", "second", (1.0, 0.0, 0.0))], drivers
+    )
     fold = np.radians(np.linspace(0.0, 175.0, 36))
     found = solve(mechanism, "fold", fold, motions={"turn": Ramp(0.7)})
     assert found.solved.all(), found.message
@@ -100,7 +131,9 @@ def test_of_the_native_primitives_these_need_a_branch_test(rng):
 
 
 def newton_from(q, primitive, rows, iterations):
-    """Newton's iteration of body j against the ground, smallest step; the poses it reaches, lane by lane."""
+    """Newton's iteration of body j against the ground, smallest step; the poses it reaches, lane by
+    lane.
+    """
     for _ in range(iterations):
         j = Pose.of(ZERO, q)
         J = np.array([lanes(row) for row in rows(j)]).transpose(2, 0, 1)
@@ -120,9 +153,11 @@ def exact(primitive):
 
 
 def test_basin_of_dot12(rng):
-    """From any orientation to the identity; formulation section 4 has the same of RotX with theta = 0.
+    """From any orientation to the identity; formulation section 4 has the same of RotX with theta =
+    0.
 
-    Of the two quaternions of an orientation, that of the turn below 180 degrees: a march arrives with it.
+    Of the two quaternions of an orientation, that of the turn below 180 degrees: a march arrives
+    with it.
     """
     q = orientation(rng)
     sign = np.sign(q.e0)
@@ -131,7 +166,9 @@ def test_basin_of_dot12(rng):
 
 
 def test_basin_of_dot11(rng):
-    """From any orientation to h_j = +h_i with the simplified rows; with the exact ones often to -h_i."""
+    """From any orientation to h_j = +h_i with the simplified rows; with the exact ones often to
+    -h_i.
+    """
     q, dot11 = orientation(rng), p.Dot11(X, Y, Z)
     reached = newton_from(q, dot11, simplified(dot11), 12)
     assert np.abs(dot11.phi(GROUND_POSE, reached)).max() < 1e-14
@@ -142,9 +179,10 @@ def test_basin_of_dot11(rng):
 
 @pytest.mark.parametrize("degrees", [1.0, 30.0, 66.0, 80.0, 100.0, 150.0, 179.0])
 def test_one_step_of_dot11(degrees):
-    """Isolated, a misalignment a is turned back by 2 atan(sin(a) / 2) with the simplified rows, which always shrinks it, and by
-    2 atan(tan(a) / 2) with the exact ones: forward, beyond 90 degrees. (Turned back by the full angle instead of its tangent,
-    the exact ones fail beyond 66.8 degrees; formulation section 3.)"""
+    """Isolated, a misalignment a is turned back by 2 atan(sin(a) / 2) with the simplified rows,
+    which always shrinks it, and by 2 atan(tan(a) / 2) with the exact ones: forward, beyond 90
+    degrees. (Turned back by the full angle instead of its tangent, the exact ones fail beyond 66.8
+    degrees; formulation section 3.)"""
     dot11, a = p.Dot11(X, Y, Z), np.radians(degrees)
     start = rotation(X, np.full(LANES, a))
     for rows, tangent in ((simplified, 0.5 * np.sin(a)), (exact, 0.5 * np.tan(a))):
@@ -171,7 +209,9 @@ def test_driven_angle_over_three_turns():
 
 @pytest.mark.parametrize("coupled", [False, True])
 def test_branch_of_driven_angle(coupled):
-    """A turn too few or too many is a zero as well, from which the rows lead away; of a coordinate it is asked at its own value."""
+    """A turn too few or too many is a zero as well, from which the rows lead away; of a coordinate
+    it is asked at its own value.
+    """
     theta = np.linspace(-6.0, 6.0, LANES)
     j = Pose.of(ZERO, rotation(Z, theta))
     for turns, sign in ((0, 1.0), (1, -1.0), (-1, -1.0)):
@@ -186,7 +226,14 @@ def test_branch_of_driven_angle(coupled):
     bodies, couplers = [Body("wheel"), Body("other")], [Gear("gear", ("second", "first"), 0.5)]
     used = slice(None) if coupled else slice(1)
     point = Point("rim", "wheel", (1.0, 0.0, 0.0))
-    mechanism = Mechanism("wheels", bodies[used], joints[used], [point], [JointAngle("turn", "first")], couplers if coupled else ())
+    mechanism = Mechanism(
+        "wheels",
+        bodies[used],
+        joints[used],
+        [point],
+        [JointAngle("turn", "first")],
+        couplers if coupled else (),
+    )
     turn = np.linspace(-20.0, 20.0, 9)
     found = solve(mechanism, "turn", turn)
     assert found.points["rim"].position[:, 0] == pytest.approx(np.cos(turn), abs=1e-14)
@@ -195,7 +242,9 @@ def test_branch_of_driven_angle(coupled):
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
 @pytest.mark.parametrize("turns", [1, 2, 3, -1, -4])
 def test_a_turn_between_two_samples_is_not_lost(turns, style):
-    """A wheel stands, makes whole turns and stands again: where it stands it says nothing of them, but the wheel it drives does."""
+    """A wheel stands, makes whole turns and stands again: where it stands it says nothing of them,
+    but the wheel it drives does.
+    """
     rest, move = np.arange(101) * 0.01, np.linspace(0.0, 1.0, 7)[1:-1]
     times = np.concatenate([rest - 1.0, 0.04 * move, 0.04 + rest])
     values = 2.0 * np.pi * turns * np.concatenate([0.0 * rest, move, 1.0 + 0.0 * rest])
@@ -214,7 +263,9 @@ def test_a_turn_between_two_samples_is_not_lost(turns, style):
     )
     clock = np.array([0.0, 1.0])
     indexed = Table(tuple(times + 0.5), tuple(values))
-    found = solve(mechanism, "clock", 0.01 * clock, rate=0.01, motions={"turn": indexed}, style=style)
+    found = solve(
+        mechanism, "clock", 0.01 * clock, rate=0.01, motions={"turn": indexed}, style=style
+    )
     assert found.solved.all(), found.message
     angle = 0.25 * indexed.at(clock)[0]
     expected = np.stack([1.0 + 0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0 * angle], axis=1)

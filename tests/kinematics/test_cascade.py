@@ -1,4 +1,6 @@
-"""Components solved one after the other: the same motions as all at once, whatever the mechanism, and programs are shared."""
+"""Components solved one after the other: the same motions as all at once, whatever the mechanism,
+and programs are shared.
+"""
 
 from pathlib import Path as File
 
@@ -33,16 +35,24 @@ def assert_alike(found, expected):
     assert found.solved.all(), found.message
     assert expected.solved.all()
     for name, motion in expected.bodies.items():
-        # two orders of elimination: round-off of one times the condition, once more for each derivative (library: below 100)
+        # two orders of elimination: round-off of one times the condition, once more for each
+        # derivative (library: below 100)
         for label, limit in (("r", 1e-14), ("p", 1e-14), ("v", 1e-13), ("a", 3e-12)):
-            assert np.abs(getattr(found.bodies[name], label) - getattr(motion, label)).max() <= limit
+            assert (
+                np.abs(getattr(found.bodies[name], label) - getattr(motion, label)).max() <= limit
+            )
     for name, motion in expected.points.items():
         assert np.abs(found.points[name].acceleration - motion.acceleration).max() <= 3e-12
-    assert [found.details[name] for name in ("rank", "dof")] == [expected.details[name] for name in ("rank", "dof")]
+    assert [found.details[name] for name in ("rank", "dof")] == [
+        expected.details[name] for name in ("rank", "dof")
+    ]
 
 
-# the redundant, the open loop of several, several drivers, a sweep that does not start at the design
-@pytest.mark.parametrize("name", ["andrews_squeezer", "mcpherson_steered", "four_bar", "rssr", "delta_robot", "bricard"])
+# the redundant, the open loop of several, several drivers, a sweep that does not start at the
+# design
+@pytest.mark.parametrize(
+    "name", ["andrews_squeezer", "mcpherson_steered", "four_bar", "rssr", "delta_robot", "bricard"]
+)
 def test_components_give_what_one_program_gives(name):
     case = cases.load(name)
     assert_alike(*both(case.mechanism, case.sweep.path, case.points))
@@ -54,7 +64,9 @@ def test_numpy_runs_components_too():
 
 
 @pytest.mark.parametrize(
-    "times", [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 70)[::-1], np.zeros(1)], ids=["far", "back", "one"]
+    "times",
+    [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 70)[::-1], np.zeros(1)],
+    ids=["far", "back", "one"],
 )
 def test_any_samples(times):
     for mechanism, driver in ((slider_crank(), "turn"), (four_bar(), "turn")):
@@ -65,7 +77,10 @@ def test_any_samples(times):
 @pytest.mark.parametrize("first", [-7.0, 0.0, 3.0, 1000.0])
 def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
     """The drivers go there in a second of their own; the path's own time may be any."""
-    mechanism, path = chain(3), Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5))
+    mechanism, path = (
+        chain(3),
+        Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5)),
+    )
     assert not start_of(chain(3), path).stands
     assert_alike(*both(mechanism, path, ("end",)))
 
@@ -81,13 +96,30 @@ def test_a_singular_pose_on_the_way_to_the_first_sample_is_told_every_time():
 def test_what_is_fixed_stands_still_beside_many_components():
     m = chain(2)
     still = Body("frame", fixed=True, origin=(0.5, 0.0, 0.0))
-    m = type(m)(m.name, [*m.bodies, still], m.joints, [*m.points, Point("mark", "frame", (1.0, 2.0, 3.0))], m.drivers)
-    request, path = Request(("turn",), ("mark",), ("frame",)), Path({"turn": Ramp(1.0)}, np.array([0.0, 0.2, LEAN + np.pi / 2.0]))
+    m = type(m)(
+        m.name,
+        [*m.bodies, still],
+        m.joints,
+        [*m.points, Point("mark", "frame", (1.0, 2.0, 3.0))],
+        m.drivers,
+    )
+    request, path = (
+        Request(("turn",), ("mark",), ("frame",)),
+        Path({"turn": Ramp(1.0)}, np.array([0.0, 0.2, LEAN + np.pi / 2.0])),
+    )
     found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
     assert found.solved.tolist() == [True, True, False]
     mark, frame = found.points["mark"], found.bodies["frame"]
     given = mark.position, mark.velocity, mark.acceleration, frame.r, frame.p, frame.v, frame.a
-    expected = (1.0, 2.0, 3.0), [0.0] * 3, [0.0] * 3, (0.5, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), [0.0] * 6, [0.0] * 6
+    expected = (
+        (1.0, 2.0, 3.0),
+        [0.0] * 3,
+        [0.0] * 3,
+        (0.5, 0.0, 0.0),
+        (1.0, 0.0, 0.0, 0.0),
+        [0.0] * 6,
+        [0.0] * 6,
+    )
     for values, wanted in zip(given, expected, strict=True):
         assert np.array_equal(values[:2], [wanted] * 2)
         assert np.isnan(values[2]).all()
@@ -104,14 +136,17 @@ def test_components_iterate_no_more_than_is_asked_for():
 def test_components_built_alike_share_a_program():
     cascade = Cascade(chain(40), Request(("turn",), ("end",)))
     assert len(cascade.parts) == 41
-    assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]  # the crank, the one with the point, all others
+    # the crank, the one with the point, all others
+    assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]
     assert cascade.largest == 12
 
 
 def test_a_chain_of_two_hundred_loops_closes_to_round_off():
     loops = 200
     turn = np.linspace(-0.3, 0.3, 33)
-    found = CascadeSweep(Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    found = CascadeSweep(
+        Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)
+    ).solve(1e-12)
     assert found.solved.all(), found.message
     assert found.residual <= 1e-15
     # the end is two hundred metres away: its coordinates round at 1.4e-14 m
@@ -122,33 +157,59 @@ def test_a_chain_of_two_hundred_loops_closes_to_round_off():
 def test_an_end_of_the_travel_is_told_with_the_component():
     mechanism = mcpherson()
     values = np.linspace(0.0, 0.4, 41)
-    sweep = CascadeSweep(Cascade(mechanism, Request(("stroke",), ("wheel",))), Path({"stroke": Ramp(1.0)}, values))
+    sweep = CascadeSweep(
+        Cascade(mechanism, Request(("stroke",), ("wheel",))), Path({"stroke": Ramp(1.0)}, values)
+    )
     found = sweep.solve(1e-12)
     assert (found.solved == (values < 0.29337)).all()  # formulation section 10
     assert np.isnan(found.points["wheel"].position[~found.solved]).all()
     assert "cannot be followed beyond stroke = 0.293" in found.message
     assert "knuckle" in found.message
     assert "; last reachable sample at stroke = 0.29; shorten the sweep" in found.message
-    assert np.array_equal(sweep.solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True)
+    assert np.array_equal(
+        sweep.solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True
+    )
 
 
 def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
-    """The second of two four-bars, which cannot turn on; the first one's crank can, and its residuals are no larger."""
-    links = {"rod0": (4.0, 3.2, 2.6, 1.0, 1.0), "rod1": (4.0, 3.0, 1.5, 2.0, 1.3)}  # ground, rod, rocker, crank, angle
+    """The second of two four-bars, which cannot turn on; the first one's crank can, and its
+    residuals are no larger.
+    """
+    # ground, rod, rocker, crank, angle
+    links = {"rod0": (4.0, 3.2, 2.6, 1.0, 1.0), "rod1": (4.0, 3.0, 1.5, 2.0, 1.3)}
     axis = (0.0, 0.0, 1.0)
-    bodies, joints, start = [Body("crank")], [Revolute("turn", "ground", "crank", (0.0, 0.0, 0.0), axis)], 0.0
+    bodies, joints, start = (
+        [Body("crank")],
+        [Revolute("turn", "ground", "crank", (0.0, 0.0, 0.0), axis)],
+        0.0,
+    )
     carrier = "crank"
     for k, (rod, (ground, long, rocker, crank, angle)) in enumerate(links.items()):
-        a, c = np.array([start, 0.0]) + crank * np.array([np.cos(angle), np.sin(angle)]), np.array([start + ground, 0.0])
+        a, c = (
+            np.array([start, 0.0]) + crank * np.array([np.cos(angle), np.sin(angle)]),
+            np.array([start + ground, 0.0]),
+        )
         apart = c - a
         along = (apart @ apart + long**2 - rocker**2) / (2.0 * (apart @ apart))
         off = np.sqrt(long**2 / (apart @ apart) - along**2)
         b = a + along * apart + off * np.array([-apart[1], apart[0]])
         bodies += [Body(rod), Body(f"rocker{k}")]
-        ends = ((f"a{k}", carrier, rod, a), (f"b{k}", rod, f"rocker{k}", b), (f"c{k}", "ground", f"rocker{k}", c))
-        joints += [Revolute(name, i, j, (*map(float, place), 0.0), axis) for name, i, j, place in ends]
+        ends = (
+            (f"a{k}", carrier, rod, a),
+            (f"b{k}", rod, f"rocker{k}", b),
+            (f"c{k}", "ground", f"rocker{k}", c),
+        )
+        joints += [
+            Revolute(name, i, j, (*map(float, place), 0.0), axis) for name, i, j, place in ends
+        ]
         carrier, start = f"rocker{k}", start + ground
-    mechanism = Mechanism("two loops", bodies, joints, [Point("end", carrier, (start, 0.0, 0.0))], [JointAngle("turn", "turn")])
+    mechanism = Mechanism(
+        "two loops",
+        bodies,
+        joints,
+        [Point("end", carrier, (start, 0.0, 0.0))],
+        [JointAngle("turn", "turn")],
+    )
     cascade = Cascade(mechanism, Request(("turn",), ("end",)))
     for values in (np.linspace(0.0, 6.0, 31), [0.0, 3.0], [0.1, 2.0, 4.0]):
         found = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.array(values))).solve(1e-12)
@@ -158,7 +219,14 @@ def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
 
 def test_what_it_cannot_take_apart_is_refused():
     m = chain(2)
-    coupled = type(m)(m.name, m.bodies, m.joints, m.points, m.drivers, [Gear("gear", ("pivot0", "pivot1"), ratio=1.0)])
+    coupled = type(m)(
+        m.name,
+        m.bodies,
+        m.joints,
+        m.points,
+        m.drivers,
+        [Gear("gear", ("pivot0", "pivot1"), ratio=1.0)],
+    )
     with pytest.raises(SolveError, match="couplers"):
         Cascade(coupled, Request(("turn",), ()))
     free = type(m)(m.name, m.bodies, m.joints, m.points, [])
@@ -170,7 +238,9 @@ def test_what_it_cannot_take_apart_is_refused():
 def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
     """Every loop may fold there; that the motion goes on is said."""
     loops, turn = 20, np.linspace(-0.1, 2.4, 26)
-    found = CascadeSweep(Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    found = CascadeSweep(
+        Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)
+    ).solve(1e-12)
     assert found.solved.all(), found.message
     expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
     # every loop adds its rounding, over the sine of how far its links are from in line
@@ -182,12 +252,17 @@ def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
 
 def test_a_sample_where_the_links_are_in_line_is_refused():
     turn = np.array([0.0, 1.8, LEAN + np.pi / 2.0, 1.9, 2.4])
-    found = CascadeSweep(Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)).solve(1e-12)
+    found = CascadeSweep(
+        Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)
+    ).solve(1e-12)
     assert found.solved.tolist() == [True, True, False, True, True]
     assert "refused at turn = 1.87079633: so near a singular pose" in found.message
-    alone = CascadeSweep(Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn[2:3])).solve(1e-12)
+    alone = CascadeSweep(
+        Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn[2:3])
+    ).solve(1e-12)
     assert not alone.solved.any()
-    assert np.isnan([alone.residual, alone.details["smallest_singular_value"]]).all()  # nothing was found, which is not zero
+    # nothing was found, which is not zero
+    assert np.isnan([alone.residual, alone.details["smallest_singular_value"]]).all()
 
 
 @pytest.mark.parametrize("name", ["kite", "four_bar_in_one_step"])
@@ -204,7 +279,10 @@ def test_a_narrow_gap_is_not_stepped_over(name):
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
-    path, request = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)), Request(("turn",), ("end",), compiled=compiled)
+    path, request = (
+        Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)),
+        Request(("turn",), ("end",), compiled=compiled),
+    )
     cascade = Cascade(chain(3), request)
     for count in (LANES, 5):  # all that there are, or the last ones are as the last
         going, carrying = (CascadeSweep(cascade, path) for _ in range(2))
@@ -221,14 +299,21 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
         for a, b in zip(going._lanes.anchor, carrying._lanes.anchor, strict=True):
             np.testing.assert_array_equal(a, b)
         model = cascade.kinds[0].model
-        assert going._lanes.anchor[0][0, [*model.plan.fixed].index(model.slots[FROM + TIME])] == pytest.approx(0.3)
+        assert going._lanes.anchor[0][
+            0, [*model.plan.fixed].index(model.slots[FROM + TIME])
+        ] == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("part", range(4))
 def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
-    """The first, which is driven, any of those that are alike, and the last; what is not a number is the worst of all."""
-    path, request = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)), Request(("turn",), ("end",), compiled=compiled)
+    """The first, which is driven, any of those that are alike, and the last; what is not a number
+    is the worst of all.
+    """
+    path, request = (
+        Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)),
+        Request(("turn",), ("end",), compiled=compiled),
+    )
     cascade = Cascade(chain(3), request)
     sweep = CascadeSweep(cascade, path)
     lanes, times = sweep._lanes, np.linspace(0.005, 0.1, LANES)
@@ -236,7 +321,9 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
     lanes.accept_by(accept_by(1e-12))
     assert len(cascade.parts) == 4
     assert (lanes.attempt(times, path) > 0.0).all()
-    np.testing.assert_array_equal(lanes.worst[WORST.index("closure")], lanes.each("closure").max(axis=0))
+    np.testing.assert_array_equal(
+        lanes.worst[WORST.index("closure")], lanes.each("closure").max(axis=0)
+    )
     np.testing.assert_array_equal(lanes.worst[WORST.index(SIGMA)], lanes.each(SIGMA).min(axis=0))
     kind, member = cascade.place[part]
     anchor, model = lanes.anchor, kind.model
@@ -258,7 +345,9 @@ def test_nothing_may_be_wanted():
 @pytest.mark.parametrize("lanes", [8, 16])
 @pytest.mark.parametrize("part", [1, 2, 7, 8, 9, 14, 15, 16, 17, 30, 31, 39])
 def test_a_step_is_divided_as_often_whatever_the_lanes(part, lanes):
-    """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is not reached."""
+    """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is
+    not reached.
+    """
     tried = list[np.ndarray]()
 
     def attempt(times):

@@ -1,4 +1,6 @@
-"""A chain of N four-bar loops (IFToMM A02: parallel unit cranks): right at any length, and its cost grows by the loop."""
+"""A chain of N four-bar loops (IFToMM A02: parallel unit cranks): right at any length, and its cost
+grows by the loop.
+"""
 
 import numpy as np
 import pytest
@@ -11,12 +13,24 @@ LEAN = 0.3
 
 
 def chain(loops, lean=LEAN):
-    """Cranks at (k, 0) that lean alike, tied by couplers of length one; only the first is driven."""
+    """Cranks at (k, 0) that lean alike, tied by couplers of length one; only the first is
+    driven.
+    """
     s, c, n = np.sin(lean), np.cos(lean), range(loops)
-    cranks = [Revolute(f"pivot{k}", "ground", f"crank{k}", (k, 0.0, 0.0), (0.0, 0.0, 1.0)) for k in range(loops + 1)]
+    cranks = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (k, 0.0, 0.0), (0.0, 0.0, 1.0))
+        for k in range(loops + 1)
+    ]
     balls = [Spherical(f"ball{k}", f"crank{k}", f"coupler{k}", (k + s, c, 0.0)) for k in n]
     crosses = [
-        Universal(f"cross{k}", f"crank{k + 1}", f"coupler{k}", (k + 1 + s, c, 0.0), ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))) for k in n
+        Universal(
+            f"cross{k}",
+            f"crank{k + 1}",
+            f"coupler{k}",
+            (k + 1 + s, c, 0.0),
+            ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+        )
+        for k in n
     ]
     return Mechanism(
         "chain",
@@ -29,11 +43,13 @@ def chain(loops, lean=LEAN):
 
 @pytest.mark.parametrize("loops", [1, 5])
 def test_the_last_crank_turns_as_the_first(loops):
-    turn = np.linspace(-np.pi, np.pi, 37)  # through the change points, where the loops could fold over
+    # through the change points, where the loops could fold over
+    turn = np.linspace(-np.pi, np.pi, 37)
     found = solve(chain(loops), "turn", turn)
     assert found.solved.all(), found.message
     expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
-    # round-off grows with the length of the chain, and by the condition near the change points, sampled no nearer than 0.1 rad
+    # round-off grows with the length of the chain, and by the condition near the change points,
+    # sampled no nearer than 0.1 rad
     assert np.abs(found.points["end"].position - expected).max() <= 1e-13 * loops
 
 

@@ -1,4 +1,6 @@
-"""Rows chosen anew where those chosen at the design come to depend on each other, and the mechanism is regular."""
+"""Rows chosen anew where those chosen at the design come to depend on each other, and the mechanism
+is regular.
+"""
 
 from dataclasses import replace
 
@@ -25,7 +27,9 @@ from .test_redundancy import LEFT, locomotive
 from .test_singular import BRANCH, chain_end
 
 ALONG = np.pi / 2.0
-"""Turn of the Bennett loop at which the rows chosen at the design depend on each other; the other is at three times as much."""
+"""Turn of the Bennett loop at which the rows chosen at the design depend on each other; the other
+is at three times as much.
+"""
 DEAD = np.pi - LEFT
 """Turn of the locomotive at which a rod is at its dead point, of which rows were chosen."""
 
@@ -39,8 +43,16 @@ def errors(found, turn, turn_t=1.0, turn_tt=0.0):
     truth = bennett.motion(Jet(turn, turn_t + 0.0 * turn, turn_tt + 0.0 * turn))
     largest = []
     for order, name in (("x", "position"), ("v", "velocity"), ("a", "acceleration")):
-        expected = {point: np.stack([getattr(jet, order) for jet in jets], axis=1) for point, jets in truth.items()}
-        largest.append(max(np.abs(getattr(found.points[point], name) - values).max() for point, values in expected.items()))
+        expected = {
+            point: np.stack([getattr(jet, order) for jet in jets], axis=1)
+            for point, jets in truth.items()
+        }
+        largest.append(
+            max(
+                np.abs(getattr(found.points[point], name) - values).max()
+                for point, values in expected.items()
+            )
+        )
     return np.array(largest)
 
 
@@ -66,7 +78,12 @@ def test_where_the_rows_of_the_design_are_singular(order, compiled):
     jets = bennett.motion(Jet(turn, np.ones(7), np.zeros(7)))["tracer"]
     motion = found.points["tracer"]
     for name, label in (("position", "x"), ("velocity", "v"), ("acceleration", "a"))[: order + 1]:
-        assert np.abs(getattr(motion, name) - np.stack([getattr(jet, label) for jet in jets], axis=1)).max() <= 1e-13
+        assert (
+            np.abs(
+                getattr(motion, name) - np.stack([getattr(jet, label) for jet in jets], axis=1)
+            ).max()
+            <= 1e-13
+        )
 
 
 def test_on_the_way_to_the_first_sample():
@@ -82,7 +99,9 @@ def test_on_the_way_to_the_first_sample():
 
 @pytest.mark.parametrize("near", [1e-2, 1e-3, 1e-5, 0.0])
 def test_a_last_sample_near_there_has_its_digits(near):
-    """Nothing ends the motion before it; rows chosen there are better, for accelerations long before anything is in doubt."""
+    """Nothing ends the motion before it; rows chosen there are better, for accelerations long
+    before anything is in doubt.
+    """
     turn = np.array([0.0, 1.0, DEAD - near])
     found = solve(locomotive(np.pi / 2.0), "turn", turn)
     assert found.solved.all(), found.message
@@ -102,7 +121,9 @@ def test_a_mechanism_that_is_singular_itself_is_followed_as_before():
 @pytest.mark.parametrize("turn", [np.linspace(0.0, 4.0, 41), np.array([0.0, 1.0, BRANCH, 4.0])])
 @pytest.mark.parametrize("first", [1.0, 1.8])
 def test_a_singular_pose_is_passed_by_the_rows_that_were_chosen_before_it(first, turn):
-    """A locomotive that turns over the dead points of its rods, and a chain that branches after the first or before."""
+    """A locomotive that turns over the dead points of its rods, and a chain that branches after the
+    first or before.
+    """
     loco, arm = locomotive(np.pi / 2.0, first), chain(1)
     both = replace(
         loco,
@@ -131,8 +152,14 @@ def test_no_more_often_than_so(monkeypatch):
 
 def test_few_samples_are_tried_in_vain(monkeypatch):
     tried, found, renew = list[float](), list[int](), Followed.renew
-    monkeypatch.setattr(Choice, "anew", lambda self, route, lane: tried.append(lane[route.model.slots["from time"]]))
-    monkeypatch.setattr(Followed, "renew", lambda self, lanes: tried.clear() or renew(self, lanes) or found.append(len(tried)))
+    monkeypatch.setattr(
+        Choice, "anew", lambda self, route, lane: tried.append(lane[route.model.slots["from time"]])
+    )
+    monkeypatch.setattr(
+        Followed,
+        "renew",
+        lambda self, lanes: tried.clear() or renew(self, lanes) or found.append(len(tried)),
+    )
     monkeypatch.setattr(segments, "WITHOUT", 3)
     solve(locomotive(np.pi / 2.0), "turn", DEAD - np.linspace(1e-3, 1e-4, 9))
     assert found == [3]
@@ -142,7 +169,11 @@ def test_a_sample_in_question_only_that_is_not_reached_again_stays(monkeypatch):
     monkeypatch.setattr(Followed, "visit", lambda self, samples: {})
     turn, question = np.append(0.0, DEAD - np.geomspace(1.0, 1e-2, 12)), segments.in_question
     found = list[int]()
-    monkeypatch.setattr(segments, "in_question", lambda *a, **k: found.append(question(*a, **k).sum()) or question(*a, **k))
+    monkeypatch.setattr(
+        segments,
+        "in_question",
+        lambda *a, **k: found.append(question(*a, **k).sum()) or question(*a, **k),
+    )
     assert solve(locomotive(np.pi / 2.0), "turn", turn).solved.all()
     assert found[0] >= 1
 
@@ -150,7 +181,11 @@ def test_a_sample_in_question_only_that_is_not_reached_again_stays(monkeypatch):
 def test_what_cannot_be_better_is_asked_once(monkeypatch):
     """The Bricard linkage comes near its dead centre, which no choice of rows changes."""
     asked, values = list[int](), singular_samples.smallest_singular_values
-    monkeypatch.setattr(singular_samples, "smallest_singular_values", lambda *given: asked.append(1) or values(*given))
+    monkeypatch.setattr(
+        singular_samples,
+        "smallest_singular_values",
+        lambda *given: asked.append(1) or values(*given),
+    )
     case = cases.load("bricard")
     route = Route(recent_model(case.mechanism, Request(("hinge",), ("P3",))), case.sweep.path)
     first, second = (follow(route, 1e-12) for _ in range(2))
@@ -168,7 +203,11 @@ def test_the_best_rows_known_are_taken_again_where_they_are_good_enough():
     assert chosen(matrix, [(0, 1), (0, 2)], drivers, none) == (0, 2)
     matrix[3, 1] = 0.5
     assert chosen(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 3)
-    assert chosen(np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1e-17]]), [(0, 1)], drivers, none) == (0, 1)  # there are not two
+    # there are not two
+    assert chosen(np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1e-17]]), [(0, 1)], drivers, none) == (
+        0,
+        1,
+    )
 
 
 def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
@@ -190,9 +229,13 @@ def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
 
 
 def test_a_pose_that_contradicts_other_rows_is_not_taken(monkeypatch):
-    """Rows chosen anew leave out others than before: those must hold as well. A hinge is askew by a part of what is allowed."""
+    """Rows chosen anew leave out others than before: those must hold as well. A hinge is askew by a
+    part of what is allowed.
+    """
     skew = replace(loop().joint("C"), axis=(4.0 + 1e-9, -3.0, 12.0))
-    mechanism = replace(loop(), joints=[skew if joint.name == "C" else joint for joint in loop().joints])
+    mechanism = replace(
+        loop(), joints=[skew if joint.name == "C" else joint for joint in loop().joints]
+    )
     model = recent_model(mechanism, Request(("turn",), ()))
     state = {name: np.array(value) for name, value in model.state.items()}
     sample = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.3]))).sampled(np.array([0.3]))
@@ -218,7 +261,9 @@ def test_a_sample_is_taken_again_only_where_it_is_much_farther_from_singular(par
 def test_other_rows_are_looked_for_before_a_step_is_divided_down_to_the_pose(monkeypatch):
     """Down to where nothing is seen through rounding takes thirty parts each time."""
     divided, divide = list[float](), Marcher._divide
-    monkeypatch.setattr(Marcher, "_divide", lambda self, *where: divided.append(1.0) or divide(self, *where))
+    monkeypatch.setattr(
+        Marcher, "_divide", lambda self, *where: divided.append(1.0) or divide(self, *where)
+    )
     turn = np.linspace(0.0, 2.0 * np.pi, 73)
 
     def parts():
@@ -235,7 +280,9 @@ def test_other_rows_are_looked_for_before_a_step_is_divided_down_to_the_pose(mon
 def test_a_diagnosis_follows_the_sign_of_the_determinant_over_a_bifurcation():
     turn = np.linspace(0.0, 3.0, 31)
     found = conditioning(chain(1), Path({"turn": Ramp(1.0)}, turn), turn, ["end"], [], 31, 1e-12)
-    assert [pose.orientation for pose in found.poses] == [1.0 if value < BRANCH else -1.0 for value in turn]
+    assert [pose.orientation for pose in found.poses] == [
+        1.0 if value < BRANCH else -1.0 for value in turn
+    ]
 
 
 def test_a_diagnosis_knows_no_singular_pose_there():
@@ -249,11 +296,17 @@ def test_a_diagnosis_knows_no_singular_pose_there():
 @pytest.mark.parametrize("off", [0.003, 0.0044, 0.008])
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
 def test_a_spherical_kite_beside_its_corner(off, style):
-    """Rod and rocker are alike, crank and ground nearly so: beside the corner all rows are nearly singular, those kept more so."""
+    """Rod and rocker are alike, crank and ground nearly so: beside the corner all rows are nearly
+    singular, those kept more so.
+    """
     alike, ground = 0.98, 0.72
 
     def turned(axis, angle, vector):
-        return vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1.0 - np.cos(angle))
+        return (
+            vector * np.cos(angle)
+            + np.cross(axis, vector) * np.sin(angle)
+            + axis * (axis @ vector) * (1.0 - np.cos(angle))
+        )
 
     first, up = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
     last = turned(up, ground, first)
@@ -262,7 +315,9 @@ def test_a_spherical_kite_beside_its_corner(off, style):
         pin = turned(first, angle, turned(up, ground + off, first))
         mean, across = pin + last, np.cross(pin, last)
         along = np.cos(alike) / (1.0 + pin @ last)
-        return pin, along * mean + np.sqrt((1.0 - along**2 * (mean @ mean)) / (across @ across)) * across
+        return pin, along * mean + np.sqrt(
+            (1.0 - along**2 * (mean @ mean)) / (across @ across)
+        ) * across
 
     pin, meet = (tuple(each.tolist()) for each in pose(0.9))
     joints = [
@@ -272,8 +327,12 @@ def test_a_spherical_kite_beside_its_corner(off, style):
         Universal("meet", "rod", "rocker", meet, (meet, tuple(np.cross(pin, meet).tolist()))),
     ]
     bodies = [Body(name) for name in ("crank", "rod", "rocker")]
-    kite = Mechanism("kite", bodies, joints, [Point("meet", "rocker", meet)], [JointAngle("turn", "first")])
+    kite = Mechanism(
+        "kite", bodies, joints, [Point("meet", "rocker", meet)], [JointAngle("turn", "first")]
+    )
     turn = np.linspace(0.0, -6.28, 14)
     found = solve(kite, "turn", turn, style=style, order=0)
     assert found.solved.all(), found.message
-    assert np.abs(found.points["meet"].position - [pose(0.9 + each)[1] for each in turn]).max() < 1e-10
+    assert (
+        np.abs(found.points["meet"].position - [pose(0.9 + each)[1] for each in turn]).max() < 1e-10
+    )

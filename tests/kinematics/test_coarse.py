@@ -1,4 +1,6 @@
-"""Coarse sweeps are gone in parts of their steps: to the samples of a closed form, by whichever parts are small enough."""
+"""Coarse sweeps are gone in parts of their steps: to the samples of a closed form, by whichever
+parts are small enough.
+"""
 
 from functools import cache
 
@@ -18,7 +20,9 @@ COARSE = {
     "turns of three radians": np.linspace(-12.0, 12.0, 9),
     "one step of six turns": np.array([12.0 * np.pi]),
     "in no order, and twice the same": np.array([5.0, -4.0, 0.0, 2.5, 5.0, -1.0]),
-    "small steps, then large": np.concatenate([np.linspace(0.0, 0.1, 40), np.linspace(2.0, 9.0, 5)]),
+    "small steps, then large": np.concatenate(
+        [np.linspace(0.0, 0.1, 40), np.linspace(2.0, 9.0, 5)]
+    ),
 }
 """Angles of the crank, measured from the design position."""
 
@@ -29,7 +33,9 @@ def model(compiled):
 
 
 def swept(values, *, compiled=True):
-    """Along a route of its own: what is made ready for one that was solved before is kept with it."""
+    """Along a route of its own: what is made ready for one that was solved before is kept with
+    it.
+    """
     return sweep(model(compiled), Path({"turn": Ramp(1.0)}, np.asarray(values)), 1e-12)
 
 
@@ -47,7 +53,11 @@ def assert_right(found, values):
 def divided(monkeypatch):
     """The steps of which parts were looked for one by one."""
     aims, divide = list[float](), Marcher._divide
-    monkeypatch.setattr(Marcher, "_divide", lambda self, anchor, aim, *rest: aims.append(aim) or divide(self, anchor, aim, *rest))
+    monkeypatch.setattr(
+        Marcher,
+        "_divide",
+        lambda self, anchor, aim, *rest: aims.append(aim) or divide(self, anchor, aim, *rest),
+    )
     return aims
 
 

@@ -1,4 +1,6 @@
-"""Tracing a motion by its own length: limit points and branch points against closed forms, and what lies beyond them."""
+"""Tracing a motion by its own length: limit points and branch points against closed forms, and what
+lies beyond them.
+"""
 
 import json
 from dataclasses import replace
@@ -23,8 +25,9 @@ from kincheck.core.kinematics.continuation.trace import trace
 from ..support.mechanisms import A0, B0, C0, CRANK, D0, four_bar, mcpherson, slider_crank
 from .test_chain import LEAN, chain
 
-# The strut's limits of travel [m] to 18 digits, by other means than the package's: the six numbers of the knuckle's pose in 40
-# digits close two rods, the arm's axis and the strut's line (as in strut_oracle.py), and a secant rule makes the stroke stationary.
+# The strut's limits of travel [m] to 18 digits, by other means than the package's: the six numbers
+# of the knuckle's pose in 40 digits close two rods, the arm's axis and the strut's line (as in
+# strut_oracle.py), and a secant rule makes the stroke stationary.
 LIMITS = {1: 0.293337313746648221, -1: -0.316737084187394147}
 
 
@@ -38,7 +41,9 @@ def distance(a, b):
 @pytest.mark.parametrize("style", ["native", "relative"])
 @pytest.mark.parametrize("direction", [1, -1])
 def test_limits_of_the_strut(direction, style):
-    """To 1e-9 m and much better; the dip of the condition at +0.26 m on the way is no branch point."""
+    """To 1e-9 m and much better; the dip of the condition at +0.26 m on the way is no branch
+    point.
+    """
     length = 5.0 if direction == 1 else 3.0
     curve = trace(mcpherson(), "stroke", direction=direction, length=length, style=style)
     (event,) = curve.events
@@ -51,7 +56,10 @@ def test_limits_of_the_strut(direction, style):
 
 
 def test_the_limit_does_not_depend_on_the_steps():
-    values = [trace(mcpherson(), "stroke", direction=-1, length=2.5, longest=longest).events[0].value for longest in (0.02, 0.1)]
+    values = [
+        trace(mcpherson(), "stroke", direction=-1, length=2.5, longest=longest).events[0].value
+        for longest in (0.02, 0.1)
+    ]
     assert values[0] == pytest.approx(values[1], abs=1e-14)
 
 
@@ -68,14 +76,19 @@ def test_the_strut_goes_on_beyond():
 
 
 def test_a_rod_that_is_shorter_than_its_crank():
-    """Limits where the rod stands upright; between them the slider takes both places that the crank leaves it."""
+    """Limits where the rod stands upright; between them the slider takes both places that the crank
+    leaves it.
+    """
     rod = 0.1
     curve = trace(slider_crank(rod), "turn", length=4.0)
     limit = np.arcsin(rod / CRANK)
     assert [event.value for event in curve.events] == pytest.approx([limit, -limit], abs=1e-12)
     assert curve.closed
     offset = curve.points["end"][:, 0] - CRANK * np.cos(curve.values)
-    assert np.abs(offset) == pytest.approx(np.sqrt(rod**2 - (CRANK * np.sin(curve.values)) ** 2), abs=1e-9)  # 1e-16 under the root
+    # 1e-16 under the root
+    assert np.abs(offset) == pytest.approx(
+        np.sqrt(rod**2 - (CRANK * np.sin(curve.values)) ** 2), abs=1e-9
+    )
     first, second = (event.arc for event in curve.events)
     assert ((offset < 0.0) == ((curve.arc > first) & (curve.arc < second))).all()
 
@@ -84,7 +97,12 @@ def test_a_rocker_that_drives_its_crank():
     """Limits where crank and coupler are in line; the crank goes round, and the curve is closed."""
     rocked = replace(four_bar(), drivers=[replace(four_bar().drivers[0], name="rock", joint="D")])
     curve = trace(rocked, "rock", length=12.0)
-    crank, coupler, rocker, base = distance(A0, B0), distance(B0, C0), distance(C0, D0), distance(A0, D0)
+    crank, coupler, rocker, base = (
+        distance(A0, B0),
+        distance(B0, C0),
+        distance(C0, D0),
+        distance(A0, D0),
+    )
 
     def angle(reach):
         return np.arccos((base**2 + rocker**2 - reach**2) / (2.0 * base * rocker))
@@ -98,7 +116,9 @@ def test_a_rocker_that_drives_its_crank():
 
 
 def test_a_limit_at_which_the_curve_branches_too():
-    """Bricard's hinge turns back at 30 degrees, folded flat: corrections do not converge there, and the limit is interpolated."""
+    """Bricard's hinge turns back at 30 degrees, folded flat: corrections do not converge there, and
+    the limit is interpolated.
+    """
     mechanism = cases.load("bricard").mechanism
     curve = trace(mechanism, mechanism.drivers[0].name, length=4.5)
     assert [event.value for event in curve.events] == pytest.approx([np.pi / 6.0], abs=1e-11)
@@ -110,7 +130,9 @@ def test_a_limit_at_which_the_curve_branches_too():
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("loops", [1, 2])
 def test_change_points(loops, direction):
-    """All links in line: the determinant changes its sign with an odd number of loops, and not with an even one."""
+    """All links in line: the determinant changes its sign with an odd number of loops, and not with
+    an even one.
+    """
     curve = trace(chain(loops), "turn", length=4.5, direction=direction)
     (event,) = curve.events
     assert event.kind == "branch point"
@@ -133,12 +155,16 @@ def test_a_motion_without_singular_poses():
 # The closing step and the first one
 
 PAST = [0.0, 1e-5, 0.002, 0.04, 0.2]
-"""How far the design is past a singular pose [rad]; zero stands for one that is nearer than a millionth."""
+"""How far the design is past a singular pose [rad]; zero stands for one that is nearer than a
+millionth.
+"""
 BOTH_SIDES = sorted({side * (past or 3e-7) for past in PAST for side in (-1.0, 1.0)})
 
 
 def driven_slider(crank_angle):
-    """A crank of 1 m and a rod of 2.5 m, driven at the slider; its dead centres are at x = 1.5 and 3.5."""
+    """A crank of 1 m and a rod of 2.5 m, driven at the slider; its dead centres are at x = 1.5 and
+    3.5.
+    """
     tip = (np.cos(crank_angle), np.sin(crank_angle), 0.0)
     x = tip[0] + np.sqrt(2.5**2 - tip[1] ** 2)
     mechanism = Mechanism(
@@ -174,7 +200,9 @@ def test_both_dead_centres_wherever_the_curve_begins(centre, past, direction):
 @pytest.mark.parametrize("style", ["native", "relative"])
 @pytest.mark.parametrize("past", [-0.04, 0.002])
 def test_the_length_of_a_closed_curve_is_that_of_one_turn(past, style):
-    """Wherever it begins; also where the coordinates are angles, which a turn does not bring back."""
+    """Wherever it begins; also where the coordinates are angles, which a turn does not bring
+    back.
+    """
     lengths = []
     for begins in (past, 1.0):
         curve = trace(driven_slider(np.pi + begins)[0], "push", length=25.0, style=style)
@@ -187,13 +215,17 @@ def test_the_length_of_a_closed_curve_is_that_of_one_turn(past, style):
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("past", [-0.1, -0.02, -1e-5, 1e-5, 0.02, 0.1])
 def test_both_dead_centres_of_a_rocker(past, direction):
-    """The four-bar that its rocker drives, with its crank beside the pose in which it stretches the coupler."""
+    """The four-bar that its rocker drives, with its crank beside the pose in which it stretches the
+    coupler.
+    """
     pivot, base, crank, coupler, rocker = (0.0, 0.0, 0.0), 2.0, 0.5, 1.8, 1.2
     reach = crank + coupler
     stretched = np.arccos((reach**2 + base**2 - rocker**2) / (2.0 * reach * base))
     pin = (crank * np.cos(stretched + past), crank * np.sin(stretched + past), 0.0)
     d = np.hypot(base - pin[0], pin[1])
-    at = np.arctan2(-pin[1], base - pin[0]) + np.arccos((d**2 + coupler**2 - rocker**2) / (2.0 * d * coupler))
+    at = np.arctan2(-pin[1], base - pin[0]) + np.arccos(
+        (d**2 + coupler**2 - rocker**2) / (2.0 * d * coupler)
+    )
     end, z = (pin[0] + coupler * np.cos(at), pin[1] + coupler * np.sin(at), 0.0), (0.0, 0.0, 1.0)
     mechanism = Mechanism(
         "rocked",
@@ -215,13 +247,17 @@ def test_both_dead_centres_of_a_rocker(past, direction):
 
     design = np.arctan2(end[1], end[0] - base)
     expected = sorted(inner(length) for length in (coupler + crank, coupler - crank))
-    assert sorted(design + event.value for event in curve.events) == pytest.approx(expected, abs=1e-11)
+    assert sorted(design + event.value for event in curve.events) == pytest.approx(
+        expected, abs=1e-11
+    )
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("past", [-0.03, -0.004, 0.004, 0.03])
 def test_a_branch_point_beside_the_beginning(past, direction):
-    """All cranks in line, a little before or behind: once each way round, and the other one half a turn away."""
+    """All cranks in line, a little before or behind: once each way round, and the other one half a
+    turn away.
+    """
     curve = trace(chain(1, np.pi / 2.0 + past), "turn", length=25.0, direction=direction)
     assert curve.closed
     turned = sorted(event.value % np.pi for event in curve.events)
@@ -232,8 +268,12 @@ def test_a_branch_point_beside_the_beginning(past, direction):
 @pytest.mark.parametrize("past", [-0.004, -0.001, 0.001, 0.004])
 def test_a_branch_point_beside_an_open_beginning(past):
     """Seen by one of both directions."""
-    curves = [trace(chain(2, np.pi / 2.0 + past), "turn", length=1.0, direction=way) for way in (1, -1)]
-    assert [event.value for curve in curves for event in curve.events] == pytest.approx([past], abs=1e-8)
+    curves = [
+        trace(chain(2, np.pi / 2.0 + past), "turn", length=1.0, direction=way) for way in (1, -1)
+    ]
+    assert [event.value for curve in curves for event in curve.events] == pytest.approx(
+        [past], abs=1e-8
+    )
 
 
 def test_many_bodies_are_not_back_when_they_have_hardly_left():

@@ -1,10 +1,23 @@
-"""Corners and gaps that are narrower than a step: turned round, or told as the end of the motion, and never stepped over."""
+"""Corners and gaps that are narrower than a step: turned round, or told as the end of the motion,
+and never stepped over.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import Body, ConstantVelocity, Distance, Inline, JointAngle, Mechanism, Point, Revolute, Universal, solve
+from kincheck.core import (
+    Body,
+    ConstantVelocity,
+    Distance,
+    Inline,
+    JointAngle,
+    Mechanism,
+    Point,
+    Revolute,
+    Universal,
+    solve,
+)
 
 Z, ORIGIN, ROD = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.8
 
@@ -24,12 +37,19 @@ def corner(angle, beside, rod=ROD, rocker=ROD):
 
 
 def loop(start, beside, rod=ROD, rocker=ROD, loops=1):
-    """A crank of one metre, whose pin passes the rocker's pivot at a distance; or several such rockers, alike."""
+    """A crank of one metre, whose pin passes the rocker's pivot at a distance; or several such
+    rockers, alike.
+    """
     start = np.float64(start)
     meet = tuple(corner(start, beside, rod, rocker).tolist())
     rockers = ["rocker", "twin"][:loops]
-    rests = [Revolute(f"rest of {each}", "ground", each, (1.0 - beside, 0.0, 0.0), Z) for each in rockers]
-    rods = [Distance(f"rod of {each}", "crank", each, (tuple(pin(start).tolist()), meet)) for each in rockers]
+    rests = [
+        Revolute(f"rest of {each}", "ground", each, (1.0 - beside, 0.0, 0.0), Z) for each in rockers
+    ]
+    rods = [
+        Distance(f"rod of {each}", "crank", each, (tuple(pin(start).tolist()), meet))
+        for each in rockers
+    ]
     return Mechanism(
         "loop",
         [Body("crank"), *map(Body, rockers)],
@@ -49,7 +69,9 @@ def test_a_corner_is_turned_round(beside, count, order, loops):
     found = solve(loop(-1.0, beside, loops=loops), "turn", turn, order=order)
     assert found.solved.all(), found.message
     # one over the distance of the two is the condition there, and all that follows goes through it
-    assert np.abs(found.points["meet"].position - corner(turn - 1.0, beside)).max() <= 1e-13 / abs(beside)
+    assert np.abs(found.points["meet"].position - corner(turn - 1.0, beside)).max() <= 1e-13 / abs(
+        beside
+    )
     assert "notes" not in found.details
 
 
@@ -64,8 +86,9 @@ def test_a_corner_that_is_too_narrow_is_no_straight_way(beside, loops):
     assert "smallest singular value" in found.message
 
 
-# Crank and pivots in line, the pin two metres from the rocker's pivot: rod and rocker are too short to reach it by this.
-# Of two loops alike the determinants change their signs together, and that of the whole keeps it.
+# Crank and pivots in line, the pin two metres from the rocker's pivot: rod and rocker are too short
+# to reach it by this. Of two loops alike the determinants change their signs together, and that of
+# the whole keeps it.
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("short", [1e-2, 1e-5, 1e-8, 1e-10])
 @pytest.mark.parametrize("count", [2, 5, 9, 300])
@@ -83,31 +106,49 @@ def test_a_gap_is_the_end(short, count, loops):
 @pytest.mark.parametrize("ground", [1.1, 1.4, 2.0])
 @pytest.mark.parametrize("count", [2, 3, 5, 9, 300])
 def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, start, count):
-    """A kite that lies on its side: the rod is shorter than the crank, and cannot fold. Beyond, what crosses there is as near."""
+    """A kite that lies on its side: the rod is shorter than the crank, and cannot fold. Beyond,
+    what crosses there is as near.
+    """
     turn = np.linspace(0.0, -2.0 * start, count)
     found = solve(loop(start, 1.0 - ground, rod=1.0 - short, rocker=ground), "turn", turn, order=0)
-    end = np.arccos((1.0 + ground**2 - (ground - 1.0 + short) ** 2) / (2.0 * ground))  # where rod and rocker are in line
+    # where rod and rocker are in line
+    end = np.arccos((1.0 + ground**2 - (ground - 1.0 + short) ** 2) / (2.0 * ground))
     assert (found.solved == (turn < -start - end)).all()
 
 
 def universal_loop(pin, meet, rest, across=(1.0, 0.0, 0.0)):
-    """A four-bar with its rod on two universals, one row more than is needed. Its crank's pivot is the origin."""
-    hinges = [Revolute("pivot", "ground", "crank", ORIGIN, Z), Revolute("rest", "ground", "rocker", rest, Z)]
+    """A four-bar with its rod on two universals, one row more than is needed. Its crank's pivot is
+    the origin.
+    """
+    hinges = [
+        Revolute("pivot", "ground", "crank", ORIGIN, Z),
+        Revolute("rest", "ground", "rocker", rest, Z),
+    ]
     ends = [
         Universal("pin", "crank", "rod", pin, (across, Z)),
         Universal("end", "rod", "rocker", meet, (Z, across)),
     ]
     bodies = [Body("crank"), Body("rod"), Body("rocker")]
-    return Mechanism("loop", bodies, [*hinges, *ends], [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")])
+    return Mechanism(
+        "loop",
+        bodies,
+        [*hinges, *ends],
+        [Point("meet", "rocker", meet)],
+        [JointAngle("turn", "pivot")],
+    )
 
 
 def revolute_loop(pin, meet, rest):
     """All on hinges, three rows more than are needed."""
     at = {"pivot": ORIGIN, "pin": pin, "end": meet, "rest": rest}
-    pairs = zip(("ground", "crank", "rod", "ground"), ("crank", "rod", "rocker", "rocker"), strict=True)
+    pairs = zip(
+        ("ground", "crank", "rod", "ground"), ("crank", "rod", "rocker", "rocker"), strict=True
+    )
     hinges = [Revolute(name, *pair, at[name], Z) for name, pair in zip(at, pairs, strict=True)]
     bodies = [Body("crank"), Body("rod"), Body("rocker")]
-    return Mechanism("loop", bodies, hinges, [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")])
+    return Mechanism(
+        "loop", bodies, hinges, [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")]
+    )
 
 
 NEARLY_KITES = {  # and nearly parallelograms: pin, end of the rod, rest of the rocker, last turn, samples
@@ -132,7 +173,13 @@ NEARLY_KITES = {  # and nearly parallelograms: pin, end of the rod, rest of the 
         -6.2769,
         19,
     ),
-    "locks": ((0.407187255644269, -0.06317054565251659), (1.4280674729874876, -0.0631734360870428), 1.0208806657722926, 3.2062, 13),
+    "locks": (
+        (0.407187255644269, -0.06317054565251659),
+        (1.4280674729874876, -0.0631734360870428),
+        1.0208806657722926,
+        3.2062,
+        13,
+    ),
     "turns unseen": (
         (-0.8114361531517722, 0.4497902962488659),
         (0.11192415924912638, 0.5400567995235857),
@@ -140,12 +187,20 @@ NEARLY_KITES = {  # and nearly parallelograms: pin, end of the rod, rest of the 
         3.4404473351597655,
         7,
     ),
-    "twisted": ((0.6286049409194256, -0.008145844979201), (2.1516027678897336, -0.008643655436957), 1.5230044750512732, -4.8815, 7),
+    "twisted": (
+        (0.6286049409194256, -0.008145844979201),
+        (2.1516027678897336, -0.008643655436957),
+        1.5230044750512732,
+        -4.8815,
+        7,
+    ),
 }
 
 
 def side_of_the_line(pin, rest, turn, found):
-    """By its sign on which side of the line from the pin to the rocker's pivot the rod's end is: there it stays."""
+    """By its sign on which side of the line from the pin to the rocker's pivot the rod's end is:
+    there it stays.
+    """
     (x, y), cos, sin = pin, np.cos(turn), np.sin(turn)
     across = np.stack([rest - (x * cos - y * sin), -(x * sin + y * cos)], axis=-1)
     d = found.points["meet"].position[:, :2] - (np.array([rest, 0.0]) - across)
@@ -156,10 +211,14 @@ def side_of_the_line(pin, rest, turn, found):
 @pytest.mark.parametrize("made", [universal_loop, revolute_loop])
 @pytest.mark.parametrize("name", NEARLY_KITES)
 def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
-    """A determinant of rows chosen from more changes its sign by a singular pose, and by one of the choice; not by both."""
+    """A determinant of rows chosen from more changes its sign by a singular pose, and by one of the
+    choice; not by both.
+    """
     (x, y), meet, rest, last, count = NEARLY_KITES[name]
     turn = np.linspace(0.0, last, count)
-    found = solve(made((x, y, 0.0), (*meet, 0.0), (rest, 0.0, 0.0)), "turn", turn, order=0, style=style)
+    found = solve(
+        made((x, y, 0.0), (*meet, 0.0), (rest, 0.0, 0.0)), "turn", turn, order=0, style=style
+    )
     side = side_of_the_line((x, y), rest, turn, found)
     assert (side[found.solved] * side[0] > 0.0).all()
     assert found.solved.all() or "there is a singular pose ahead" in found.message
@@ -170,23 +229,43 @@ def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
 @pytest.mark.parametrize("beside", [1e-2, -3e-3, 1e-3])
 @pytest.mark.parametrize("made", [universal_loop, revolute_loop])
 def test_other_rows_are_chosen_where_a_kite_is_nearly_singular(made, beside, style):
-    """Those that were chosen at design depend on each other where it lies flat, or so nearly that it cannot be told from that."""
+    """Those that were chosen at design depend on each other where it lies flat, or so nearly that
+    it cannot be told from that.
+    """
     start, turn = np.float64(-1.5), np.linspace(0.0, 3.3, 31)
-    mechanism = made(tuple(pin(start).tolist()), tuple(corner(start, beside, 1.2, 1.2).tolist()), (1.0 - beside, 0.0, 0.0))
+    mechanism = made(
+        tuple(pin(start).tolist()),
+        tuple(corner(start, beside, 1.2, 1.2).tolist()),
+        (1.0 - beside, 0.0, 0.0),
+    )
     found = solve(mechanism, "turn", turn, style=style, order=0)
     assert found.solved.all(), found.message
-    assert np.abs(found.points["meet"].position - corner(start + turn, beside, 1.2, 1.2)).max() <= 1e-13 / abs(beside)
+    assert np.abs(
+        found.points["meet"].position - corner(start + turn, beside, 1.2, 1.2)
+    ).max() <= 1e-13 / abs(beside)
 
 
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
 @pytest.mark.parametrize("count", [4, 7, 8, 10, 12, 15])
 def test_a_small_loop_does_not_hide_the_corner_of_a_large_one(count, style):
     """Its singular values are the smaller ones all the way round, but where the large one folds."""
-    x, y, rest, end = -0.35245745516404536, -0.7148047631848835, 2.802282190370843, (2.175441305403854, 0.49218148289661845)
-    large = universal_loop((x, y, 0.0), (*end, 0.0), (rest, 0.0, 0.0), (np.cos(1.345), np.sin(1.345), 0.0))
-    pin, meet = (-0.023472379164771337, -0.0056469601124647896, 0.0), (0.0017654205974588259, 0.11112362657419883, 0.0)
+    x, y, rest, end = (
+        -0.35245745516404536,
+        -0.7148047631848835,
+        2.802282190370843,
+        (2.175441305403854, 0.49218148289661845),
+    )
+    large = universal_loop(
+        (x, y, 0.0), (*end, 0.0), (rest, 0.0, 0.0), (np.cos(1.345), np.sin(1.345), 0.0)
+    )
+    pin, meet = (
+        (-0.023472379164771337, -0.0056469601124647896, 0.0),
+        (0.0017654205974588259, 0.11112362657419883, 0.0),
+    )
     joints = [
-        Revolute("small rest", "ground", "small", (0.12433883023528294, 0.04634680743282863, 0.0), Z),
+        Revolute(
+            "small rest", "ground", "small", (0.12433883023528294, 0.04634680743282863, 0.0), Z
+        ),
         Distance("small rod", "crank", "small", (pin, meet)),
     ]
     both = replace(large, bodies=[*large.bodies, Body("small")], joints=[*large.joints, *joints])
@@ -198,16 +277,24 @@ def test_a_small_loop_does_not_hide_the_corner_of_a_large_one(count, style):
 
 
 def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
-    """The rates interpolated at the pose are worse than the pose; they are not wanted, and what is beyond is solved as anywhere."""
+    """The rates interpolated at the pose are worse than the pose; they are not wanted, and what is
+    beyond is solved as anywhere.
+    """
     joints = [
         Revolute("hinge", "ground", "crank", (0.9, -0.2, 0.0), (-0.9, -0.1, -1.6)),
-        ConstantVelocity("joint", "crank", "shaft", (0.1, -1.0, 0.0), ((0.1, 0.6, -0.1), (-0.5, 2.2, 1.3))),
+        ConstantVelocity(
+            "joint", "crank", "shaft", (0.1, -1.0, 0.0), ((0.1, 0.6, -0.1), (-0.5, 2.2, 1.3))
+        ),
         Inline("groove", "shaft", "ground", (0.4, -1.0, 0.5), (-0.9, 0.9, -0.3)),
     ]
     point = Point("tip", "shaft", (-0.1, 1.7, 1.3))
-    mechanism = Mechanism("groove", [Body("crank"), Body("shaft")], joints, [point], [JointAngle("turn", "hinge")])
+    mechanism = Mechanism(
+        "groove", [Body("crank"), Body("shaft")], joints, [point], [JointAngle("turn", "hinge")]
+    )
     found = [solve(mechanism, "turn", [0.0, 1.0], order=order) for order in range(3)]
     assert [each.solved.all() for each in found] == [True] * 3
     assert all("crosses a singular pose" in each.details["notes"][0] for each in found)
     for each in found[1:]:
-        np.testing.assert_allclose(each.points["tip"].position, found[0].points["tip"].position, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(
+            each.points["tip"].position, found[0].points["tip"].position, rtol=0.0, atol=1e-12
+        )

@@ -1,10 +1,21 @@
-"""Drivers against degrees of freedom, at any size: what the sparse count finds is what the dense one does, and is told alike."""
+"""Drivers against degrees of freedom, at any size: what the sparse count finds is what the dense
+one does, and is told alike.
+"""
 
 from dataclasses import replace
 
 import pytest
 from kincheck import cases
-from kincheck.core import Body, Gear, JointAngle, Mechanism, PointCoordinate, Revolute, SolveError, Spherical
+from kincheck.core import (
+    Body,
+    Gear,
+    JointAngle,
+    Mechanism,
+    PointCoordinate,
+    Revolute,
+    SolveError,
+    Spherical,
+)
 from kincheck.core.cli import main
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure import driver_count
@@ -27,8 +38,12 @@ def sparse(monkeypatch):
 def test_the_sparse_count_is_the_dense_one(name, sparse):
     mechanism = cases.load(name).mechanism
     dof = account(mechanism, frames(mechanism)).dof
-    undriven, twice = (replace(mechanism, drivers=each) for each in ((), (*mechanism.drivers, *again(mechanism))))
-    assert [driver_count.degrees_of_freedom(each) for each in (mechanism, undriven, twice)] == [dof] * 3
+    undriven, twice = (
+        replace(mechanism, drivers=each) for each in ((), (*mechanism.drivers, *again(mechanism)))
+    )
+    assert [driver_count.degrees_of_freedom(each) for each in (mechanism, undriven, twice)] == [
+        dof
+    ] * 3
     driver_count.require_driven(mechanism)
 
 
@@ -43,48 +58,89 @@ def test_many_freedoms_are_counted_one_by_one(count, sparse):
     balls = [Spherical(f"s{k}", "ground", f"b{k}", (float(k), 0.0, 0.0)) for k in range(count)]
     free = Mechanism("loose", bodies, balls, [], [])
     assert driver_count.degrees_of_freedom(free) == 3 * count
-    with pytest.raises(SolveError, match=rf"{3 * count} degrees of freedom \({6 * count} coordinates - rank {3 * count}\) but 0 "):
+    with pytest.raises(
+        SolveError,
+        match=(
+            rf"{3 * count} degrees of freedom \({6 * count} coordinates - rank {3 * count}\) but 0 "
+        ),
+    ):
         driver_count.require_driven(free)
 
 
 def test_what_only_couplers_tie_is_counted(sparse):
-    axles = [Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0)) for name, x in (("first", 0.0), ("second", 1.0))]
-    wheels = Mechanism("gears", [Body("first"), Body("second")], axles, [], [], [Gear("mesh", ("first", "second"), -2.0)])
+    axles = [
+        Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
+        for name, x in (("first", 0.0), ("second", 1.0))
+    ]
+    wheels = Mechanism(
+        "gears",
+        [Body("first"), Body("second")],
+        axles,
+        [],
+        [],
+        [Gear("mesh", ("first", "second"), -2.0)],
+    )
     assert driver_count.degrees_of_freedom(wheels) == 1
     assert driver_count.degrees_of_freedom(replace(wheels, couplers=())) == 2
 
 
 def test_a_driver_that_is_locked_at_the_design_is_left_to_the_solver(sparse):
     stretched = slider_crank()
-    driver_count.require_driven(replace(stretched, drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))]))
+    driver_count.require_driven(
+        replace(stretched, drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
+    )
 
 
 def test_a_large_mechanism_is_refused_with_names():
     whole = chain(LOOPS)
     driver_count.require_driven(whole)
-    with pytest.raises(SolveError, match=r"1 degree of freedom \(174 coordinates - rank 173\) but 0 drivers; what can still"):
+    with pytest.raises(
+        SolveError,
+        match=r"1 degree of freedom \(174 coordinates - rank 173\) but 0 drivers; what can still",
+    ):
         driver_count.require_driven(replace(whole, drivers=()))
     twice = replace(whole, drivers=(*whole.drivers, JointAngle("second", "pivot7")))
-    with pytest.raises(SolveError, match=r"but 2 drivers; not independent are '(turn|second)', '(turn|second)'; remove 1 or"):
+    with pytest.raises(
+        SolveError,
+        match=r"but 2 drivers; not independent are '(turn|second)', '(turn|second)'; remove 1 or",
+    ):
         driver_count.require_driven(twice)
     spinning = replace(
-        whole, bodies=[*whole.bodies, Body("stray")], joints=[*whole.joints, Spherical("s", "crank3", "stray", (9, 9, 9))]
+        whole,
+        bodies=[*whole.bodies, Body("stray")],
+        joints=[*whole.joints, Spherical("s", "crank3", "stray", (9, 9, 9))],
     )
-    with pytest.raises(SolveError, match=r"4 degrees of freedom .* but 1 driver; what can still move is most of all 'stray'; add"):
+    with pytest.raises(
+        SolveError,
+        match=(
+            r"4 degrees of freedom .* but 1 driver; what can still move is most of all 'stray'; add"
+        ),
+    ):
         driver_count.require_driven(spinning)
 
 
 def written(mechanism, drivers):
     """A case file of a chain."""
-    lines = ['schema = "kincheck-case/1"', 'name = "long"', 'source = "made up for this test"', 'truth = "consensus_only"']
+    lines = [
+        'schema = "kincheck-case/1"',
+        'name = "long"',
+        'source = "made up for this test"',
+        'truth = "consensus_only"',
+    ]
     lines += [f"[bodies.{body.name}]" for body in mechanism.bodies]
     for joint in mechanism.joints:
         axes = f"axes = {[list(axis) for axis in joint.axes]}" if hasattr(joint, "axes") else ""
         axes = f"axis = {list(joint.axis)}" if hasattr(joint, "axis") else axes
         place = f"bodies = {list(joint.bodies)}\npoint = {[float(x) for x in joint.point]}"
         lines += [f'[joints.{joint.name}]\ntype = "{joint.type}"\n{place}\n{axes}']
-    lines += [f'[points.end]\nbody = "{mechanism.points[0].body}"\nposition = {[float(x) for x in mechanism.points[0].position]}']
-    lines += [f'[drivers.{name}]\ntype = "joint_angle"\njoint = "{joint}"' for name, joint in drivers.items()]
+    lines += [
+        f'[points.end]\nbody = "{mechanism.points[0].body}"\nposition ='
+        f" {[float(x) for x in mechanism.points[0].position]}"
+    ]
+    lines += [
+        f'[drivers.{name}]\ntype = "joint_angle"\njoint = "{joint}"'
+        for name, joint in drivers.items()
+    ]
     return "\n".join([*lines, '[sweep]\ndriver = "turn"\nstart = 0.0\nstop = 0.1\nsteps = 3'])
 
 
@@ -98,7 +154,9 @@ def written(mechanism, drivers):
         (2, {"turn": "pivot0"}, "cross1", 2, "but 1 driver; 'crank2' can turn, 'coupler1' can turn; add a driver"),
     ],
 )  # fmt: skip
-def test_exit_status_is_the_same_for_small_and_large(loops, drivers, left_out, status, said, tmp_path, capsys):
+def test_exit_status_is_the_same_for_small_and_large(
+    loops, drivers, left_out, status, said, tmp_path, capsys
+):
     whole = chain(loops)
     partial = replace(whole, joints=[joint for joint in whole.joints if joint.name != left_out])
     file = write(tmp_path, written(partial, drivers))

@@ -1,4 +1,6 @@
-"""Proofs in ball arithmetic: what is proved is true, and what is not true, or singular, is not proved."""
+"""Proofs in ball arithmetic: what is proved is true, and what is not true, or singular, is not
+proved.
+"""
 
 import csv
 import math
@@ -9,7 +11,16 @@ from pathlib import Path
 import kincheck.cases
 import numpy as np
 import pytest
-from kincheck.core import Body, Gear, JointAngle, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute
+from kincheck.core import (
+    Body,
+    Gear,
+    JointAngle,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    Revolute,
+)
 from kincheck.core.algebra import root
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
@@ -17,7 +28,13 @@ from kincheck.core.kinematics.formulation.constraints import constraints, frames
 from kincheck.core.kinematics.solve import solve
 from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.verified import krawczyk
-from kincheck.core.kinematics.verified.exact import Exact, as_decimal, as_double, equations, exact_mechanism
+from kincheck.core.kinematics.verified.exact import (
+    Exact,
+    as_decimal,
+    as_double,
+    equations,
+    exact_mechanism,
+)
 from kincheck.core.kinematics.verified.krawczyk import Enclosure, UnprovedError
 from kincheck.core.kinematics.verified.verified_sweep import _states, prove
 from kincheck.core.mechanism.motions import Path as Way
@@ -35,7 +52,9 @@ BITS = 200
 def proved(mechanism, driver, values, reading=as_double, exact=None, tol=1e-12):
     """The proofs of a sweep at rate one."""
     values = np.asarray(values, dtype=float)
-    drives = {driver: [(x, Fraction(1), Fraction(0)) for x in exact or map(Fraction, values.tolist())]}
+    drives = {
+        driver: [(x, Fraction(1), Fraction(0)) for x in exact or map(Fraction, values.tolist())]
+    }
     points = [point.name for point in mechanism.points]
     return prove(mechanism, Way({driver: Ramp(1.0)}, values), points, drives, reading, BITS, tol)
 
@@ -52,7 +71,11 @@ def test_jacobian_of_a_tape_is_that_of_its_series():
     assert gradients[3].keys() == {2}
     assert gradients[4] == {}
     code = program("values", tape, dict(enumerate(values)))
-    slopes = program("slopes", tape, {3 * row + k: value for row, each in enumerate(gradients) for k, value in each.items()})
+    slopes = program(
+        "slopes",
+        tape,
+        {3 * row + k: value for row, each in enumerate(gradients) for k, value in each.items()},
+    )
     with precision(BITS):
         at = [flint.arb(x) for x in ("0.7", "-0.3", "1.9")]
         found = evaluate(slopes, at)
@@ -104,11 +127,15 @@ def test_exact_numbers():
 
 @pytest.mark.parametrize("case", probes(), ids=lambda case: case.name)
 def test_no_joint_rounds(case, monkeypatch):
-    """Nothing that reaches the primitives went through a function of doubles; checks and the choice of a length unit may."""
+    """Nothing that reaches the primitives went through a function of doubles; checks and the choice
+    of a length unit may.
+    """
 
     def exactly(do):
         def call(*arguments):
-            assert not any(isinstance(each, Exact) for each in arguments), f"{do} rounds {arguments} to a double"
+            assert not any(isinstance(each, Exact) for each in arguments), (
+                f"{do} rounds {arguments} to a double"
+            )
             return do(*arguments)
 
         return call
@@ -116,7 +143,10 @@ def test_no_joint_rounds(case, monkeypatch):
     with precision(BITS):
         exact = exact_mechanism(case.mechanism, as_double)
         frame = frames(exact)
-        for name in {name for name in dir(math) if callable(getattr(math, name))} - {"isfinite", "dist"}:
+        for name in {name for name in dir(math) if callable(getattr(math, name))} - {
+            "isfinite",
+            "dist",
+        }:
             monkeypatch.setattr(math, name, exactly(getattr(math, name)))
         for constraint in constraints(exact, frame, {}):
             assert {*_floats(constraint)} <= {0.0, 1.0, -1.0}, constraint
@@ -143,21 +173,33 @@ def test_slider_crank_is_its_closed_form():
             height = theta.sin() * CRANK
             x = theta.cos() * CRANK + (ROD * ROD - height * height).sqrt()
             moved, velocity, acceleration = each.points["end"]
-            for ball, truth in ((moved[0], x[0] - (CRANK + ROD)), (velocity[0], x[1]), (acceleration[0], 2 * x[2])):
+            for ball, truth in (
+                (moved[0], x[0] - (CRANK + ROD)),
+                (velocity[0], x[1]),
+                (acceleration[0], 2 * x[2]),
+            ):
                 assert ball.overlaps(truth)
                 assert ball.rad() < 1e-40
             assert all(x.contains(0) for x in moved[1:])
 
 
 def test_strut_agrees_with_its_printed_reference():
-    """Two independent 40-digit solutions, printed to 17 digits, of the geometry as its decimals say."""
+    """Two independent 40-digit solutions, printed to 17 digits, of the geometry as its decimals
+    say.
+    """
     case = kincheck.cases.load("mcpherson_strut")
     lines = [
-        line for line in (Path(kincheck.cases.__file__).parent / "mcpherson_strut.csv").read_text().splitlines() if line[0] != "#"
+        line
+        for line in (Path(kincheck.cases.__file__).parent / "mcpherson_strut.csv")
+        .read_text()
+        .splitlines()
+        if line[0] != "#"
     ]
     rows = [*csv.DictReader(lines)][::16]
     values = [float(row["stroke"]) for row in rows]
-    found = proved(case.mechanism, "stroke", values, as_decimal, [Fraction(row["stroke"]) for row in rows])
+    found = proved(
+        case.mechanism, "stroke", values, as_decimal, [Fraction(row["stroke"]) for row in rows]
+    )
     with precision(BITS):
         for row, each in zip(rows, found.samples, strict=True):
             for name, axis in (("half_track_change", 1), ("wheelbase_change", 0)):
@@ -165,26 +207,36 @@ def test_strut_agrees_with_its_printed_reference():
                     printed = row[name + ending]
                     last = Fraction(1, 10 ** len(printed.partition(".")[2]))
                     off = abs(each.points["wheel_center"][order][axis] - flint.arb(printed))
-                    assert off < flint.arb(flint.fmpq(last.numerator, last.denominator)) * 0.51, (name, ending, row["stroke"])
+                    assert off < flint.arb(flint.fmpq(last.numerator, last.denominator)) * 0.51, (
+                        name,
+                        ending,
+                        row["stroke"],
+                    )
 
 
 @pytest.mark.parametrize("case", probes(), ids=lambda case: case.name)
 def test_every_joint_type_is_proved(case):
-    """Velocities and accelerations here come from the residuals alone; the native ones from rows, nu and gamma."""
+    """Velocities and accelerations here come from the residuals alone; the native ones from rows,
+    nu and gamma.
+    """
     values = case.sweep.change[::20]
     found = proved(case.mechanism, case.sweep.driver, values)
     for name, native in found.native.points.items():
         origin = np.array(case.mechanism.point(name).position)
         for k, each in enumerate(found.samples):
             assert isinstance(each, Enclosure), each
-            moved, velocity, acceleration = ([float(x) for x in vector] for vector in each.points[name])
+            moved, velocity, acceleration = (
+                [float(x) for x in vector] for vector in each.points[name]
+            )
             assert np.abs(native.position[k] - origin - moved).max() < 1e-14
             assert np.abs(native.velocity[k] - velocity).max() < 1e-13
             assert np.abs(native.acceleration[k] - acceleration).max() < 1e-11
 
 
 def test_turns_of_coupled_joints_are_counted():
-    """A worm: twelve turns of the shaft are one of the wheel, and the samples are most of half a turn apart."""
+    """A worm: twelve turns of the shaft are one of the wheel, and the samples are most of half a
+    turn apart.
+    """
     axis, along = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
     gears = Mechanism(
         "gears",
@@ -226,9 +278,16 @@ def _setup(mechanism, native, angle):
     driver = native.drivers[0].name
     motion = solve(native, driver, [angle], bodies=[body.name for body in native.moving])
     frame = frames(mechanism)
-    kept = select_rows(mechanism, frame, Cartesian(constraints(mechanism, frame, {}), frame.moving)).chosen
+    kept = select_rows(
+        mechanism, frame, Cartesian(constraints(mechanism, frame, {}), frame.moving)
+    ).chosen
     with precision(BITS):
-        traced = equations(exact_mechanism(mechanism, as_double), (driver,), [p.name for p in mechanism.points], kept)
+        traced = equations(
+            exact_mechanism(mechanism, as_double),
+            (driver,),
+            [p.name for p in mechanism.points],
+            kept,
+        )
         drives = [[flint.arb(angle), flint.arb(1), flint.arb(0)]]
     return traced, _states(native, motion, np.array([angle]))[0], drives
 
@@ -243,7 +302,9 @@ def test_a_solution_too_far_away_is_not_taken():
 
 
 def test_a_spurious_branch_is_not_proved():
-    """A crank turned over about an axis in its plane solves the residuals of its revolute, and its driver's at half a turn."""
+    """A crank turned over about an axis in its plane solves the residuals of its revolute, and its
+    driver's at half a turn.
+    """
     arm = Mechanism(
         "arm",
         [Body("arm")],
@@ -261,7 +322,9 @@ def test_a_spurious_branch_is_not_proved():
 
 
 def test_a_change_point_is_not_proved_and_says_so():
-    """A parallelogram with all pivots on a line can go on as a parallelogram or as its crossed twin."""
+    """A parallelogram with all pivots on a line can go on as a parallelogram or as its crossed
+    twin.
+    """
     y = (0.0, 0.0, 1.0)
     flat = Mechanism(
         "parallelogram",
@@ -279,7 +342,9 @@ def test_a_change_point_is_not_proved_and_says_so():
     assert [isinstance(each, Enclosure) for each in found.samples] == [True, True, False, True]
     assert "singular pose" in str(found.samples[2])
     # beyond it the march goes on as the parallelogram, and that is proved again
-    assert found.native.points["C"].position[3] == pytest.approx([2.0 - np.sin(2.0), np.cos(2.0), 0.0], abs=1e-12)
+    assert found.native.points["C"].position[3] == pytest.approx(
+        [2.0 - np.sin(2.0), np.cos(2.0), 0.0], abs=1e-12
+    )
 
 
 def test_a_dead_centre_is_not_proved_and_its_neighbours_are():
@@ -295,5 +360,8 @@ def test_a_dead_centre_is_not_proved_and_its_neighbours_are():
     bent = replace(bent, joints=joints, points=[Point("pin", "crank", pin)])
     stroke = end - slider[0]
     found = proved(bent, "push", [0.0, 0.5 * stroke, stroke - 1e-5, stroke])
-    assert [isinstance(each, Enclosure) for each in found.samples] == [True, True, True, False], found.samples[2]
-    assert found.samples[2].alone < 0.2 * found.samples[0].alone  # the singular value is a hundredth, the proof reaches less far
+    assert [isinstance(each, Enclosure) for each in found.samples] == [True, True, True, False], (
+        found.samples[2]
+    )
+    # the singular value is a hundredth, the proof reaches less far
+    assert found.samples[2].alone < 0.2 * found.samples[0].alone

@@ -1,10 +1,21 @@
-"""Lanes that are predicted by the samples before them: to one iteration, to the same pose; and where that fails, by their rates."""
+"""Lanes that are predicted by the samples before them: to one iteration, to the same pose; and
+where that fails, by their rates.
+"""
 
 import numpy as np
 import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.interpolation import weights_of_groups, weights_of_samples
-from kincheck.core.kinematics.compiled.request import ACCEPT, EARLIER, FROM, PREDICTED, RATE, RATE_T, TIME, Request
+from kincheck.core.kinematics.compiled.request import (
+    ACCEPT,
+    EARLIER,
+    FROM,
+    PREDICTED,
+    RATE,
+    RATE_T,
+    TIME,
+    Request,
+)
 from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NODES, groups_behind, place_of
@@ -31,19 +42,32 @@ def test_weights_continue_what_is_of_fifth_order(lanes):
     assert not of_samples[:, :NODES].any()
     assert not of_groups[:, :behind].any()
     for k in range(behind, len(times)):
-        past = [values[j] for place in range(NODES) for j in range(k - NODES, k) if j % NODES == place]
+        past = [
+            values[j] for place in range(NODES) for j in range(k - NODES, k) if j % NODES == place
+        ]
         assert of_samples[:, k] @ past == pytest.approx(values[k], rel=1e-11)
         groups = values[k // lanes * lanes - behind : k // lanes * lanes].reshape(-1, lanes)
-        assert of_groups[:, k] @ [groups[place_of(j, lanes)] for j in range(NODES)] == pytest.approx(values[k], rel=1e-9)
+        assert of_groups[:, k] @ [
+            groups[place_of(j, lanes)] for j in range(NODES)
+        ] == pytest.approx(values[k], rel=1e-9)
     for few in range(9):
-        assert weights_of_samples(times[:few]).shape == weights_of_groups(times[:few], lanes).shape == (NODES, few)
-    for weights in weights_of_samples(np.repeat(times, 2)), weights_of_groups(np.repeat(times, 2), lanes):
+        assert (
+            weights_of_samples(times[:few]).shape
+            == weights_of_groups(times[:few], lanes).shape
+            == (NODES, few)
+        )
+    for weights in (
+        weights_of_samples(np.repeat(times, 2)),
+        weights_of_groups(np.repeat(times, 2), lanes),
+    ):
         assert not np.isfinite(weights[:, 8:]).all(axis=0).any()
 
 
 def positions(values, order=0, *, compiled=False):
     """Of the strut, as many samples at once as a vector of machine code has lanes."""
-    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=compiled))
+    model = compile_model(
+        mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=compiled)
+    )
     found = sweep(model, Path({"stroke": Ramp(1.0)}, np.asarray(values)), 1e-12)
     assert found.solved.all(), found.message
     return found
@@ -52,7 +76,8 @@ def positions(values, order=0, *, compiled=False):
 @pytest.fixture
 def eight_lanes(monkeypatch):
     monkeypatch.setattr("kincheck.core.kinematics.compiled.samples.LANES", 8)
-    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)  # whatever the processor's
+    # whatever the processor's
+    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)
 
 
 @pytest.mark.usefixtures("eight_lanes")
@@ -60,26 +85,41 @@ def eight_lanes(monkeypatch):
 def test_lanes_are_extrapolated_to_one_iteration(order):
     fine = np.linspace(-0.08, 0.08, 161)
     found = positions(fine, order)
-    later = np.abs(np.arange(161) - 80) > 8  # there is nothing yet to extrapolate the first eight on either side from
+    # there is nothing yet to extrapolate the first eight on either side from
+    later = np.abs(np.arange(161) - 80) > 8
     assert (found.iterations[later] == 1).all()
     by_rates = positions(fine[::8], order)  # all that is left of the lanes before are rates
     assert (by_rates.iterations[1:-1] > 1).any()
-    assert np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max() <= 4e-16
+    assert (
+        np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max()
+        <= 4e-16
+    )
 
 
 @pytest.mark.parametrize("interpreted", [False, True])
 @pytest.mark.parametrize("order", [0, 2])
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, interpreted, monkeypatch):
-    """Whatever the processor's: it runs such vectors too. On from where the grid changes it takes as many again."""
+    """Whatever the processor's: it runs such vectors too. On from where the grid changes it takes
+    as many again.
+    """
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
     monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
     monkeypatch.setattr("kincheck.core.program.llvm.jit.OFTEN", 10**9 if interpreted else 0)
-    grid = np.concatenate([np.linspace(-0.08, 0.0, 80), 0.001 * np.arange(1.0, 41.0), 0.06 + 0.001 * np.arange(1.0, 20.0)])
+    grid = np.concatenate(
+        [
+            np.linspace(-0.08, 0.0, 80),
+            0.001 * np.arange(1.0, 41.0),
+            0.06 + 0.001 * np.arange(1.0, 20.0),
+        ]
+    )
     found, first = positions(grid, order, compiled=True), groups_behind(lanes) * lanes
     expected = positions(grid, order).points["wheel"]
     assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
-    assert order == 0 or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
+    assert (
+        order == 0
+        or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
+    )
     below, above = found.iterations[78::-1], found.iterations[79:]  # the sides, from the start
     assert (below[:first] > 1).any()
     assert (below[first:] == 1).all()
@@ -90,19 +130,29 @@ def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, interpre
 
 @pytest.mark.parametrize("order", [0, 2])
 def test_what_is_continued_is_all_that_tests_need_and_no_step_behind(order):
-    """Neither rates, nor what was predicted: where lanes are predicted after all, the step before is none."""
-    found = compile_model(mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=False))
+    """Neither rates, nor what was predicted: where lanes are predicted after all, the step before
+    is none.
+    """
+    found = compile_model(
+        mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=False)
+    )
     slots, vectors, plan = found.slots, found.vectors, found.plan
     ahead = [RATE, RATE_T, *(PREDICTED + name for name in found.state)]
     left_out = {slot for name in ahead for slot in vectors[FROM + name]}
-    assert {target for _, target in plan.continued} == {target for _, target in plan.carried} - left_out
+    assert {target for _, target in plan.continued} == {
+        target for _, target in plan.carried
+    } - left_out
     now = {slots[TIME]: slots[FROM + TIME], slots[FROM + TIME]: slots[EARLIER + TIME]}
     assert {*now.items()} <= {*plan.carried}
-    assert {(slots[TIME], slots[FROM + TIME]), (slots[TIME], slots[EARLIER + TIME])} <= {*plan.continued}
+    assert {(slots[TIME], slots[FROM + TIME]), (slots[TIME], slots[EARLIER + TIME])} <= {
+        *plan.continued
+    }
     # what stands in the last lane `extrapolate` puts out itself
     puts = plan.programs["extrapolate"].outputs
     assert {*plan.moved} == {pair for pair in plan.continued if pair[1] not in puts}
-    assert {target for _, target in plan.moved} == {slots[name] for name in (FROM + TIME, EARLIER + TIME, *ACCEPT)}
+    assert {target for _, target in plan.moved} == {
+        slots[name] for name in (FROM + TIME, EARLIER + TIME, *ACCEPT)
+    }
 
 
 GRIDS = {
@@ -116,24 +166,38 @@ GRIDS = {
 @pytest.mark.parametrize("values", GRIDS.values(), ids=GRIDS)
 @pytest.mark.parametrize("order", [0, 2])
 def test_where_extrapolation_fails_the_rates_take_over(values, order, monkeypatch):
-    """Two samples at one time make it infinite, a long step makes it wild. A lane alone is never extrapolated."""
+    """Two samples at one time make it infinite, a long step makes it wild. A lane alone is never
+    extrapolated.
+    """
     both = [positions(values, order, compiled=compiled) for compiled in (False, True)]
     monkeypatch.setattr("kincheck.core.kinematics.compiled.samples.LANES", 1)
     expected = positions(values, order, compiled=False).points["wheel"]
     for found in both:
         assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
-        assert order == 0 or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
+        assert (
+            order == 0
+            or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
+        )
     np.testing.assert_array_equal(*(found.iterations for found in both))  # predicted by the same
 
 
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_beyond_a_long_step_groups_are_counted_anew(lanes, monkeypatch):
-    """A group of eight is accepted in part there, and those after it begin at no multiple of eight."""
+    """A group of eight is accepted in part there, and those after it begin at no multiple of
+    eight.
+    """
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
     monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
     angles = np.concatenate([0.002 * np.arange(21.0), 0.94 + 0.002 * np.arange(60.0)])
-    found = sweep(compile_model(slider_crank(), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, angles), 1e-12)
-    assert np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max() <= 1e-15
+    found = sweep(
+        compile_model(slider_crank(), Request(("turn",), ("end",))),
+        Path({"turn": Ramp(1.0)}, angles),
+        1e-12,
+    )
+    assert (
+        np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max()
+        <= 1e-15
+    )
     assert (found.iterations[21:25] > 1).any()
     assert (found.iterations[-40:] == 1).all()
 
@@ -141,13 +205,20 @@ def test_beyond_a_long_step_groups_are_counted_anew(lanes, monkeypatch):
 @pytest.mark.usefixtures("eight_lanes")
 @pytest.mark.parametrize("order", [0, 2])
 def test_a_grid_that_gets_fine_is_extrapolated_from_there(order):
-    """Long steps are taken one by one; from the first group that is accepted whole it is on to a multiple of eight."""
+    """Long steps are taken one by one; from the first group that is accepted whole it is on to a
+    multiple of eight.
+    """
     angles = np.concatenate([[0.5, 1.0, 1.5], 1.5 + 0.002 * np.arange(1.0, 62.0)])
     taken = list[list[int]]()
     for compiled in (False, True):
-        model = compile_model(slider_crank(), Request(("turn",), ("end",), order=order, compiled=compiled))
+        model = compile_model(
+            slider_crank(), Request(("turn",), ("end",), order=order, compiled=compiled)
+        )
         found = sweep(model, Path({"turn": Ramp(1.0)}, angles), 1e-12)
-        assert np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max() <= 1e-15
+        assert (
+            np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max()
+            <= 1e-15
+        )
         taken.append(found.iterations.tolist())
     assert taken[0] == taken[1]
     assert taken[0][:3] == [3, 3, 3]

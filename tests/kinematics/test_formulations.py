@@ -1,7 +1,8 @@
 """One mechanism, several row styles: the same motion, and what the simplified rows are worth.
 
-Whichever way the rows are written, the solutions agree to round-off. The paper's simplified rows are exact where the equations
-hold; away from there they are not, and that is what keeps Newton off the spurious zeros (formulation section 3).
+Whichever way the rows are written, the solutions agree to round-off. The paper's simplified rows
+are exact where the equations hold; away from there they are not, and that is what keeps Newton off
+the spurious zeros (formulation section 3).
 """
 
 import kincheck.cases
@@ -37,7 +38,10 @@ def rng():
 def deviation(found, reference, order):
     """The largest over all points and samples."""
     assert found.solved.all(), found.message
-    return max(np.abs(getattr(found.points[name], order) - getattr(reference.points[name], order)).max() for name in found.points)
+    return max(
+        np.abs(getattr(found.points[name], order) - getattr(reference.points[name], order)).max()
+        for name in found.points
+    )
 
 
 STROKES = np.linspace(-0.08, 0.08, 161)
@@ -45,10 +49,16 @@ STROKES = np.linspace(-0.08, 0.08, 161)
 
 @pytest.mark.parametrize("style", OTHERS)
 def test_the_strut_moves_alike_in_all_styles(style):
-    """Round-off of metre-sized coordinates is 1e-16; each derivative passes the equations, of pivots about 0.3, once more."""
-    found, reference = (solve(mcpherson(), "stroke", STROKES, style=each) for each in (style, Style.NATIVE))
+    """Round-off of metre-sized coordinates is 1e-16; each derivative passes the equations, of
+    pivots about 0.3, once more.
+    """
+    found, reference = (
+        solve(mcpherson(), "stroke", STROKES, style=each) for each in (style, Style.NATIVE)
+    )
     limits = dict(zip(ORDERS, (1e-15, 1e-14, 1e-13), strict=True))
-    assert {order: d for order in ORDERS if (d := deviation(found, reference, order)) > limits[order]} == {}
+    assert {
+        order: d for order in ORDERS if (d := deviation(found, reference, order)) > limits[order]
+    } == {}
 
 
 def run(case, style):
@@ -57,7 +67,8 @@ def run(case, style):
     return sweep(compile_model(case.mechanism, request), case.sweep.path, 1e-12)
 
 
-# The platforms, of 13 bodies, take ten times as long to trace in all styles as any other case, and their joints occur elsewhere.
+# The platforms, of 13 bodies, take ten times as long to trace in all styles as any other case, and
+# their joints occur elsewhere.
 MOST_BODIES = 7
 ALL = [*map(kincheck.cases.load, kincheck.cases.names()), *probes()]
 CASES = {case.name: case for case in ALL if len(case.mechanism.moving) <= MOST_BODIES}
@@ -66,13 +77,19 @@ CASES = {case.name: case for case in ALL if len(case.mechanism.moving) <= MOST_B
 @pytest.mark.parametrize("name", CASES)
 def test_all_cases_move_alike_in_all_styles(name):
     reference = run(CASES[name], Style.NATIVE)
-    # a hundred roundings, divided by the smallest singular value once for positions, and once more for each derivative
+    # a hundred roundings, divided by the smallest singular value once for positions, and once more
+    # for each derivative
     sigma = reference.details["smallest_singular_value"]
     for style in OTHERS:
         found = run(CASES[name], style)
         for k, order in enumerate(ORDERS):
-            size = max(1.0, *(np.abs(getattr(motion, order)).max() for motion in reference.points.values()))
-            assert deviation(found, reference, order) < 1e-14 * size / sigma ** (k + 1), (style, order)
+            size = max(
+                1.0, *(np.abs(getattr(motion, order)).max() for motion in reference.points.values())
+            )
+            assert deviation(found, reference, order) < 1e-14 * size / sigma ** (k + 1), (
+                style,
+                order,
+            )
 
 
 # Where the simplified rows are exact
@@ -80,18 +97,28 @@ def test_all_cases_move_alike_in_all_styles(name):
 
 def matrix(primitives, i, j):
     """The rows of primitives by (dr_i, dpi_i, dr_j, dpi_j), shape (lanes, rows, 12)."""
-    rows = [lanes([*row.ri, *row.pi, *row.rj, *row.pj]) for each in primitives for row in each.rows(i, j)]
+    rows = [
+        lanes([*row.ri, *row.pi, *row.rj, *row.pj])
+        for each in primitives
+        for row in each.rows(i, j)
+    ]
     return np.array(rows).transpose(2, 0, 1)
 
 
 def both(native, i, j):
-    """Rows of a native primitive's twins: the simplified ones of the paper, and the exact ones by full products."""
-    simplified, exact = (matrix(twins[type(native)](native), i, j) for twins in (paper.TWINS, conventional.TWINS))
+    """Rows of a native primitive's twins: the simplified ones of the paper, and the exact ones by
+    full products.
+    """
+    simplified, exact = (
+        matrix(twins[type(native)](native), i, j) for twins in (paper.TWINS, conventional.TWINS)
+    )
     return simplified, exact
 
 
 def off_by(rng, angle, turn=None):
-    """Poses of two bodies, j turned against i by the angle about an axis of i (any axis unless given)."""
+    """Poses of two bodies, j turned against i by the angle about an axis of i (any axis unless
+    given).
+    """
     q, axis = orientation(rng), direction(rng) if turn is None else turn
     return Pose.of(vector(rng), q), Pose.of(vector(rng), q * rotation(axis, angle))
 
@@ -113,7 +140,8 @@ def test_parallel_axes_have_exact_rows_on_the_right_branch_only(rng):
     assert np.abs(simplified + exact).max() < 1e-14
     simplified, exact = rows(SMALL)
     error = np.abs(simplified - exact).max(axis=(1, 2)) / SMALL
-    assert 0.1 < error.min() < error.max() < 2.0  # first order in the misalignment: largest component of a unit vector
+    # first order in the misalignment: largest component of a unit vector
+    assert 0.1 < error.min() < error.max() < 2.0
 
 
 def test_a_lock_has_exact_rows_where_it_is_closed_only(rng):
@@ -139,7 +167,9 @@ def beyond(rows, others):
 
 
 def test_a_simplified_line_needs_the_lock_beside_it(rng):
-    """dot21 leaves out what three rows of dot12 say; with them it spans the exact rows at any pose, without them it is wrong."""
+    """dot21 leaves out what three rows of dot12 say; with them it spans the exact rows at any pose,
+    without them it is wrong.
+    """
     f, g, h = frame(rng)
     s_i, s_j = vector(rng), vector(rng)
     line = [paper.PaperDot20(a, s_i, s_j, ZERO) for a in (f, g)]
@@ -175,7 +205,9 @@ def stacked(values):
 
 
 def newton(primitives, i, j):
-    """Plain Newton with the smallest steps: (whether a zero was reached, the angle left between the bodies [rad])."""
+    """Plain Newton with the smallest steps: (whether a zero was reached, the angle left between the
+    bodies [rad]).
+    """
     done = np.zeros(STARTS, dtype=bool)
     for _ in range(60):
         poses = Pose.of(ZERO, i), Pose.of(ZERO, j)
@@ -183,7 +215,9 @@ def newton(primitives, i, j):
         done = np.abs(phi).max(axis=0) < 1e-12
         if done.all():
             break
-        rows = np.array([stacked([*row.pi, *row.pj]) for each in primitives for row in each.rows(*poses)]).transpose(2, 0, 1)
+        rows = np.array(
+            [stacked([*row.pi, *row.pj]) for each in primitives for row in each.rows(*poses)]
+        ).transpose(2, 0, 1)
         step = -np.einsum("lij,jl->il", np.linalg.pinv(rows), phi) * ~done
         turns = [Vec3(*part) for part in (step[:3], step[3:])]
         if primitives[0].body_axes:
@@ -194,7 +228,9 @@ def newton(primitives, i, j):
 
 @pytest.mark.parametrize("style", Style)
 def test_from_anywhere_to_the_right_branch(style, rng):
-    """Exact rows lead to the nearest zero; seven of the eight rotations that solve the conventional residual are spurious."""
+    """Exact rows lead to the nearest zero; seven of the eight rotations that solve the conventional
+    residual are spurious.
+    """
     done, left = newton(lock(style), uniform(rng), uniform(rng))
     assert done.all()
     right = int((left < 1e-6).sum())

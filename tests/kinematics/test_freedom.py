@@ -1,4 +1,6 @@
-"""Degrees of freedom: the paper's count, the rank, the rows that are left out, and what is said where the numbers do not match."""
+"""Degrees of freedom: the paper's count, the rank, the rows that are left out, and what is said
+where the numbers do not match.
+"""
 
 from dataclasses import replace
 
@@ -43,7 +45,9 @@ def jacobian(formulation, at):
 
 
 def test_mcpherson_account():
-    """Table 5 of the paper: five bodies, 35 coordinates, 34 equations; the native count: 18 coordinates, rank 17."""
+    """Table 5 of the paper: five bodies, 35 coordinates, 34 equations; the native count: 18
+    coordinates, rank 17.
+    """
     found = account_of(mcpherson())
     assert found.counted == "35 - 34 = 1"
     assert (found.bodies, found.coordinates, found.equations) == (5, 35, 34)
@@ -89,9 +93,13 @@ def tilted(point):
     return tuple(TILT @ point)
 
 
-@pytest.mark.parametrize("mechanism", [four_bar(), placed(four_bar(), tilted, tilted)], ids=["upright", "tilted"])
+@pytest.mark.parametrize(
+    "mechanism", [four_bar(), placed(four_bar(), tilted, tilted)], ids=["upright", "tilted"]
+)
 def test_four_bar_of_spatial_revolutes(mechanism):
-    """20 rows, 18 coordinates, rank 17 (formulation section 7): three rows are left out, named, and hold all the same."""
+    """20 rows, 18 coordinates, rank 17 (formulation section 7): three rows are left out, named, and
+    hold all the same.
+    """
     found = account_of(mechanism)
     assert (found.rows, found.moving_coordinates, found.rank, found.dof) == (20, 18, 17, 1)
     assert len(found.redundant_rows) == 3
@@ -105,7 +113,9 @@ def test_four_bar_of_spatial_revolutes(mechanism):
 
 
 def test_redundant_rows_that_contradict_are_not_passed_over():
-    """A rod across a guide gives way to first order only: its row is redundant at design and violated beyond."""
+    """A rod across a guide gives way to first order only: its row is redundant at design and
+    violated beyond.
+    """
     guided = [
         Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         Distance("rod", "ground", "slider", ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))),
@@ -124,7 +134,11 @@ def test_a_pivot_out_of_parallel_locks():
 
 
 def test_a_body_held_twice():
-    m = mechanism_of(Fixed("weld", "ground", "a", A), Fixed("weld again", "ground", "a", B), Revolute("r", "a", "b", A, X))
+    m = mechanism_of(
+        Fixed("weld", "ground", "a", A),
+        Fixed("weld again", "ground", "a", B),
+        Revolute("r", "a", "b", A, X),
+    )
     found = account_of(m)
     assert (found.rows, found.rank, found.dof) == (17, 11, 1)
     assert solve(m, "turn", [0.0, 0.5]).solved.all()
@@ -142,13 +156,21 @@ def rod_between_balls(count):
     """A slider-crank whose rod is a body between two balls and so spins about itself."""
     base = slider_crank()
     pin, end = (CRANK, 0.0, 0.0), (CRANK + ROD, 0.0, 0.0)
-    joints = [base.joint("pivot"), Spherical("big end", "crank", "con rod", pin), Spherical("small end", "con rod", "slider", end)]
-    return replace(base, bodies=[*base.bodies, Body("con rod")], joints=[*joints, base.joint("guide")][:count])
+    joints = [
+        base.joint("pivot"),
+        Spherical("big end", "crank", "con rod", pin),
+        Spherical("small end", "con rod", "slider", end),
+    ]
+    return replace(
+        base, bodies=[*base.bodies, Body("con rod")], joints=[*joints, base.joint("guide")][:count]
+    )
 
 
 def test_a_rod_that_spins_is_named():
     """It alone: the driver holds the crank."""
-    with pytest.raises(SolveError, match=r"2 degrees of freedom .* 1 driver; 'con rod' can turn; .*use distance"):
+    with pytest.raises(
+        SolveError, match=r"2 degrees of freedom .* 1 driver; 'con rod' can turn; .*use distance"
+    ):
         solve(rod_between_balls(4), "turn", [0.0])
 
 
@@ -158,7 +180,9 @@ def test_without_drivers_all_that_moves_is_named():
 
 
 def test_a_body_without_joints_is_named():
-    with pytest.raises(SolveError, match=r"6 degrees of freedom .* 0 drivers; 'a' can move; add a driver"):
+    with pytest.raises(
+        SolveError, match=r"6 degrees of freedom .* 0 drivers; 'a' can move; add a driver"
+    ):
         solve(Mechanism("m", [Body("a")], []), "none", [0.0])
 
 
@@ -218,8 +242,15 @@ def test_a_mechanism_that_does_not_close():
 
 
 def with_ground_rows(mechanism, drives):
-    held = [Constraint(body.name, Ground(), GROUND, body.name) for body in mechanism.bodies if body.fixed]
-    return Cartesian([*held, *constraints(mechanism, frames(mechanism), drives)], [body.name for body in mechanism.bodies])
+    held = [
+        Constraint(body.name, Ground(), GROUND, body.name)
+        for body in mechanism.bodies
+        if body.fixed
+    ]
+    return Cartesian(
+        [*held, *constraints(mechanism, frames(mechanism), drives)],
+        [body.name for body in mechanism.bodies],
+    )
 
 
 def test_ground_rows_leave_the_rank():
@@ -254,7 +285,9 @@ def test_ground_rows_leave_the_solution():
         [*(unit * (Twist(rest.v_t, rest.w_t).of(S) + motion.centripetal(S)))],
     )
     wheel = solve(mechanism, "stroke", [stroke]).points["wheel"]
-    for found, wanted in zip((wheel.position[0], wheel.velocity[0], wheel.acceleration[0]), expected, strict=True):
+    for found, wanted in zip(
+        (wheel.position[0], wheel.velocity[0], wheel.acceleration[0]), expected, strict=True
+    ):
         assert found == pytest.approx(wanted, rel=1e-14, abs=1e-14)
     for fixed in ("chassis", "rack"):
         assert np.abs([*at.poses[fixed].u]).max() < 1e-15
@@ -263,14 +296,23 @@ def test_ground_rows_leave_the_solution():
 @pytest.mark.parametrize("style", ["native", "mixed", "conventional"])
 def test_a_driver_that_is_locked_at_the_design_is_named_with_what_locks_it_and_what_to_do(style):
     pushed = replace(slider_crank(), drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
-    said = r"driver 'push' does not move it .* already from 'pivot', 'rod'; give the design in another pose"
+    said = (
+        r"driver 'push' does not move it .* already from 'pivot', 'rod'; give the design in another"
+        r" pose"
+    )
     with pytest.raises(SolveError, match=said):
         solve(pushed, "push", [0.0], style=style)
 
 
 def test_drivers_that_repeat_each_other_are_named_and_no_others():
-    axles = [Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0)) for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))]
+    axles = [
+        Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
+        for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))
+    ]
     drivers = [JointAngle("first", "a"), JointAngle("second", "a"), JointAngle("sound", "b")]
     twice = Mechanism("twice", [Body("a"), Body("b"), Body("c")], axles, [], drivers)
-    with pytest.raises(SolveError, match=r"drivers 'first', 'second' do not move it .* follows already from each other; give"):
+    with pytest.raises(
+        SolveError,
+        match=r"drivers 'first', 'second' do not move it .* follows already from each other; give",
+    ):
         solve(twice, "first", [0.0])

@@ -1,4 +1,5 @@
-"""A driver that stands at two neighbouring samples and makes whole turns between them, in every engine.
+"""A driver that stands at two neighbouring samples and makes whole turns between them, in every
+engine.
 
 Where it stands says nothing of the turns, but a wheel that is geared to it does.
 """
@@ -6,7 +7,17 @@ Where it stands says nothing of the turns, but a wheel that is geared to it does
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.core import Body, Gear, JointAngle, JointDisplacement, Mechanism, Point, Revolute, Table, Translational
+from kincheck.core import (
+    Body,
+    Gear,
+    JointAngle,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    Revolute,
+    Table,
+    Translational,
+)
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
@@ -35,12 +46,25 @@ def indexing():
 @pytest.mark.parametrize("turns", [1, 2, -5])
 def test_turns_between_two_samples_are_not_lost(turns):
     rest = np.arange(-40.0, 41.0) * 0.01
-    table = Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(np.repeat([0.0, 2.0 * np.pi * turns], len(rest))))
+    table = Table(
+        tuple(np.concatenate([rest, 1.0 + rest])),
+        tuple(np.repeat([0.0, 2.0 * np.pi * turns], len(rest))),
+    )
     angle, still = RATIO * 2.0 * np.pi * turns * np.array([0.0, 1.0]), np.zeros(2)
-    outputs = [Output(name, "rim", along, False, 1e-12, 0.0, "round-off") for name, along in (("x", X), ("y", Y))]
-    reference = {"x": Series(1.0 + 0.2 * np.cos(angle), still, still), "y": Series(0.2 * np.sin(angle), still, still)}
+    outputs = [
+        Output(name, "rim", along, False, 1e-12, 0.0, "round-off")
+        for name, along in (("x", X), ("y", Y))
+    ]
+    reference = {
+        "x": Series(1.0 + 0.2 * np.cos(angle), still, still),
+        "y": Series(0.2 * np.sin(angle), still, still),
+    }
     sweep = Sweep("clock", VALUES, 0.1, motions={"turn": table})
-    case = Case("indexing", "closed form", Truth.CLOSED_FORM, indexing(), sweep, tuple(outputs), reference)
-    engines = [each for each in map(adapters.engine, adapters.ENGINES) if each.version() is not None]
+    case = Case(
+        "indexing", "closed form", Truth.CLOSED_FORM, indexing(), sweep, tuple(outputs), reference
+    )
+    engines = [
+        each for each in map(adapters.engine, adapters.ENGINES) if each.version() is not None
+    ]
     for record in run([case], engines, tol=1e-12).records:
         assert record.outcome is Outcome.PASS, record

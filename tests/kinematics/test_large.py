@@ -36,7 +36,9 @@ def test_a_large_mechanism_that_is_not_driven_is_told_what_can_move(cranks):
 
 @pytest.mark.parametrize("order", [0, 2])
 def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself(order):
-    """What is known of sigma of many variants at once leaves all samples of such a ring in doubt."""
+    """What is known of sigma of many variants at once leaves all samples of such a ring in
+    doubt.
+    """
     whole, turn = ring(24), np.array([0.1, -0.2, 0.0])
     (hinge,) = (joint.point for joint in whole.joints if joint.name == "pivot0")
     hinges = np.array(hinge) + [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]
@@ -44,7 +46,9 @@ def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself(order):
     assert found.solved.all()
     assert found.messages == {}
     for k, at in enumerate(hinges.tolist()):
-        alone = solve(placed(whole, {"joints.pivot0.point": at}), "turn", turn, order=order).points["tip12"]
+        alone = solve(placed(whole, {"joints.pivot0.point": at}), "turn", turn, order=order).points[
+            "tip12"
+        ]
         motion = found.points["tip12"]
         assert np.abs(motion.position[k] - alone.position).max() <= 1e-13
         assert (motion.acceleration is None) == (order < 2)
@@ -69,7 +73,15 @@ def test_a_gear_leaves_a_large_mechanism_a_sparse_system():
     gear = Gear("gear", ("shaft", f"pivot{cranks // 2}"), ratio=-2.0)
     turn = np.linspace(-0.4, 0.4, 9)
     found = solve(
-        replace(whole, bodies=[*whole.bodies, Body("wheel")], joints=joints, points=points, couplers=[gear]), "turn", turn
+        replace(
+            whole,
+            bodies=[*whole.bodies, Body("wheel")],
+            joints=joints,
+            points=points,
+            couplers=[gear],
+        ),
+        "turn",
+        turn,
     )
     assert found.solved.all(), found.message
     assert "factor_entries" in found.details
@@ -80,7 +92,9 @@ def test_a_gear_leaves_a_large_mechanism_a_sparse_system():
 
 @pytest.mark.parametrize(("rod", "end"), [(1.000001, 2.0), (0.99999, 1.098176)])
 def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, end):
-    """On the driven crank of a ring a kite on its side, on hinges: three rows more than are needed."""
+    """On the driven crank of a ring a kite on its side, on hinges: three rows more than are
+    needed.
+    """
     ground, start, turn = 1.2, -1.1, np.linspace(0.0, 1.6, 9)
     pin = np.stack([np.cos(start + turn), np.sin(start + turn)], axis=-1)
     d = np.array([ground, 0.0]) - pin
@@ -95,7 +109,9 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
         Revolute("end", "rod", "rocker", at, Z),
     ]
     whole = ring(25)
-    made = replace(whole, bodies=[*whole.bodies, Body("rod"), Body("rocker")], joints=[*whole.joints, *hinges])
+    made = replace(
+        whole, bodies=[*whole.bodies, Body("rod"), Body("rocker")], joints=[*whole.joints, *hinges]
+    )
     found = solve(replace(made, points=[Point("meet", "rocker", at)]), "turn", turn)
     assert "factor_entries" in found.details
     assert found.solved.sum() >= 6
@@ -108,7 +124,9 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
 @pytest.mark.parametrize("turns", [1, 2, -4])
 @pytest.mark.parametrize("count", [2, 11])
 def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
-    """A nut stands at both: where it stands says nothing of the turns, which its driver makes between them, but its lead does."""
+    """A nut stands at both: where it stands says nothing of the turns, which its driver makes
+    between them, but its lead does.
+    """
     whole, lead, last = ring(cranks), 0.01, 0.01
     nut = [
         Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), Z, lead=lead),
@@ -123,15 +141,22 @@ def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
         drivers=[*whole.drivers, *drivers],
     )
     rest = np.arange(-40.0, 41.0) * 0.01
-    index = Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(np.repeat([0.0, 2.0 * np.pi * turns], len(rest))))
-    found = solve(mechanism, "clock", np.linspace(0.0, last, count), rate=last, motions={"index": index})
+    index = Table(
+        tuple(np.concatenate([rest, 1.0 + rest])),
+        tuple(np.repeat([0.0, 2.0 * np.pi * turns], len(rest))),
+    )
+    found = solve(
+        mechanism, "clock", np.linspace(0.0, last, count), rate=last, motions={"index": index}
+    )
     assert found.solved.all(), found.message
     assert ("factor_entries" in found.details) == (cranks > 20)
     assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)
 
 
 def stretched(crank, rod, angle):
-    """A crank that its slider drives towards the stretched rod, with 42 wheels on it; and where the slider begins."""
+    """A crank that its slider drives towards the stretched rod, with 42 wheels on it; and where the
+    slider begins.
+    """
     pin = (crank * np.cos(angle), crank * np.sin(angle), 0.0)
     begin = pin[0] + np.sqrt(rod**2 - pin[1] ** 2)
     wheels = [f"w{k}" for k in range(42)]
@@ -143,18 +168,28 @@ def stretched(crank, rod, angle):
             Universal("pin", "crank", "rod", pin, (Z, (pin[1], begin - pin[0], 0.0))),
             Spherical("end", "rod", "slider", (begin, 0.0, 0.0)),
             Translational("guide", "ground", "slider", (begin, 0.0, 0.0), (1.0, 0.0, 0.0)),
-            *(Revolute(f"axle {name}", "ground", name, (0.01 * k, 0.2, 0.0), Z) for k, name in enumerate(wheels)),
+            *(
+                Revolute(f"axle {name}", "ground", name, (0.01 * k, 0.2, 0.0), Z)
+                for k, name in enumerate(wheels)
+            ),
         ],
         points=[Point("pin", "crank", pin)],
         drivers=[JointDisplacement("push", "guide")],
-        couplers=[Gear(f"mesh {name}", (f"axle {name}", f"axle w{k - 1}" if k else "turn"), -1.0) for k, name in enumerate(wheels)],
+        couplers=[
+            Gear(f"mesh {name}", (f"axle {name}", f"axle w{k - 1}" if k else "turn"), -1.0)
+            for k, name in enumerate(wheels)
+        ],
     )
     return whole, begin
 
 
-@pytest.mark.parametrize(("short", "solved"), [(1e-2, True), (1e-3, True), (1e-7, False), (1e-9, False)])
+@pytest.mark.parametrize(
+    ("short", "solved"), [(1e-2, True), (1e-3, True), (1e-7, False), (1e-9, False)]
+)
 def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short, solved):
-    """Rates were off by up to 3e-6 of their own. The crank's angle follows from the slider's place by a triangle."""
+    """Rates were off by up to 3e-6 of their own. The crank's angle follows from the slider's place
+    by a triangle.
+    """
     crank, rod = 0.5, 1.5
     mechanism, begin = stretched(crank, rod, 0.3)
     (value,) = values = [(crank + rod - begin) * (1.0 - short)]
@@ -162,7 +197,10 @@ def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short,
     assert "smallest_pivot" in found.details
     assert found.solved.tolist() == [solved]
     if not solved:
-        assert "refused at 1 samples so near a singular pose that residuals leave the pose or its rates uncertain" in found.message
+        assert (
+            "refused at 1 samples so near a singular pose that residuals leave the pose or its"
+            " rates uncertain" in found.message
+        )
         return
     x = begin + value
     cosine = (crank**2 - rod**2 + x**2) / (2.0 * crank * x)
@@ -170,7 +208,9 @@ def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short,
     at = crank * np.array([cosine, np.sqrt(1.0 - cosine**2), 0.0])
     np.testing.assert_allclose(found.points["pin"].position[0], at, rtol=0, atol=1e-12)
     expected = rate * np.array([-at[1], at[0], 0.0])
-    np.testing.assert_allclose(found.points["pin"].velocity[0], expected, rtol=0, atol=1e-9 * abs(rate))
+    np.testing.assert_allclose(
+        found.points["pin"].velocity[0], expected, rtol=0, atol=1e-9 * abs(rate)
+    )
 
 
 def test_uncertainty_that_is_no_number_is_refused(monkeypatch):

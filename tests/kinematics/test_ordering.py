@@ -18,7 +18,9 @@ from ..support.running import run_on
 
 
 def cycles(found):
-    """When the last result is there, if operations begin in this order, so many in a cycle, and wait for their operands."""
+    """When the last result is there, if operations begin in this order, so many in a cycle, and
+    wait for their operands.
+    """
     there, now, room = [], 0, AT_ONCE
     for node in found.nodes:
         if node[0] in LEAVES:
@@ -57,8 +59,12 @@ def test_what_has_no_need_to_wait_is_left_as_it_was_traced():
 
 @pytest.mark.parametrize("width", [2, 4, 8])
 def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkeypatch):
-    each = compile_model(mcpherson(), Request(("stroke",), ("wheel",), compiled=False)).programs["newton"]
-    traced, waiting = (_Straight(found, width).text for found in (lowered(each), ordered(lowered(each))))
+    each = compile_model(mcpherson(), Request(("stroke",), ("wheel",), compiled=False)).programs[
+        "newton"
+    ]
+    traced, waiting = (
+        _Straight(found, width).text for found in (lowered(each), ordered(lowered(each)))
+    )
     assert traced != waiting
     assert (waiting if width == 8 else traced) in programs.function(each, width)
     monkeypatch.setattr(programs, "PUT_AWAY", 0.0)  # nothing may be put away for it
@@ -67,7 +73,9 @@ def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkey
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_programs_of_a_mechanism_take_fewer_cycles_and_say_the_same(order):
-    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",), ("strut", "knuckle"), order=order))
+    model = compile_model(
+        mcpherson(), Request(("stroke",), ("wheel",), ("strut", "knuckle"), order=order)
+    )
     rng, moved = np.random.default_rng(1), 0
     for name, each in model.programs.items():
         if each.times > 1 or any(node[0] == "node" for node in each.nodes):
@@ -83,7 +91,8 @@ def test_programs_of_a_mechanism_take_fewer_cycles_and_say_the_same(order):
         assert cycles(after) < 0.8 * cycles(before), name
         block = rng.uniform(0.5, 1.5, size=(len(model.slots), 3))
         blocks = block.copy(), block.copy()
-        for found, here in zip((each, ordered(each)), blocks, strict=True):  # what is fused, only machine code knows
+        # what is fused, only machine code knows
+        for found, here in zip((each, ordered(each)), blocks, strict=True):
             run_on([found], here, each.name)
         assert np.array_equal(*blocks, equal_nan=True)
     assert moved >= 3

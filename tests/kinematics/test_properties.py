@@ -1,7 +1,9 @@
-"""Random closed loops of every joint type, written otherwise: moved, turned, scaled, shuffled, renamed. The motion is the same.
+"""Random closed loops of every joint type, written otherwise: moved, turned, scaled, shuffled,
+renamed. The motion is the same.
 
-No oracle, and no tolerance by experience: hardpoints are doubles, so that a motion is known to what the rounding of its hardpoints
-changes it by. That is measured for each loop, by shifting all of them by known amounts.
+No oracle, and no tolerance by experience: hardpoints are doubles, so that a motion is known to what
+the rounding of its hardpoints changes it by. That is measured for each loop, by shifting all of
+them by known amounts.
 """
 
 from dataclasses import fields, replace
@@ -21,11 +23,13 @@ from scipy.spatial.transform import Rotation
 
 ENGINE = Interpreted(adapters.engine("native"))
 LOOPS, LARGEST, SAMPLES = 8, 5, 5
-# The part of the loop's own reach that is driven: far from where it may lock up, and where rounding is magnified without bound.
+# The part of the loop's own reach that is driven: far from where it may lock up, and where rounding
+# is magnified without bound.
 PART = 0.05
 SHIFT, SHIFTS = 1e-7, 3
-# Random shifts add up as their root, roundings may all go to the worse side: of a hundred numbers that is ten times as far. And
-# each is rounded some ten times: when it is written otherwise (turned: three products and sums), and in the equations, twice.
+# Random shifts add up as their root, roundings may all go to the worse side: of a hundred numbers
+# that is ten times as far. And each is rounded some ten times: when it is written otherwise
+# (turned: three products and sums), and in the equations, twice.
 MARGIN = 100.0
 EPS = 2.2e-16
 
@@ -34,13 +38,20 @@ def loop(seed):
     """A random loop as a case, a little way to both sides of its design position."""
     with mock.patch.object(loops, "LARGEST", LARGEST):
         case = loops.Loops().specimen(np.random.default_rng(seed), SAMPLES).describe()
-    motions = {name: replace(motion, amplitude=PART * motion.amplitude) for name, motion in case.sweep.motions.items()}
-    return replace(case, sweep=replace(case.sweep, values=PART * case.sweep.values, motions=motions))
+    motions = {
+        name: replace(motion, amplitude=PART * motion.amplitude)
+        for name, motion in case.sweep.motions.items()
+    }
+    return replace(
+        case, sweep=replace(case.sweep, values=PART * case.sweep.values, motions=motions)
+    )
 
 
 @cache
 def known(seed):
-    """A random loop, its motion, and what rounding of hardpoints and axes may change that by, shape (3,): by its derivatives."""
+    """A random loop, its motion, and what rounding of hardpoints and axes may change that by, shape
+    (3,): by its derivatives.
+    """
     case, rng = loop(seed), np.random.default_rng(seed)
     expected = motion(case)
     if expected is None:
@@ -50,23 +61,35 @@ def known(seed):
         return tuple(np.add(a, SHIFT * rng.uniform(-1.0, 1.0, 3)).tolist())
 
     changes = [motion(placed(case, shifted, shifted)) for _ in range(SHIFTS)]
-    changes = [np.abs(found - expected).max(axis=(0, 2, 3)) for found in changes if found is not None]
+    changes = [
+        np.abs(found - expected).max(axis=(0, 2, 3)) for found in changes if found is not None
+    ]
     own = np.abs(expected).max(axis=(0, 2, 3))
-    own[2] = max(own[2], own[1] ** 2 / own[0])  # an acceleration of zero is a difference of numbers of this size
+    # an acceleration of zero is a difference of numbers of this size
+    own[2] = max(own[2], own[1] ** 2 / own[0])
     return case, expected, MARGIN * EPS * (np.max([*changes, np.zeros(3)], axis=0) / SHIFT + own)
 
 
 def motion(case):
-    """Position, velocity and acceleration of all points, shape (points, 3, n, 3); None where the loop locks up on the way."""
+    """Position, velocity and acceleration of all points, shape (points, 3, n, 3); None where the
+    loop locks up on the way.
+    """
     found = ENGINE.solve(ENGINE.build(case), case, 1e-12)
     if not found.solved.all():
         return None
     order = [point.name for point in case.mechanism.points]
-    return np.array([[found.points[p].position, found.points[p].velocity, found.points[p].acceleration] for p in order])
+    return np.array(
+        [
+            [found.points[p].position, found.points[p].velocity, found.points[p].acceleration]
+            for p in order
+        ]
+    )
 
 
 def placed(case, where, turned=tuple, factor=1.0):
-    """The case with its points sent through `where`, its directions through `turned`, its lengths multiplied by the factor."""
+    """The case with its points sent through `where`, its directions through `turned`, its lengths
+    multiplied by the factor.
+    """
     ways = {
         Kind.POSITION: where,
         Kind.POSITIONS: lambda pair: tuple(map(where, pair)),
@@ -76,8 +99,19 @@ def placed(case, where, turned=tuple, factor=1.0):
     }
 
     def sent(part):
-        given = {each.name: (each.metadata["kind"], getattr(part, each.name)) for each in fields(part) if "kind" in each.metadata}
-        return replace(part, **{name: ways[kind](value) for name, (kind, value) in given.items() if value is not None})
+        given = {
+            each.name: (each.metadata["kind"], getattr(part, each.name))
+            for each in fields(part)
+            if "kind" in each.metadata
+        }
+        return replace(
+            part,
+            **{
+                name: ways[kind](value)
+                for name, (kind, value) in given.items()
+                if value is not None
+            },
+        )
 
     m = case.mechanism
     mechanism = replace(
@@ -85,12 +119,18 @@ def placed(case, where, turned=tuple, factor=1.0):
         bodies=[replace(body, origin=where(body.origin)) for body in m.bodies],
         joints=[*map(sent, m.joints)],
         points=[replace(point, position=where(point.position)) for point in m.points],
-        drivers=[replace(d, direction=turned(d.direction)) if isinstance(d, PointCoordinate) else d for d in m.drivers],
+        drivers=[
+            replace(d, direction=turned(d.direction)) if isinstance(d, PointCoordinate) else d
+            for d in m.drivers
+        ],
         couplers=[*map(sent, m.couplers)],
     )
     by = {driver.name: 1.0 if driver.type == "joint_angle" else factor for driver in m.drivers}
     sweep, swept = case.sweep, by[case.sweep.driver]
-    motions = {name: replace(each, amplitude=by[name] * each.amplitude) for name, each in sweep.motions.items()}
+    motions = {
+        name: replace(each, amplitude=by[name] * each.amplitude)
+        for name, each in sweep.motions.items()
+    }
     sweep = replace(sweep, values=swept * sweep.values, rate=swept * sweep.rate, motions=motions)
     return replace(case, mechanism=mechanism, sweep=sweep)
 
@@ -102,7 +142,9 @@ def assert_same(found, expected, allowed):
 
 
 def for_random_loops(test):
-    """The same few in every run, and for every property: most of the time goes into what their rounding may change."""
+    """The same few in every run, and for every property: most of the time goes into what their
+    rounding may change.
+    """
     run = settings(derandomize=True, max_examples=LOOPS, deadline=None, phases=[Phase.generate])
     return run(given(st.integers(0, LOOPS - 1))(test))
 
@@ -112,7 +154,10 @@ def test_rigid_motion_moves_the_motion(seed):
     case, expected, allowed = known(seed)
     if expected is None:
         return
-    turn, shift = Rotation.random(random_state=seed % 2**32), np.random.default_rng(seed).normal(size=3)
+    turn, shift = (
+        Rotation.random(random_state=seed % 2**32),
+        np.random.default_rng(seed).normal(size=3),
+    )
 
     def turned(a):
         return tuple(turn.apply(a).tolist())
@@ -128,7 +173,9 @@ def test_rigid_motion_moves_the_motion(seed):
 
 @for_random_loops
 def test_size_scales_the_motion(seed):
-    """From a tenth of a millimetre to kilometres; not by powers of two, so that every number is rounded anew."""
+    """From a tenth of a millimetre to kilometres; not by powers of two, so that every number is
+    rounded anew.
+    """
     case, expected, allowed = known(seed)
     if expected is None:
         return
@@ -144,7 +191,10 @@ def test_order_and_names_do_not_matter(seed):
     if expected is None:
         return
     rng, m = np.random.default_rng(seed), case.mechanism
-    words = {name: f"{k} {name[::-1]}" for k, name in enumerate(rng.permutation([each.name for each in (*m.bodies, *m.joints)]))}
+    words = {
+        name: f"{k} {name[::-1]}"
+        for k, name in enumerate(rng.permutation([each.name for each in (*m.bodies, *m.joints)]))
+    }
     words["ground"] = "ground"
 
     def shuffled(parts):
@@ -153,23 +203,42 @@ def test_order_and_names_do_not_matter(seed):
     mechanism = replace(
         m,
         bodies=shuffled([replace(body, name=words[body.name]) for body in m.bodies]),
-        joints=shuffled([replace(each, name=words[each.name], i=words[each.i], j=words[each.j]) for each in m.joints]),
+        joints=shuffled(
+            [
+                replace(each, name=words[each.name], i=words[each.i], j=words[each.j])
+                for each in m.joints
+            ]
+        ),
         points=[replace(point, body=words[point.body]) for point in m.points],
-        drivers=shuffled([replace(d, joint=words[d.joint]) if hasattr(d, "joint") else d for d in m.drivers]),
-        couplers=shuffled([replace(each, joints=tuple(words[name] for name in each.joints)) for each in m.couplers]),
+        drivers=shuffled(
+            [replace(d, joint=words[d.joint]) if hasattr(d, "joint") else d for d in m.drivers]
+        ),
+        couplers=shuffled(
+            [
+                replace(each, joints=tuple(words[name] for name in each.joints))
+                for each in m.couplers
+            ]
+        ),
     )
     assert_same(motion(replace(case, mechanism=mechanism)), expected, allowed)
 
 
 @for_random_loops
 def test_order_of_the_bodies_of_joints_does_not_matter(seed):
-    """Of those that are the same both ways; where a joint is driven or coupled, it is the sign of its coordinate."""
+    """Of those that are the same both ways; where a joint is driven or coupled, it is the sign of
+    its coordinate.
+    """
     case, expected, allowed = known(seed)
     if expected is None:
         return
     m = case.mechanism
-    signed = {name for each in m.couplers for name in each.joints} | {getattr(driver, "joint", "") for driver in m.drivers}
-    joints = [joint.reversed() if joint.symmetric and joint.name not in signed else joint for joint in m.joints]
+    signed = {name for each in m.couplers for name in each.joints} | {
+        getattr(driver, "joint", "") for driver in m.drivers
+    }
+    joints = [
+        joint.reversed() if joint.symmetric and joint.name not in signed else joint
+        for joint in m.joints
+    ]
     found = motion(replace(case, mechanism=replace(m, joints=joints)))
     assert_same(found, expected, allowed)
 
@@ -180,8 +249,13 @@ def test_speed_scales_velocities_and_accelerations(seed):
     if expected is None:
         return
     speed = float(np.random.default_rng(seed).uniform(-3.0, 3.0))
-    motions = {name: Sine(each.amplitude, speed * each.frequency) for name, each in case.sweep.motions.items()}
-    found = motion(replace(case, sweep=replace(case.sweep, rate=speed * case.sweep.rate, motions=motions)))
+    motions = {
+        name: Sine(each.amplitude, speed * each.frequency)
+        for name, each in case.sweep.motions.items()
+    }
+    found = motion(
+        replace(case, sweep=replace(case.sweep, rate=speed * case.sweep.rate, motions=motions))
+    )
     powers = np.array([1.0, speed, speed**2])
     assert found is not None
     assert_same(found / powers[:, None, None], expected, allowed)

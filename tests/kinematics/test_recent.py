@@ -29,7 +29,9 @@ STROKES = np.linspace(-0.05, 0.05, 21)
 def made(monkeypatch):
     """The requests that models were made for."""
     requests, make = [], compiled_model.compile_model
-    monkeypatch.setattr(compiled_model, "compile_model", lambda *given: (requests.append(given[1]), make(*given))[1])
+    monkeypatch.setattr(
+        compiled_model, "compile_model", lambda *given: (requests.append(given[1]), make(*given))[1]
+    )
     return requests
 
 
@@ -53,7 +55,10 @@ def test_the_same_mechanism_and_request_need_one_model(made):
 def test_designs_too(made):
     place = "points.wheel.position"
     values = {place: np.array([mcpherson().point("wheel").position, (0.1, 0.7, 0.3)])}
-    first, again = (solve_designs(mcpherson(), "stroke", STROKES, values).points["wheel"].position for _ in range(2))
+    first, again = (
+        solve_designs(mcpherson(), "stroke", STROKES, values).points["wheel"].position
+        for _ in range(2)
+    )
     assert len(made) == 1
     np.testing.assert_array_equal(first, again)
 
@@ -69,7 +74,11 @@ def test_threads_share_it():
 def swept(monkeypatch):
     """What was made of paths through components."""
     sweeps, make = [], cascade_sweep.CascadeSweep.__init__
-    monkeypatch.setattr(cascade_sweep.CascadeSweep, "__init__", lambda self, *given: (sweeps.append(self), make(self, *given))[1])
+    monkeypatch.setattr(
+        cascade_sweep.CascadeSweep,
+        "__init__",
+        lambda self, *given: (sweeps.append(self), make(self, *given))[1],
+    )
     return sweeps
 
 
@@ -86,10 +95,15 @@ def test_of_a_chain_the_last_path_is_kept(swept):
 def test_threads_take_turns_at_a_chain_and_each_keeps_its_own(swept):
     turn = np.linspace(-0.1, 0.2, 9)
     with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
-        found = [pool.submit(solve, chain(12), "turn", turn).result() for pool in (one, other, one, other)]
+        found = [
+            pool.submit(solve, chain(12), "turn", turn).result()
+            for pool in (one, other, one, other)
+        ]
     assert len(swept) == 2
     for each in found[1:]:
-        np.testing.assert_array_equal(each.points["end"].acceleration, found[0].points["end"].acceleration)
+        np.testing.assert_array_equal(
+            each.points["end"].acceleration, found[0].points["end"].acceleration
+        )
 
 
 def test_large_mechanisms_follow_motions_of_a_users_own_anew(swept):
@@ -111,9 +125,16 @@ def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
         type = "hinge_of_mine"
 
     made, make = [], block_solver.Cascade.__init__
-    monkeypatch.setattr(block_solver.Cascade, "__init__", lambda self, *given: (made.append(self), make(self, *given))[1])
+    monkeypatch.setattr(
+        block_solver.Cascade,
+        "__init__",
+        lambda self, *given: (made.append(self), make(self, *given))[1],
+    )
     mechanism = chain(12)
-    joints = [Hinge(j.name, j.i, j.j, j.point, j.axis) if type(j) is Revolute else j for j in mechanism.joints]
+    joints = [
+        Hinge(j.name, j.i, j.j, j.point, j.axis) if type(j) is Revolute else j
+        for j in mechanism.joints
+    ]
     for number in (1, 2):
         assert solve(replace(mechanism, joints=joints), "turn", [0.0, 0.1]).solved.all()
         assert len(made) == number
@@ -127,7 +148,9 @@ def test_joints_of_a_users_own_are_made_anew(made):
     class Ball(Spherical):
         type = "ball_of_mine"
 
-    joints = [Ball(j.name, j.i, j.j, j.point) if type(j) is Spherical else j for j in mcpherson().joints]
+    joints = [
+        Ball(j.name, j.i, j.j, j.point) if type(j) is Spherical else j for j in mcpherson().joints
+    ]
     assert any(type(j) is Ball for j in joints)
     for _ in range(2):
         assert solve(replace(mcpherson(), joints=joints), "stroke", STROKES).solved.all()
@@ -138,15 +161,24 @@ def test_joints_of_a_users_own_are_made_anew(made):
 def bound(monkeypatch):
     """What was bound to lanes, a route each."""
     routes, bind = [], walk.Marcher.__init__
-    monkeypatch.setattr(walk.Marcher, "__init__", lambda self, *given: (routes.append(given[0]), bind(self, *given))[1])
+    monkeypatch.setattr(
+        walk.Marcher,
+        "__init__",
+        lambda self, *given: (routes.append(given[0]), bind(self, *given))[1],
+    )
     return routes
 
 
 def test_the_same_samples_are_laid_out_once(bound):
-    first, again = (solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy() for _ in range(2))
+    first, again = (
+        solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy() for _ in range(2)
+    )
     assert len(bound) == 1
     np.testing.assert_array_equal(first, again)
-    for k, other in enumerate([{"values": STROKES[:-1]}, {"rate": 2.0}, {"values": STROKES + 1e-15}, {"order": 1}], start=2):
+    for k, other in enumerate(
+        [{"values": STROKES[:-1]}, {"rate": 2.0}, {"values": STROKES + 1e-15}, {"order": 1}],
+        start=2,
+    ):
         solve(mcpherson(), "stroke", **({"values": STROKES} | other))
         assert len(bound) == k
 
@@ -157,7 +189,9 @@ def test_samples_of_the_users_may_change_afterwards():
     strokes *= 0.5
     near = solve(mcpherson(), "stroke", strokes).points["wheel"].position
     assert np.abs(near[0] - far).max() > 1e-3
-    np.testing.assert_array_equal(solve(mcpherson(), "stroke", STROKES).points["wheel"].position[0], far)
+    np.testing.assert_array_equal(
+        solve(mcpherson(), "stroke", STROKES).points["wheel"].position[0], far
+    )
 
 
 def test_motions_of_a_users_own_are_followed_anew(bound):
@@ -169,11 +203,16 @@ def test_motions_of_a_users_own_are_followed_anew(bound):
             return 0.0 * t, 0.0 * t, 0.0 * t
 
     assert Path({}, np.ones(2)) == Path({}, np.ones(2)) != Path({}, np.ones(3))
-    assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})  # their messages differ
+    # their messages differ
+    assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})
     for motion in (Mine(), Absolute(Mine(), 0.0)):
         assert not Path({"steer": motion}, np.ones(1)).ours
     assert not Path({"steer": Ramp(np.array(1.0))}, np.ones(1)).ours  # whoever has it may change it
-    for motion in (Ramp(1.0), Absolute(Sine(1.0, 1.0, 0.0), 0.2), Table(np.arange(2.0), [0.0, 1.0])):
+    for motion in (
+        Ramp(1.0),
+        Absolute(Sine(1.0, 1.0, 0.0), 0.2),
+        Table(np.arange(2.0), [0.0, 1.0]),
+    ):
         assert Path({"steer": motion}, np.ones(1)).ours
     request = samples.Request(("stroke",), ("wheel",))
     for number in (1, 2):
@@ -190,11 +229,17 @@ def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("large", "kind"), [(chain(12), (block_solver.Cascade, "__init__")), (circle(21).mechanism, (sparse.SparseModel, "__init__"))]
+    ("large", "kind"),
+    [
+        (chain(12), (block_solver.Cascade, "__init__")),
+        (circle(21).mechanism, (sparse.SparseModel, "__init__")),
+    ],
 )
 def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
     made, make = [], getattr(*kind)
-    monkeypatch.setattr(*kind, lambda self, *given, **named: (made.append(given[0]), make(self, *given, **named))[1])
+    monkeypatch.setattr(
+        *kind, lambda self, *given, **named: (made.append(given[0]), make(self, *given, **named))[1]
+    )
     values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
     first = solve(large, driver, values).points
     other = solve(large, driver, values[::2]).points
@@ -202,7 +247,8 @@ def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
     assert len(made) == 1
     for name, motion in first.items():
         np.testing.assert_array_equal(again[name].acceleration, motion.acceleration)
-        # predicted from other samples: round-off, by the condition and once more for each derivative
+        # predicted from other samples: round-off, by the condition and once more for each
+        # derivative
         assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-10
     with ThreadPoolExecutor(1) as threads:
         threads.submit(solve, large, driver, values).result()

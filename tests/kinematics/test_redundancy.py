@@ -1,4 +1,6 @@
-"""Which rows are left out where some repeat others: as many as must be, and such that the others are good for the whole sweep."""
+"""Which rows are left out where some repeat others: as many as must be, and such that the others
+are good for the whole sweep.
+"""
 
 import numpy as np
 import pytest
@@ -39,7 +41,9 @@ def test_independent_rows_of_random_matrices(seed):
 
 
 def test_a_senseless_number_of_rows_is_looked_at_in_portions():
-    """What is left out of the first is not taken up again, and what is kept is judged with the rest."""
+    """What is left out of the first is not taken up again, and what is kept is judged with the
+    rest.
+    """
     rng = np.random.default_rng(0)
     weights = rng.normal(size=(3000, 4))
     weights[:1500, :2] = weights[1500:, 2:] = 0.0  # neither half has what the other has
@@ -51,14 +55,19 @@ def test_a_senseless_number_of_rows_is_looked_at_in_portions():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
-    """Each loop keeps a system of its own: of hinges alone three of its rows are left out, and they are none of the crank's."""
+    """Each loop keeps a system of its own: of hinges alone three of its rows are left out, and they
+    are none of the crank's.
+    """
     rng = np.random.default_rng(seed)
     plane, bars = any_plane(rng), crank_rocker(rng)
     mechanism = beside(planar.four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     selection = select_rows(mechanism, frame, formulation)
-    assert {formulation.owners[k][0].removeprefix("twin ") for k in selection.dropped} <= {"pin_1", "pin_2"}
+    assert {formulation.owners[k][0].removeprefix("twin ") for k in selection.dropped} <= {
+        "pin_1",
+        "pin_2",
+    }
     traced = Tracer(mechanism, Request(("turn",), mechanism.points))
     assert traced.selection.chosen == selection.chosen
     rows = traced.formulation.rows(traced.at)
@@ -67,7 +76,9 @@ def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
-    """Against the best there is, all rows. Where one row each of two hinges kept an axis parallel there were poses without rank."""
+    """Against the best there is, all rows. Where one row each of two hinges kept an axis parallel
+    there were poses without rank.
+    """
     rng = np.random.default_rng(seed)
     plane, bars = any_plane(rng), crank_rocker(rng)
     mechanism = planar.four_bar(plane, *bars)
@@ -80,13 +91,21 @@ def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
         state = dict(formulation.design)
         for name in frame.moving:
             turn, pivot, shift = moved[name]
-            q, away = turn[:, sample].astype(float), np.array([*frame.origins[name]]) - pivot.astype(float) / frame.unit
+            q, away = (
+                turn[:, sample].astype(float),
+                np.array([*frame.origins[name]]) - pivot.astype(float) / frame.unit,
+            )
             swung = Pose.of(ZERO, Quat(q[0], vec(q[1:]))).swing(vec(away))
-            state |= {f"q {name}": [*q], f"u {name}": [*(vec(shift[:, sample].astype(float) / frame.unit) + swung)]}
+            state |= {
+                f"q {name}": [*q],
+                f"u {name}": [*(vec(shift[:, sample].astype(float) / frame.unit) + swung)],
+            }
         at = formulation.configuration(state)
         assert np.abs(formulation.phi(at)[:-1]).max() < 1e-14  # all but the driver's, at rest
         matrix = jacobian(formulation, at)
-        least, best = (np.linalg.svd(rows, compute_uv=False)[-1] for rows in (matrix[[*kept]], matrix))
+        least, best = (
+            np.linalg.svd(rows, compute_uv=False)[-1] for rows in (matrix[[*kept]], matrix)
+        )
         assert least > 0.4 * best
 
 
@@ -94,19 +113,35 @@ LEFT = 0.9273
 
 
 def locomotive(lead, first=LEFT):
-    """Two wheels and two coupling rods, the second ahead by that angle: where one rod is at its dead point the other holds."""
-    z, joints = (0.0, 0.0, 1.0), [Revolute(f"axle{k}", "ground", f"wheel{k}", (2.0 * k, 0.0, 0.0), (0.0, 0.0, 1.0)) for k in (0, 1)]
+    """Two wheels and two coupling rods, the second ahead by that angle: where one rod is at its
+    dead point the other holds.
+    """
+    z, joints = (
+        (0.0, 0.0, 1.0),
+        [
+            Revolute(f"axle{k}", "ground", f"wheel{k}", (2.0 * k, 0.0, 0.0), (0.0, 0.0, 1.0))
+            for k in (0, 1)
+        ],
+    )
     for rod, angle in (("left", first), ("right", first + lead)):
         x, y = 0.4 * np.cos(angle), 0.4 * np.sin(angle)
-        joints += [Revolute(f"{rod}{k}", f"wheel{k}", rod, (2.0 * k + x, y, 0.0), z) for k in (0, 1)]
+        joints += [
+            Revolute(f"{rod}{k}", f"wheel{k}", rod, (2.0 * k + x, y, 0.0), z) for k in (0, 1)
+        ]
     points = [Point("rim", "wheel1", (2.5, 0.0, 0.0))]
     return Mechanism(
-        "loco", [Body(n) for n in ("wheel0", "wheel1", "left", "right")], joints, points, [JointAngle("turn", "axle0")]
+        "loco",
+        [Body(n) for n in ("wheel0", "wheel1", "left", "right")],
+        joints,
+        points,
+        [JointAngle("turn", "axle0")],
     )
 
 
 def test_where_only_the_chosen_rows_depend_on_each_other_there_is_no_singular_pose():
-    """The rod whose rows were chosen comes to its dead points; the mechanism is regular there, for the other rod is not."""
+    """The rod whose rows were chosen comes to its dead points; the mechanism is regular there, for
+    the other rod is not.
+    """
     turn = np.linspace(0.0, 4.0 * np.pi, 49)
     found = solve(locomotive(np.pi / 2.0), "turn", turn)
     assert found.solved.all(), found.message
@@ -120,4 +155,6 @@ def test_where_only_the_chosen_rows_depend_on_each_other_there_is_no_singular_po
 def test_where_both_rods_are_at_their_dead_points_there_is_one():
     found = solve(locomotive(np.pi), "turn", np.linspace(0.0, 4.0 * np.pi, 49))
     assert all("(bifurcation)" in note for note in found.details["notes"])
-    assert [event.kind for event in trace(locomotive(np.pi), "turn", length=7.0).events][:1] == ["branch point"]
+    assert [event.kind for event in trace(locomotive(np.pi), "turn", length=7.0).events][:1] == [
+        "branch point"
+    ]

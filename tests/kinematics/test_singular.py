@@ -1,4 +1,6 @@
-"""Samples at, near and beyond singular poses: right and said to be, or refused with the number; never taken in silence."""
+"""Samples at, near and beyond singular poses: right and said to be, or refused with the number;
+never taken in silence.
+"""
 
 from dataclasses import replace
 
@@ -44,10 +46,16 @@ def chain_end(loops, turn):
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, monkeypatch):
-    """The estimate says a fifth of sigma; equations for that are traced for the first sweep only."""
+    """The estimate says a fifth of sigma; equations for that are traced for the first sweep
+    only.
+    """
     case, traced = probe(Joint.registry["revolute_spherical"]), list[System]()
-    monkeypatch.setattr(dense_equations, "System", lambda model: traced.append(System(model)) or traced[-1])
-    model = compile_model(case.mechanism, Request((case.sweep.driver,), case.points, compiled=compiled))
+    monkeypatch.setattr(
+        dense_equations, "System", lambda model: traced.append(System(model)) or traced[-1]
+    )
+    model = compile_model(
+        case.mechanism, Request((case.sweep.driver,), case.points, compiled=compiled)
+    )
     route, tol = Route(model, case.sweep.path), 2e-13
     estimates = march(route, tol).kept[model.rows[SIGMA].start]
     doubted = doubtful(estimates, 0.0, tol)
@@ -56,7 +64,9 @@ def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, mo
         found = follow(route, tol)
         assert found.solved.all(), found.message
         assert "retried_samples" not in found.details
-        assert estimates.min() < found.details["smallest_singular_value"] == estimates[~doubted].min()
+        assert (
+            estimates.min() < found.details["smallest_singular_value"] == estimates[~doubted].min()
+        )
     assert len(traced) == 1
 
 
@@ -66,13 +76,18 @@ def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, mo
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("near", [0.0, 1e-13, -1e-9])
 def test_a_sample_where_the_motion_branches(loops, near):
-    """Its equations say nothing of it; it is interpolated, said to be, and the samples beyond are reached."""
+    """Its equations say nothing of it; it is interpolated, said to be, and the samples beyond are
+    reached.
+    """
     turn = np.array([0.0, 0.7, 1.4, BRANCH + near, 2.3, 3.0])
     found = solve(chain(loops), "turn", turn)
     assert found.solved.all(), found.message
     end = found.points["end"]
     for values, expected, error in zip(
-        (end.position, end.velocity, end.acceleration), chain_end(loops, turn), (1e-12, 1e-11, 1e-9), strict=True
+        (end.position, end.velocity, end.acceleration),
+        chain_end(loops, turn),
+        (1e-12, 1e-11, 1e-9),
+        strict=True,
     ):
         assert np.abs(values - expected).max() <= error
     (note,) = found.details["notes"]
@@ -133,7 +148,9 @@ def test_ordinary_sweeps_say_nothing():
 
 
 def pushed():
-    """A slider that drives its crank, from an open angle; its dead centre is at the second value."""
+    """A slider that drives its crank, from an open angle; its dead centre is at the second
+    value.
+    """
     design = float(slider_crank_motion([1.0]).x[0])
     pin = (CRANK * np.cos(1.0), 0.0, -CRANK * np.sin(1.0))
     m = slider_crank()
@@ -146,7 +163,11 @@ def pushed():
 def pin_height(design, pin, push):
     """Of the pin below the guide [m], in 40 digits from the doubles that the mechanism has."""
     with mp.workdps(40):
-        x, crank, rod = mpf(design) + mpf(push), mp.norm([mpf(v) for v in pin]), mp.norm([mpf(design) - mpf(pin[0]), mpf(pin[2])])
+        x, crank, rod = (
+            mpf(design) + mpf(push),
+            mp.norm([mpf(v) for v in pin]),
+            mp.norm([mpf(design) - mpf(pin[0]), mpf(pin[2])]),
+        )
         along = (x * x + crank * crank - rod * rod) / (2 * x)
         return -mp.sqrt(crank * crank - along * along)
 
@@ -155,7 +176,9 @@ GAPS = np.array([1e-3, 1e-6, 1e-9, 1e-12])
 
 
 def test_near_a_dead_centre_positions_are_right():
-    """1e-12 m before it a residual of 1e-12 would be 1e-6 m of the pin; samples are solved again until rounding ends it."""
+    """1e-12 m before it a residual of 1e-12 would be 1e-6 m of the pin; samples are solved again
+    until rounding ends it.
+    """
     mechanism, design, pin = pushed()
     values = CRANK + 1.0 - design - GAPS
     found = solve(mechanism, "push", values, order=0)
@@ -204,7 +227,9 @@ def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
 
 @pytest.mark.parametrize("sizes", [[1], [2], [5], [11], [1, 3], [2, 2, 4]])
 def test_orientation_tells_the_sign_of_every_block(sizes):
-    """Of blocks solved one after the other, rows and columns mixed: of each that of its determinant, or always the other."""
+    """Of blocks solved one after the other, rows and columns mixed: of each that of its
+    determinant, or always the other.
+    """
     n, lanes = sum(sizes), 64
     rng = np.random.default_rng(sizes)
     block = np.repeat(np.arange(len(sizes)), sizes)
@@ -213,14 +238,22 @@ def test_orientation_tells_the_sign_of_every_block(sizes):
     mixed = matrices[:, rows][:, :, columns]
     tape = Tape()
     used = (mixed != 0.0).any(axis=0)
-    elimination = Elimination([{j: tape.input(n * i + j) for j in range(n) if used[i, j]} for i in range(n)])
+    elimination = Elimination(
+        [{j: tape.input(n * i + j) for j in range(n) if used[i, j]} for i in range(n)]
+    )
     memory = np.vstack([mixed.reshape(lanes, -1).T, np.zeros((1, lanes))])
     run_on([program("p", tape, {n * n: elimination.orientation})], memory)
-    expected = np.stack([np.linalg.slogdet(matrices[:, block == k][:, :, block == k])[0] for k in range(len(sizes))])
+    expected = np.stack(
+        [np.linalg.slogdet(matrices[:, block == k][:, :, block == k])[0] for k in range(len(sizes))]
+    )
     _, known = np.unique(expected, axis=1, return_inverse=True)
     _, found = np.unique(memory[n * n], return_inverse=True)
     # one number for each combination of signs
-    assert len(set(zip(known.tolist(), found.tolist(), strict=True))) == known.max() + 1 == found.max() + 1
+    assert (
+        len(set(zip(known.tolist(), found.tolist(), strict=True)))
+        == known.max() + 1
+        == found.max() + 1
+    )
     assert known.max() > 0
 
 
@@ -229,9 +262,14 @@ def estimated(matrices):
     lanes, n, _ = matrices.shape
     tape = Tape()
     slots = np.arange(n * n).reshape(n, n)
-    elimination = Elimination([{j: tape.input(int(slots[i, j])) for j in range(n)} for i in range(n)])
+    elimination = Elimination(
+        [{j: tape.input(int(slots[i, j])) for j in range(n)} for i in range(n)]
+    )
     block = np.vstack([matrices.reshape(lanes, -1).T, np.zeros((n + 1, lanes))])
-    run_on([program("p", tape, dict(enumerate([elimination.sigma, *elimination.pivots], n * n)))], block)
+    run_on(
+        [program("p", tape, dict(enumerate([elimination.sigma, *elimination.pivots], n * n)))],
+        block,
+    )
     return block[n * n], np.abs(block[n * n + 1 :]).min(axis=0)
 
 
@@ -246,14 +284,15 @@ def test_beside_a_singular_pose_accelerations_keep_their_digits():
 @pytest.mark.parametrize("n", [2, 4, 6, 10, 20, 30])
 @pytest.mark.parametrize("sigma", [1.0, 1e-3, 1e-9])
 def test_sigma_is_about_the_smallest_singular_value(n, sigma):
-    """Whichever rows depend on each other. Of 10,000 such matrices of each n it was 0.021 to 2.04 times as much. The smallest
-    pivot, up to 35,000 times as much, is no measure."""
+    """Whichever rows depend on each other. Of 10,000 such matrices of each n it was 0.021 to 2.04
+    times as much. The smallest pivot, up to 35,000 times as much, is no measure."""
     rng = np.random.default_rng(n)
     left, right = (np.linalg.qr(rng.normal(size=(200, n, n)))[0] for _ in range(2))
     sizes = np.linspace(1.0, 0.3, n)
     sizes[-1] *= sigma
     found, pivot = estimated(left * sizes @ right)
-    # the more unknowns, the more the comparison matrix makes of them: where that is no longer asked, sigma is known better
+    # the more unknowns, the more the comparison matrix makes of them: where that is no longer
+    # asked, sigma is known better
     assert found.min() > (0.01 if n <= COMPARED else 0.1) * sizes[-1]
     assert found.max() < 4.0 * sizes[-1]
     assert sigma == 1.0 or pivot.max() > 20.0 * sizes[-1]
@@ -272,7 +311,13 @@ def test_of_a_large_core_sigma_is_no_less_than_by_its_comparison_matrix(monkeypa
 
 @pytest.mark.parametrize(
     ("margins", "part"),
-    [([1.0, 1.0, 1.0], 0), ([-1.0, 1.0, -1.0, 1.0, 1.0], 3), ([1.0, np.nan, 1.0], None), ([-1.0, -1.0], None), ([-1.0, 1.0], None)],
+    [
+        ([1.0, 1.0, 1.0], 0),
+        ([-1.0, 1.0, -1.0, 1.0, 1.0], 3),
+        ([1.0, np.nan, 1.0], None),
+        ([-1.0, -1.0], None),
+        ([-1.0, 1.0], None),
+    ],
 )
 def test_a_part_of_a_step_is_gone_only_where_its_half_could_be(margins, part):
     assert longest(np.array(margins)) == part

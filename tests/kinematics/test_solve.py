@@ -1,4 +1,6 @@
-"""The McPherson strut against its 40-digit reference and against the paper's unsimplified equations; what is asked is computed."""
+"""The McPherson strut against its 40-digit reference and against the paper's unsimplified
+equations; what is asked is computed.
+"""
 
 import pickle
 from dataclasses import replace
@@ -8,7 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import Body, Distance, Fixed, Mechanism, Point, Revolute, SolveError, Translational, Universal
+from kincheck.core import (
+    Body,
+    Distance,
+    Fixed,
+    Mechanism,
+    Point,
+    Revolute,
+    SolveError,
+    Translational,
+    Universal,
+)
 from kincheck.core.joints import Cylindrical, Screw
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import RATE, RATE_T, Request
@@ -27,7 +39,12 @@ MOVING = ("lca", "knuckle", "strut")
 @cache
 def reference():
     """Columns by name, shape (161,) each."""
-    table = np.genfromtxt(Path(__file__).parents[1] / "data" / "mcpherson_reference.csv", delimiter=",", names=True, skip_header=2)
+    table = np.genfromtxt(
+        Path(__file__).parents[1] / "data" / "mcpherson_reference.csv",
+        delimiter=",",
+        names=True,
+        skip_header=2,
+    )
     assert table.shape == (161,)
     return {name: table[name] for name in table.dtype.names}
 
@@ -48,7 +65,9 @@ def deviation(found, *columns):
 
 @pytest.mark.parametrize("style", [style.value for style in Style])
 def test_wheel_against_the_reference(style):
-    """Round-off of numbers near one, amplified by the condition (36) and the second derivatives (3 1/m)."""
+    """Round-off of numbers near one, amplified by the condition (36) and the second derivatives (3
+    1/m).
+    """
     wheel = solution(style).points["wheel"]
     assert deviation(wheel.position, "x_W", "y_W", "z_W") <= 5e-16
     assert deviation(wheel.velocity[:, :2], "vx", "vy") <= 1e-14
@@ -81,10 +100,16 @@ def universal_chain():
     """A crank that drives, through a universal joint, a shaft askew, with a plate welded on."""
     return Mechanism(
         "cardan",
-        [Body("crank", (0.1, 0.2, 0.3), (0.5, 0.5, -0.5, 0.5)), Body("shaft", (0.0, 0.3, 1.5)), Body("plate", (0.2, 0.0, 2.0))],
+        [
+            Body("crank", (0.1, 0.2, 0.3), (0.5, 0.5, -0.5, 0.5)),
+            Body("shaft", (0.0, 0.3, 1.5)),
+            Body("plate", (0.2, 0.0, 2.0)),
+        ],
         [
             Revolute("in", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-            Universal("cross", "crank", "shaft", (0.0, 0.0, 1.0), ((1.0, 0.0, 0.0), (0.0, 0.8, -0.6))),
+            Universal(
+                "cross", "crank", "shaft", (0.0, 0.0, 1.0), ((1.0, 0.0, 0.0), (0.0, 0.8, -0.6))
+            ),
             Revolute("out", "shaft", "ground", (0.0, 0.6, 1.8), (0.0, 0.6, 0.8)),
             Fixed("weld", "shaft", "plate"),
         ],
@@ -97,7 +122,11 @@ def jack():
     """A nut on a screw askew, and a slider that it moves by a rod."""
     return Mechanism(
         "jack",
-        [Body("screw", (0.1, 0.0, 0.2)), Body("nut", (0.5, 0.1, 0.0), (0.8, 0.0, 0.6, 0.0)), Body("slider", (1.5, 0.4, 0.0))],
+        [
+            Body("screw", (0.1, 0.0, 0.2)),
+            Body("nut", (0.5, 0.1, 0.0), (0.8, 0.0, 0.6, 0.0)),
+            Body("slider", (1.5, 0.4, 0.0)),
+        ],
         [
             Revolute("bearing", "ground", "screw", (0.0, 0.0, 0.0), (1.0, 0.2, 0.1)),
             Screw("thread", "screw", "nut", (0.3, 0.06, 0.03), (1.0, 0.2, 0.1), 0.15),
@@ -123,19 +152,28 @@ SWEEPS = {
 @pytest.mark.parametrize("write", [lambda m: m, swapped], ids=["as given", "swapped"])
 @pytest.mark.parametrize("name", SWEEPS)
 def test_the_papers_equations_hold(name, write, style):
-    """Residuals of all joints at the solved poses, and their first two derivatives by time along r, p, v and a.
+    """Residuals of all joints at the solved poses, and their first two derivatives by time along r,
+    p, v and a.
 
-    omega' and its derivative enter through pdot and pddot: another frame or sign of theirs would show. All joints hold
-    undriven, so every derivative is zero; redundant rows are among them.
+    omega' and its derivative enter through pdot and pddot: another frame or sign of theirs would
+    show. All joints hold undriven, so every derivative is zero; redundant rows are among them.
     """
     make, driver, values = SWEEPS[name]
     mechanism = write(make())
-    found = solve(mechanism, driver, values, rate=1.3, bodies=[body.name for body in mechanism.moving], style=style)
+    found = solve(
+        mechanism,
+        driver,
+        values,
+        rate=1.3,
+        bodies=[body.name for body in mechanism.moving],
+        style=style,
+    )
     assert found.solved.all()
     for k in range(len(values)):
         path = naive.along(naive.sample(found, k))
         phi, phi_t, phi_tt = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
-        assert np.abs(naive.residuals(mechanism, path(0.0))).max() <= 4e-15  # some roundings of coordinates of 2 m
+        # some roundings of coordinates of 2 m
+        assert np.abs(naive.residuals(mechanism, path(0.0))).max() <= 4e-15
         assert np.abs(phi).max() <= 4e-15
         # speeds reach 4 m/s, accelerations 10 m/s^2; the circle of 0.1 s costs one and two digits
         assert np.abs(phi_t).max() <= 1e-13
@@ -143,15 +181,25 @@ def test_the_papers_equations_hold(name, write, style):
 
 
 def test_wrong_angular_velocities_would_show():
-    """The check above has teeth: omega' in the wrong frame or with the wrong sign breaks it by orders of magnitude."""
+    """The check above has teeth: omega' in the wrong frame or with the wrong sign breaks it by
+    orders of magnitude.
+    """
     mechanism, found = mcpherson(), solution()
     r, p, v, a = naive.sample(found, 0)["knuckle"]
     A = naive.A(p)
     for wrong in (A @ v[3:], -v[3:]):
         bodies = naive.sample(found, 0) | {"knuckle": (r, p, np.r_[v[:3], wrong], a)}
-        assert np.abs(naive.taylor(lambda t, b=bodies: naive.residuals(mechanism, naive.along(b)(t)))[1]).max() > 1e-2
+        assert (
+            np.abs(
+                naive.taylor(lambda t, b=bodies: naive.residuals(mechanism, naive.along(b)(t)))[1]
+            ).max()
+            > 1e-2
+        )
     bodies = naive.sample(found, 0) | {"knuckle": (r, p, v, np.r_[a[:3], A @ a[3:]])}
-    assert np.abs(naive.taylor(lambda t: naive.residuals(mechanism, naive.along(bodies)(t)))[2]).max() > 1e-2
+    assert (
+        np.abs(naive.taylor(lambda t: naive.residuals(mechanism, naive.along(bodies)(t)))[2]).max()
+        > 1e-2
+    )
 
 
 def test_points_are_carried_by_their_bodies():
@@ -175,17 +223,26 @@ def flops(found):
 
 
 def test_lower_orders_give_the_same_and_cost_less():
-    by_order = [solve(mcpherson(), "stroke", STROKES, bodies=MOVING, order=order) for order in (0, 1, 2)]
+    by_order = [
+        solve(mcpherson(), "stroke", STROKES, bodies=MOVING, order=order) for order in (0, 1, 2)
+    ]
     position, velocity, acceleration = by_order
-    for found in by_order:  # all are predicted by rates and accelerations, and end at the same pose but for its rounding
+    # all are predicted by rates and accelerations, and end at the same pose but for its rounding
+    for found in by_order:
         assert (found.iterations == acceleration.iterations).all()
-        assert np.abs(found.points["wheel"].position - acceleration.points["wheel"].position).max() <= 3e-16
+        assert (
+            np.abs(found.points["wheel"].position - acceleration.points["wheel"].position).max()
+            <= 3e-16
+        )
         assert np.abs(found.bodies["strut"].p - acceleration.bodies["strut"].p).max() <= 3e-16
     assert position.points["wheel"].velocity is None
     assert position.bodies["strut"].v is None
     assert velocity.points["wheel"].acceleration is None
     assert velocity.bodies["strut"].a is None
-    assert np.abs(velocity.points["wheel"].velocity - acceleration.points["wheel"].velocity).max() <= 2e-15
+    assert (
+        np.abs(velocity.points["wheel"].velocity - acceleration.points["wheel"].velocity).max()
+        <= 2e-15
+    )
     assert np.abs(velocity.bodies["strut"].v - acceleration.bodies["strut"].v).max() <= 2e-15
     cost = [sum(flops(found).get(name, 0) for name in ("newton", "outputs")) for found in by_order]
     assert cost[0] < cost[1] < cost[2]
@@ -197,8 +254,13 @@ def test_lower_orders_give_the_same_and_cost_less():
 
 @pytest.mark.parametrize("style", [style.value for style in Style])
 def test_fixed_bodies_cost_nothing(style):
-    """Chassis and rack as fixed bodies, or as the ground itself: the same programs, the same bits."""
-    free, fixed = (solve(each, "stroke", STROKES, style=style) for each in (without_fixed_bodies(mcpherson()), mcpherson()))
+    """Chassis and rack as fixed bodies, or as the ground itself: the same programs, the same
+    bits.
+    """
+    free, fixed = (
+        solve(each, "stroke", STROKES, style=style)
+        for each in (without_fixed_bodies(mcpherson()), mcpherson())
+    )
     assert flops(free) == flops(fixed)
     assert (free.points["wheel"].position == fixed.points["wheel"].position).all()
     assert free.details["rank"] == fixed.details["rank"]
@@ -207,9 +269,13 @@ def test_fixed_bodies_cost_nothing(style):
 def test_the_ground_may_be_either_body():
     """Which body of a joint is the fixed one costs nothing either."""
     m = mcpherson()
-    turned = [joint.reversed() if any(map(m.is_fixed, joint.bodies)) else joint for joint in m.joints]
+    turned = [
+        joint.reversed() if any(map(m.is_fixed, joint.bodies)) else joint for joint in m.joints
+    ]
     assert sum(joint is not other for joint, other in zip(turned, m.joints, strict=True)) == 3
-    assert flops(solve(replace(m, joints=turned), "stroke", [0.0])) == flops(solve(m, "stroke", [0.0]))
+    assert flops(solve(replace(m, joints=turned), "stroke", [0.0])) == flops(
+        solve(m, "stroke", [0.0])
+    )
 
 
 def test_only_what_is_asked_for_is_there():
@@ -227,7 +293,9 @@ def test_only_what_is_asked_for_is_there():
 
 def test_fixed_bodies_and_their_points_stay():
     mechanism = mcpherson()
-    mechanism = replace(mechanism, points=[*mechanism.points, Point("top", "chassis", (1.0, 0.55, 0.6))])
+    mechanism = replace(
+        mechanism, points=[*mechanism.points, Point("top", "chassis", (1.0, 0.55, 0.6))]
+    )
     found = solve(mechanism, "stroke", [-0.05, 0.05], points=["top"], bodies=["rack"])
     top, rack = found.points["top"], found.bodies["rack"]
     assert (top.position == (1.0, 0.55, 0.6)).all()
@@ -279,7 +347,10 @@ def test_of_no_values_there_are_no_samples(name):
         ({"motions": {"stroke": Ramp(1.0)}}, "motions has 'stroke', which is swept; leave it out"),
         ({"motions": {"steer": Ramp(1.0)}}, "there is no driver 'steer'"),
         ({"motions": {"steer": 3.0}}, r"motions\['steer'\] is 3.0, expected a motion"),
-        ({"style": "dads"}, "there is no style 'dads'; known: native, paper, conventional, mixed, relative"),
+        (
+            {"style": "dads"},
+            "there is no style 'dads'; known: native, paper, conventional, mixed, relative",
+        ),
     ],
 )
 def test_an_argument_that_makes_no_sense_is_told(arguments, message):

@@ -1,4 +1,6 @@
-"""Large mechanisms as one sparse system: the motions that one program gives, rings of any size, and refusals with names."""
+"""Large mechanisms as one sparse system: the motions that one program gives, rings of any size, and
+refusals with names.
+"""
 
 from dataclasses import replace
 
@@ -52,14 +54,25 @@ def turning(*values, rate=1.0):
 
 def both(mechanism, path, points, compiled=False):
     bodies = tuple(body.name for body in mechanism.moving)
-    expected = follow(Route(compile_model(mechanism, Request(tuple(path.motions), points, bodies)), path), 1e-12)
+    expected = follow(
+        Route(compile_model(mechanism, Request(tuple(path.motions), points, bodies)), path), 1e-12
+    )
     return solve_sparse(SparseModel(mechanism, compiled=compiled), path, points, bodies), expected
 
 
 # several drivers, redundant rows, all kinds of joints, a sweep that does not start at the design
 @WAYS
 @pytest.mark.parametrize(
-    "name", ["mcpherson_strut", "mcpherson_steered", "four_bar", "andrews_squeezer", "delta_robot", "bricard", "double_cardan"]
+    "name",
+    [
+        "mcpherson_strut",
+        "mcpherson_steered",
+        "four_bar",
+        "andrews_squeezer",
+        "delta_robot",
+        "bricard",
+        "double_cardan",
+    ],
 )
 def test_it_gives_what_one_program_gives(name, compiled):
     case = cases.load(name)
@@ -70,7 +83,12 @@ def test_it_gives_what_one_program_gives(name, compiled):
 def test_couplers_and_their_coordinates(compiled):
     mechanism = Mechanism(
         "gears",
-        [Body("wheel"), Body("pinion", (1.0, 0.0, 0.0)), Body("rack"), Body("nut", (1.0, 0.0, 0.5))],
+        [
+            Body("wheel"),
+            Body("pinion", (1.0, 0.0, 0.0)),
+            Body("rack"),
+            Body("nut", (1.0, 0.0, 0.5)),
+        ],
         [
             Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), Z),
             Revolute("second", "pinion", "ground", (1.0, 0.0, 0.0), Z),
@@ -82,25 +100,44 @@ def test_couplers_and_their_coordinates(compiled):
         [JointAngle("turn", "first")],
         [Gear("mesh", ("first", "second"), -2.0), RackPinion("rolls", ("second", "guide"), 0.3)],
     )
-    found, expected = both(mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"), compiled)
+    found, expected = both(
+        mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"), compiled
+    )
     assert_alike(found, expected)
     # the pinion makes half the turns, the nut a lead for each
-    assert np.ptp(found.points["top"].position[:, 2]) == pytest.approx(6.0 / 2.0 * 0.02 / (2.0 * np.pi), rel=1e-12)
+    assert np.ptp(found.points["top"].position[:, 2]) == pytest.approx(
+        6.0 / 2.0 * 0.02 / (2.0 * np.pi), rel=1e-12
+    )
 
 
 @WAYS
 @pytest.mark.parametrize(
-    "times", [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 30)[::-1], np.zeros(1), np.array([0.5, 0.5, -0.5])]
+    "times",
+    [
+        np.linspace(2.0, 3.0, 5),
+        np.linspace(-0.2, 0.9, 30)[::-1],
+        np.zeros(1),
+        np.array([0.5, 0.5, -0.5]),
+    ],
 )
 def test_any_samples(times, compiled):
     for mechanism in (slider_crank(1.01), four_bar()):
-        assert_alike(*both(mechanism, turning(*times, rate=2.0), tuple(point.name for point in mechanism.points), compiled))
+        assert_alike(
+            *both(
+                mechanism,
+                turning(*times, rate=2.0),
+                tuple(point.name for point in mechanism.points),
+                compiled,
+            )
+        )
 
 
 @WAYS
 def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample(compiled):
     for times in (np.linspace(0.0, 3.0, 31), np.linspace(2.0, 1.0, 7)):
-        assert_alike(*both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",), compiled))
+        assert_alike(
+            *both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",), compiled)
+        )
     steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))  # begins beyond the travel
     assert solve_sparse(SparseModel(mcpherson(), compiled=compiled), steep).message.startswith(
         "on the way to the first sample: cannot be followed beyond"
@@ -112,31 +149,49 @@ def test_small_steps_take_one_iteration_each():
     assert (found.iterations[4:] == 1).all()  # after the steps from which the predictor learns
 
 
-CRANK = Mechanism("crank", [Body("b")], [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)], (), [JointAngle("turn", "axle")])
+CRANK = Mechanism(
+    "crank",
+    [Body("b")],
+    [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)],
+    (),
+    [JointAngle("turn", "axle")],
+)
 
 
 def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another():
     path = turning(6.0 * np.pi + 0.3)
     found = solve_sparse(CRANK, path, (), ["b"])  # an odd number of turns changes the sign
-    assert found.bodies["b"].p[0] == pytest.approx([-np.cos(0.15), 0.0, 0.0, -np.sin(0.15)], abs=1e-14)
+    assert found.bodies["b"].p[0] == pytest.approx(
+        [-np.cos(0.15), 0.0, 0.0, -np.sin(0.15)], abs=1e-14
+    )
     model = SparseModel(CRANK, compiled=False)
     here = model.moving(model.design, 0.0, model.drives(path, np.zeros(1))[:, 0])
     assert model.reach(here, 0.9, model.drives(path, np.array([0.9]))[:, 0], 1e-12).iterations
     with pytest.raises(FailedError, match="too long to be believed"):
-        model.reach(replace(here, slopes=np.array([1e-3])), 1.1, model.drives(path, np.array([1.1]))[:, 0], 1e-12)
+        model.reach(
+            replace(here, slopes=np.array([1e-3])),
+            1.1,
+            model.drives(path, np.array([1.1]))[:, 0],
+            1e-12,
+        )
 
 
 def test_a_wrong_branch_is_no_solution():
     model = SparseModel(CRANK, compiled=False)
     here = model.moving(model.design, 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0])
-    over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])  # half a turn about x: the axes are parallel, but opposite
+    # half a turn about x: the axes are parallel, but opposite
+    over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
     with pytest.raises(FailedError, match="wrong branch"):
-        model.reach(replace(here, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12)
+        model.reach(
+            replace(here, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12
+        )
 
 
 @pytest.mark.parametrize("cranks", [16, 120])
 def test_every_crank_of_a_ring_turns_as_the_first(cranks):
-    """Of a ring of 31 bodies as one program, whose samples are beyond doubt, and of a large one as a sparse system."""
+    """Of a ring of 31 bodies as one program, whose samples are beyond doubt, and of a large one as
+    a sparse system.
+    """
     turn = np.linspace(-0.8, 0.8, 17)
     found = solve(ring(cranks), "turn", turn)
     assert found.solved.all(), found.message
@@ -145,8 +200,12 @@ def test_every_crank_of_a_ring_turns_as_the_first(cranks):
     s, c, o = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
     for k in range(cranks):
         motion = found.points[f"tip{k}"]
-        # an angle is known to the sum of the round-offs on the way to it; each derivative multiplies it again
-        assert np.abs(motion.position - np.column_stack([pivot(k, cranks) + s, c, o])).max() <= 1e-15 * cranks
+        # an angle is known to the sum of the round-offs on the way to it; each derivative
+        # multiplies it again
+        assert (
+            np.abs(motion.position - np.column_stack([pivot(k, cranks) + s, c, o])).max()
+            <= 1e-15 * cranks
+        )
         assert np.abs(motion.velocity - np.column_stack([-c, s, o])).max() <= 1e-14 * cranks
         assert np.abs(motion.acceleration - np.column_stack([-s, -c, o])).max() <= 1e-13 * cranks
 
@@ -160,17 +219,33 @@ def test_a_ring_cannot_be_taken_apart_and_its_factors_grow_with_it():
 
 def test_numpy_and_machine_code_agree():
     path = turning(*np.linspace(-0.5, 0.5, 5))
-    assert_alike(*(solve_sparse(SparseModel(ring(12), compiled=each), path, ["tip6"], ["plate5"]) for each in (True, False)))
+    assert_alike(
+        *(
+            solve_sparse(SparseModel(ring(12), compiled=each), path, ["tip6"], ["plate5"])
+            for each in (True, False)
+        )
+    )
 
 
 def test_redundant_rows_of_many_loops_are_found_where_they_are():
     loops = 60
     n, s, c = range(loops), np.sin(0.3), np.cos(0.3)
-    pivots = [Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), Z) for k in range(loops + 1)]
-    pins = [Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), Z) for k in n for at in (0, 1)]
+    pivots = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), Z)
+        for k in range(loops + 1)
+    ]
+    pins = [
+        Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), Z)
+        for k in n
+        for at in (0, 1)
+    ]
     bodies = [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)]
-    planar = Mechanism("planar", bodies, [*pivots, *pins], [Point("end", f"crank{loops}", (loops + s, c, 0.0))])
-    driven = Mechanism("planar", bodies, planar.joints, planar.points, [JointAngle("turn", "pivot0")])
+    planar = Mechanism(
+        "planar", bodies, [*pivots, *pins], [Point("end", f"crank{loops}", (loops + s, c, 0.0))]
+    )
+    driven = Mechanism(
+        "planar", bodies, planar.joints, planar.points, [JointAngle("turn", "pivot0")]
+    )
     found = solve_sparse(driven, turning(-0.5, 0.5), ["end"])
     assert found.solved.all(), found.message
     assert len(found.details["dof_account"]["redundant_rows"]) == 3 * loops
@@ -181,8 +256,14 @@ def test_redundant_rows_of_many_loops_are_found_where_they_are():
 
 def test_redundant_rows_that_contradict_are_told():
     mechanism = four_bar()
-    joints = [joint.changed(axis=(0.0, 1.0, 1e-3)) if joint.name == "D" else joint for joint in mechanism.joints]
-    found = solve_sparse(Mechanism("askew", mechanism.bodies, joints, mechanism.points, mechanism.drivers), turning(0.5))
+    joints = [
+        joint.changed(axis=(0.0, 1.0, 1e-3)) if joint.name == "D" else joint
+        for joint in mechanism.joints
+    ]
+    found = solve_sparse(
+        Mechanism("askew", mechanism.bodies, joints, mechanism.points, mechanism.drivers),
+        turning(0.5),
+    )
     assert not found.solved.any()
     assert "the redundant rows (" in found.message
     assert "contradict" in found.message
@@ -191,7 +272,9 @@ def test_redundant_rows_that_contradict_are_told():
 def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
     values = np.linspace(-0.05, 0.4, 46)
     model = SparseModel(mcpherson())
-    found = solve_sparse(model, Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1)
+    found = solve_sparse(
+        model, Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1
+    )
     assert (found.solved == (values < 0.29337)).all()  # formulation section 10
     assert np.isnan(found.points["wheel"].position[~found.solved]).all()
     assert "cannot be followed beyond stroke = 0.293" in found.message
@@ -211,17 +294,32 @@ def without_driver(mechanism):
 
 def test_what_cannot_be_solved_is_refused_by_name():
     whole = chain(40)
-    with pytest.raises(SolveError, match=r"1 degree of freedom .* but 0 drivers; what can still move is most of all 'crank0', "):
+    with pytest.raises(
+        SolveError,
+        match=(
+            r"1 degree of freedom .* but 0 drivers; what can still move is most of all 'crank0', "
+        ),
+    ):
         SparseModel(without_driver(whole), compiled=False)
     second = JointAngle("second", "pivot20")
-    with pytest.raises(SolveError, match=r"1 degree of freedom .* but 2 drivers; not independent are .*'second'"):
-        SparseModel(Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]), compiled=False)
+    with pytest.raises(
+        SolveError, match=r"1 degree of freedom .* but 2 drivers; not independent are .*'second'"
+    ):
+        SparseModel(
+            Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]),
+            compiled=False,
+        )
     stretched = slider_crank()
     push = [PointCoordinate("push", "end", X)]
     with pytest.raises(SolveError, match=r"driven by 'push' it does not move .*dead centre"):
-        SparseModel(Mechanism("stuck", stretched.bodies, stretched.joints, stretched.points, push), compiled=False)
+        SparseModel(
+            Mechanism("stuck", stretched.bodies, stretched.joints, stretched.points, push),
+            compiled=False,
+        )
     m = mcpherson()
-    joints = [joint.changed(length=3.0) if isinstance(joint, Distance) else joint for joint in m.joints]
+    joints = [
+        joint.changed(length=3.0) if isinstance(joint, Distance) else joint for joint in m.joints
+    ]
     with pytest.raises(SolveError, match="does not close at the design position: residual"):
         SparseModel(Mechanism("apart", m.bodies, joints, m.points, m.drivers), compiled=False)
     with pytest.raises(SolveError, match="no body can move"):
@@ -236,12 +334,23 @@ def test_a_rod_that_spins_freely_is_named():
     ]
     joints = [*(joint for joint in mechanism.joints if not isinstance(joint, Distance)), *rod]
     with pytest.raises(SolveError, match=r"but 1 driver; 'rod' can turn; .*use distance"):
-        SparseModel(Mechanism("spinning", [*mechanism.bodies, Body("rod")], joints, mechanism.points, mechanism.drivers))
+        SparseModel(
+            Mechanism(
+                "spinning",
+                [*mechanism.bodies, Body("rod")],
+                joints,
+                mechanism.points,
+                mechanism.drivers,
+            )
+        )
 
 
 def test_costs_are_measured_with_residuals_and_errors():
     rows = scaling.measure([3], [5], rounds=1)
-    assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [("chain", 3, 7, 42), ("ring", 5, 9, 54)]
+    assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [
+        ("chain", 3, 7, 42),
+        ("ring", 5, 9, 54),
+    ]
     assert all(row.residual <= 1e-15 for row in rows)
     assert all(row.error <= 1e-14 for row in rows)
     assert all(row.us_per_value.median > 0.0 for row in rows)
@@ -251,7 +360,9 @@ def test_costs_are_measured_with_residuals_and_errors():
 def test_the_sign_of_the_determinant(n):
     """Of matrices of one pattern it is that of the signed pivot, or always the other."""
     rng = np.random.default_rng(n)
-    rows, columns = np.nonzero((rng.random((n, n)) < 3.0 / n) | np.eye(n, k=1, dtype=bool) | np.eye(n, k=1 - n, dtype=bool))
+    rows, columns = np.nonzero(
+        (rng.random((n, n)) < 3.0 / n) | np.eye(n, k=1, dtype=bool) | np.eye(n, k=1 - n, dtype=bool)
+    )
     factors = Factors(rows, columns, rng.normal(size=len(rows)), n)
     products: set[float] = set()
     signs: set[float] = set()
@@ -269,7 +380,9 @@ def test_the_sign_of_the_determinant(n):
 
 
 def test_orientation_tells_the_sign_of_every_block():
-    """Of blocks solved one after the other, rows and columns mixed: of each that of its determinant, or always the other."""
+    """Of blocks solved one after the other, rows and columns mixed: of each that of its
+    determinant, or always the other.
+    """
     sizes = [1, 2, 5, 1, 2, 3]
     rng, n = np.random.default_rng(4), sum(sizes)
     block = np.repeat(np.arange(len(sizes)), sizes)
@@ -282,8 +395,13 @@ def test_orientation_tells_the_sign_of_every_block():
         matrix, mixed = rng.normal(size=(n, n)), np.zeros((n, n))
         mixed[rows[i], columns[j]] = matrix[i, j]
         known.append(
-            tuple(float(np.linalg.slogdet(matrix[np.ix_(at, at)])[0]) for at in (np.flatnonzero(block == k) for k in range(6)))
+            tuple(
+                float(np.linalg.slogdet(matrix[np.ix_(at, at)])[0])
+                for at in (np.flatnonzero(block == k) for k in range(6))
+            )
         )
-        found.append(blocks.orientation(matrix[i, j, None], np.array([np.linalg.slogdet(mixed)[0]]))[0])
+        found.append(
+            blocks.orientation(matrix[i, j, None], np.array([np.linalg.slogdet(mixed)[0]]))[0]
+        )
     # one answer for each combination of signs
     assert len(set(known)) == len(set(found)) == len(set(zip(known, found, strict=True))) > 20

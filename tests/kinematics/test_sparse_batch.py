@@ -1,4 +1,6 @@
-"""Samples of a sparse system solved together: what they are one by one, and never what cannot be believed."""
+"""Samples of a sparse system solved together: what they are one by one, and never what cannot be
+believed.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,10 @@ def one_by_one(mechanism, path, points=POINTS):
 
 @pytest.mark.parametrize("count", [4, 9, 65])
 def test_a_smooth_sweep_needs_no_sample_alone(count, alone):
-    model, path = SparseModel(ring(20)), turning(*np.linspace(-0.4, 0.4, count)) if count > 4 else turning(0.0, 0.05, 0.1, 0.15)
+    model, path = (
+        SparseModel(ring(20)),
+        turning(*np.linspace(-0.4, 0.4, count)) if count > 4 else turning(0.0, 0.05, 0.1, 0.15),
+    )
     found = solve_sparse(model, path, POINTS)
     assert not alone
     assert_alike(found, one_by_one(ring(20), path))
@@ -58,7 +63,10 @@ def test_samples_after_the_first_eight_take_one_iteration():
 def test_samples_in_any_order_at_any_distance_and_twice():
     times = np.random.default_rng(3).uniform(-0.9, 0.9, 40)
     times = np.concatenate([times, times[:3], [0.0, 0.0]])
-    assert_alike(solve_sparse(SparseModel(ring(9)), turning(*times), POINTS), one_by_one(ring(9), turning(*times)))
+    assert_alike(
+        solve_sparse(SparseModel(ring(9)), turning(*times), POINTS),
+        one_by_one(ring(9), turning(*times)),
+    )
 
 
 def test_samples_that_come_twice_are_solved_together_too(alone):
@@ -75,9 +83,12 @@ def test_few_samples_are_not_worth_making_it_ready():
 
 
 def test_an_order_that_serves_no_longer_is_renewed(monkeypatch, alone):
-    monkeypatch.setattr(sparse_lu, "PIVOT_THRESHOLD", 1.0)  # rows are exchanged, and not kept for as long as they may
+    # rows are exchanged, and not kept for as long as they may
+    monkeypatch.setattr(sparse_lu, "PIVOT_THRESHOLD", 1.0)
     ordered, order = list[float](), Batch.order
-    monkeypatch.setattr(Batch, "order", lambda self, model: order(self, model) or ordered.append(self._sign[0]))
+    monkeypatch.setattr(
+        Batch, "order", lambda self, model: order(self, model) or ordered.append(self._sign[0])
+    )
     monkeypatch.setattr(module, "GROWTH", 1.5)
     path = turning(*np.linspace(0.0, 1.5, 100))
     found = solve_sparse(SparseModel(ring(13)), path, POINTS)
@@ -101,9 +112,11 @@ def test_what_cannot_be_believed_is_refused():
     here, times = stood(model), [0.01, 0.02, 0.03]
     assert reached(model, here, times) == 3
     assert reached(model, replace(here, orientation=bytes(len(here.orientation))), times) == 0
-    assert reached(model, replace(here, largest_pivot=1e12), times) == 0  # as if it were next to singular
+    # as if it were next to singular
+    assert reached(model, replace(here, largest_pivot=1e12), times) == 0
     assert reached(model, here, times, tol=-1.0) == 0
-    assert reached(model, here, [0.01, 0.02, 1.2, 1.21]) == 2  # further than can be told from another motion
+    # further than can be told from another motion
+    assert reached(model, here, [0.01, 0.02, 1.2, 1.21]) == 2
     assert reached(model, here, [0.01, float("nan"), 0.03]) == 1
     # the way is not what the rates say
     assert reached(model, replace(here, rates=2.0 * here.rates), times) == 0
@@ -113,7 +126,8 @@ def test_what_cannot_be_believed_is_refused():
 def test_a_step_that_is_longer_than_can_be_told_from_another_is_refused():
     model = SparseModel(CRANK)
     assert reached(model, stood(model), [1.03]) == 1
-    assert reached(model, stood(model), [1.06]) == 0  # half of it is more than 0.5 in Euler parameters
+    # half of it is more than 0.5 in Euler parameters
+    assert reached(model, stood(model), [1.06]) == 0
 
 
 def changed(monkeypatch, quantity: str, change) -> None:
@@ -150,7 +164,9 @@ def test_another_branch_is_refused(monkeypatch):
 
 @WAYS
 def test_a_singular_pose_is_not_stepped_over(compiled):
-    found = solve_sparse(SparseModel(chain(3), compiled=compiled), turning(*np.linspace(0.0, 2.4, 7)), ["end"])
+    found = solve_sparse(
+        SparseModel(chain(3), compiled=compiled), turning(*np.linspace(0.0, 2.4, 7)), ["end"]
+    )
     assert found.solved.tolist() == [True] * 5 + [False] * 2
     assert "cannot be followed beyond turn = 1.8707" in found.message
     assert "there is a singular pose ahead" in found.message
@@ -164,6 +180,9 @@ def test_a_gap_is_the_end_also_of_two_loops_at_once(short, count, loops, compile
     """Their determinants change their signs together, and that of the whole keeps it."""
     turn = np.linspace(0.0, 2.0, count)
     found = solve_sparse(
-        SparseModel(loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops), compiled=compiled), turning(*turn)
+        SparseModel(
+            loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops), compiled=compiled
+        ),
+        turning(*turn),
     )
     assert (found.solved == (turn < 1.0 - np.pi + 2.0 * np.arcsin(1.0 - 0.5 * short))).all()

@@ -1,10 +1,22 @@
-"""Sparse systems choose rows anew where those of the design come to depend on each other, and step over no singular pose."""
+"""Sparse systems choose rows anew where those of the design come to depend on each other, and step
+over no singular pose.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Distance, Inline, JointAngle, Mechanism, Point, Revolute, Universal, solve
+from kincheck.core import (
+    Body,
+    Distance,
+    Inline,
+    JointAngle,
+    Mechanism,
+    Point,
+    Revolute,
+    Universal,
+    solve,
+)
 from kincheck.core.kinematics.sparse import row_selection
 from kincheck.core.kinematics.sparse.determinant_signs import Blocks
 from kincheck.core.kinematics.sparse.elements import Elements
@@ -29,20 +41,35 @@ def pin_meeting(crank, ground, rod, rocker, angle):
 
 
 def four_bar(sizes, start, ends):
-    """A four-bar on the driven crank of a ring, its rod on hinges or on universals: three rows or one more than are needed."""
+    """A four-bar on the driven crank of a ring, its rod on hinges or on universals: three rows or
+    one more than are needed.
+    """
     pin, meet = ((*each[0].tolist(), 0.0) for each in pin_meeting(*sizes, np.array([start])))
     joints = [Revolute("rest", "ground", "rocker", (sizes[1], 0.0, 0.0), Z)]
     if ends == "hinges":
-        joints += [Revolute("pin", "crank0", "rod", pin, Z), Revolute("end", "rod", "rocker", meet, Z)]
+        joints += [
+            Revolute("pin", "crank0", "rod", pin, Z),
+            Revolute("end", "rod", "rocker", meet, Z),
+        ]
     else:
-        joints += [Universal("pin", "crank0", "rod", pin, (X, Z)), Universal("end", "rod", "rocker", meet, (Z, X))]
+        joints += [
+            Universal("pin", "crank0", "rod", pin, (X, Z)),
+            Universal("end", "rod", "rocker", meet, (Z, X)),
+        ]
     whole = ring(25)
     bodies = [*whole.bodies, Body("rod"), Body("rocker")]
-    return replace(whole, bodies=bodies, joints=[*whole.joints, *joints], points=[Point("meet", "rocker", meet)])
+    return replace(
+        whole,
+        bodies=bodies,
+        joints=[*whole.joints, *joints],
+        points=[Point("meet", "rocker", meet)],
+    )
 
 
 @pytest.mark.parametrize("ends", ["hinges", "universals"])
-@pytest.mark.parametrize("sizes", [(0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.000001, 1.2)])
+@pytest.mark.parametrize(
+    "sizes", [(0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.000001, 1.2)]
+)
 @pytest.mark.parametrize("count", [9, 65])
 def test_rows_that_come_to_depend_on_each_other_end_nothing(sizes, ends, count):
     """A plain four-bar, a kite off by a twentieth, and one on its side beside its corner."""
@@ -55,7 +82,9 @@ def test_rows_that_come_to_depend_on_each_other_end_nothing(sizes, ends, count):
 
 
 def test_rows_chosen_anew_are_counted():
-    found = solve(four_bar((1.25, 1.2, 0.7, 0.7), -1.1, "hinges"), "turn", np.linspace(0.0, 1.6, 65))
+    found = solve(
+        four_bar((1.25, 1.2, 0.7, 0.7), -1.1, "hinges"), "turn", np.linspace(0.0, 1.6, 65)
+    )
     assert found.details["rows_chosen_anew"] >= 1
     assert "rows_chosen_anew" not in solve(ring(25), "turn", np.linspace(0.0, 0.8, 9)).details
 
@@ -74,16 +103,27 @@ def test_several_samples_at_once_give_what_one_after_the_other_gives(compiled):
         (pin, np.stack([-pin[:, 1], pin[:, 0]], axis=-1), -pin),
         (np.array([1.2, 0.0]), np.zeros(2), np.zeros(2)),
     ):
-        d, v, a = (x[:, :2] - y for x, y in ((point.position, end), (point.velocity, rate), (point.acceleration, second)))
+        d, v, a = (
+            x[:, :2] - y
+            for x, y in (
+                (point.position, end),
+                (point.velocity, rate),
+                (point.acceleration, second),
+            )
+        )
         assert np.abs((d * v).sum(axis=1)).max() < 1e-12
         assert np.abs((v * v).sum(axis=1) + (d * a).sum(axis=1)).max() < 1e-10
 
 
 def inside(off, ends, crank=14, cranks=30, phase=0.7):
-    """A ring of which a crank is two, tied by a parallelogram, or by what is nearly one: it belongs to all that is irreducible."""
+    """A ring of which a crank is two, tied by a parallelogram, or by what is nearly one: it belongs
+    to all that is irreducible.
+    """
     whole, aside = ring(cranks), 0.7
     joints = [
-        Inline(j.name, "other", f"plate{crank + 1}", (j.point[0] + aside, *j.point[1:]), Z) if j.name == f"before{crank + 1}" else j
+        Inline(j.name, "other", f"plate{crank + 1}", (j.point[0] + aside, *j.point[1:]), Z)
+        if j.name == f"before{crank + 1}"
+        else j
         for j in whole.joints
     ]
     x, s, c = pivot(crank, cranks), np.sin(LEAN + phase), np.cos(LEAN + phase)
@@ -92,12 +132,20 @@ def inside(off, ends, crank=14, cranks=30, phase=0.7):
     joints.append(Revolute("rest", "ground", "other", (x + aside, 0.0, 0.0), Z))
     bodies = [*whole.bodies, Body("other")]
     if ends == "distance":
-        return replace(whole, bodies=bodies, joints=[*joints, Distance("rod", f"crank{crank}", "other", (pin, end))])
-    joints += [Revolute("pin", f"crank{crank}", "rod", pin, Z), Revolute("end", "rod", "other", end, Z)]
+        return replace(
+            whole,
+            bodies=bodies,
+            joints=[*joints, Distance("rod", f"crank{crank}", "other", (pin, end))],
+        )
+    joints += [
+        Revolute("pin", f"crank{crank}", "rod", pin, Z),
+        Revolute("end", "rod", "other", end, Z),
+    ]
     return replace(whole, bodies=[*bodies, Body("rod")], joints=joints)
 
 
-# where the rod's arms are in line with it: the parallelogram may go on as another, and what is nearly one turns back
+# where the rod's arms are in line with it: the parallelogram may go on as another, and what is
+# nearly one turns back
 @pytest.mark.parametrize(("off", "end"), [(0.0, 0.5708), (1e-6, 0.57053), (1e-4, 0.56846)])
 @pytest.mark.parametrize("ends", ["distance", "hinges"])
 @pytest.mark.parametrize("count", [3, 9, 2201])
@@ -118,7 +166,9 @@ def test_the_largest_block_is_followed_where_it_is_regular(ends):
 
 
 def test_sigmas_of_blocks():
-    """Of blocks solved one after the other: of small ones exact, of the largest the better the more singular it is."""
+    """Of blocks solved one after the other: of small ones exact, of the largest the better the more
+    singular it is.
+    """
     rng, sizes = np.random.default_rng(2), [1, 3, 40, 2]
     block, n = np.repeat(np.arange(4), sizes), sum(sizes)
     i, j = np.nonzero(block[:, None] >= block)
@@ -129,16 +179,27 @@ def test_sigmas_of_blocks():
         s[-1] *= near
         matrix[np.ix_(inside, inside)] = (u * s) @ v
         factors = Factors(i, j, matrix[i, j], n)
-        largest, *small = Blocks(i, j, n).sigmas(matrix[i, j, None], factors.solve, factors.solve_transposed)[0]
+        largest, *small = Blocks(i, j, n).sigmas(
+            matrix[i, j, None], factors.solve, factors.solve_transposed
+        )[0]
         others = [np.flatnonzero(block == k) for k in (0, 3, 1)]
-        assert small == pytest.approx([np.linalg.svd(matrix[np.ix_(at, at)], compute_uv=False)[-1] for at in others], rel=1e-9)
+        assert small == pytest.approx(
+            [np.linalg.svd(matrix[np.ix_(at, at)], compute_uv=False)[-1] for at in others], rel=1e-9
+        )
         assert s[-1] * (1.0 - 1e-9) <= largest <= (4.0 if near == 1.0 else 1.0 + 1e-6) * s[-1]
 
 
 def chain_of_hinges(loops):
     n, s, c = range(loops), float(np.sin(0.3)), float(np.cos(0.3))
-    pivots = [Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), Z) for k in range(loops + 1)]
-    pins = [Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), Z) for k in n for at in (0, 1)]
+    pivots = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), Z)
+        for k in range(loops + 1)
+    ]
+    pins = [
+        Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), Z)
+        for k in n
+        for at in (0, 1)
+    ]
     bodies = [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)]
     return Mechanism("chain", bodies, [*pivots, *pins], (), [JointAngle("turn", "pivot0")])
 
@@ -150,9 +211,13 @@ def dense(model: SparseModel, elements: Elements):
 
 
 def test_rows_that_are_kept_are_well_conditioned(monkeypatch):
-    """Of a chain of loops rows were left out at one end: the smallest singular value was nothing, that of all rows is not."""
+    """Of a chain of loops rows were left out at one end: the smallest singular value was nothing,
+    that of all rows is not.
+    """
     model = SparseModel(chain_of_hinges(30), compiled=False)
-    kept, whole = (np.linalg.svd(each, compute_uv=False)[-1] for each in dense(model, model.elements))
+    kept, whole = (
+        np.linalg.svd(each, compute_uv=False)[-1] for each in dense(model, model.elements)
+    )
     assert kept > 0.2 * whole
     assert len(model.dropped) == 90
     monkeypatch.setattr(row_selection, "TOGETHER", 0)

@@ -1,4 +1,6 @@
-"""Where a motion is followed from: the design decides, up to six typed digits, and rounding never does."""
+"""Where a motion is followed from: the design decides, up to six typed digits, and rounding never
+does.
+"""
 
 import math
 from dataclasses import replace
@@ -9,7 +11,17 @@ from kincheck.adapters.exudyn.exudyn import Exudyn
 from kincheck.adapters.exudyn.solvers import static
 from kincheck.adapters.mujoco.mujoco import MuJoCo
 from kincheck.adapters.pinocchio.pinocchio import Pinocchio
-from kincheck.core import Body, JointAngle, Mechanism, Point, PointCoordinate, RackPinion, Revolute, Translational, solve
+from kincheck.core import (
+    Body,
+    JointAngle,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    RackPinion,
+    Revolute,
+    Translational,
+    solve,
+)
 from kincheck.core import solve_designs as designs
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.io.model_writer import way_to
@@ -30,7 +42,14 @@ from .test_chain import chain
 RADIUS = 0.1
 TIMES = np.linspace(-0.75, 0.75, 13)
 Z = (0.0, 0.0, 1.0)
-ANGLES = [60.0, 45.0, -60.0, 120.0, 180.0, *np.random.default_rng(7).uniform(-180.0, 180.0, 6).round(3).tolist()]
+ANGLES = [
+    60.0,
+    45.0,
+    -60.0,
+    120.0,
+    180.0,
+    *np.random.default_rng(7).uniform(-180.0, 180.0, 6).round(3).tolist(),
+]
 
 
 def six(x):
@@ -39,9 +58,13 @@ def six(x):
 
 
 def arm(degrees, *, relative=False):
-    """Two links of 0.8 m whose tip is driven on the unit circle about their hinge, which turns a pinion."""
+    """Two links of 0.8 m whose tip is driven on the unit circle about their hinge, which turns a
+    pinion.
+    """
     tip, elbow = math.radians(degrees), math.radians(degrees) + math.acos(0.5 / 0.8)
-    at, joint = ((r * math.cos(angle), r * math.sin(angle), 0.0) for r, angle in ((1.0, tip), (0.8, elbow)))
+    at, joint = (
+        (r * math.cos(angle), r * math.sin(angle), 0.0) for r, angle in ((1.0, tip), (0.8, elbow))
+    )
     return Mechanism(
         "arm",
         [Body("a"), Body("b"), Body("rack")],
@@ -69,7 +92,10 @@ def circling(mechanism, phases, kind="sine"):
         values = [math.sin(2.0 * math.pi * t + phase) for t in times.tolist()]
         return Table(tuple(times), tuple(map(six, values) if kind == "typed table" else values))
 
-    return {name: Absolute(motion(phase), mechanism.design_value(name)) for name, phase in zip("xy", phases, strict=True)}
+    return {
+        name: Absolute(motion(phase), mechanism.design_value(name))
+        for name, phase in zip("xy", phases, strict=True)
+    }
 
 
 def phases_of(degrees):
@@ -78,14 +104,25 @@ def phases_of(degrees):
 
 def case_of(mechanism, motions, times=TIMES):
     points = [each.name for each in mechanism.points]
-    outputs = tuple(Output(f"{name}_x", name, (1.0, 0.0, 0.0), False, 1e-9, 0.0, "a test") for name in points)
-    return Case("case", "made up", Truth.CONSENSUS_ONLY, mechanism, Sweep("time", times, 1.0, 0.0, motions), outputs)
+    outputs = tuple(
+        Output(f"{name}_x", name, (1.0, 0.0, 0.0), False, 1e-9, 0.0, "a test") for name in points
+    )
+    return Case(
+        "case",
+        "made up",
+        Truth.CONSENSUS_ONLY,
+        mechanism,
+        Sweep("time", times, 1.0, 0.0, motions),
+        outputs,
+    )
 
 
 def by_style(style):
     def solved(case):
         path = case.sweep.path
-        return prepare(case.mechanism, Request(tuple(path.motions), case.points, style=style), path)(1e-12)
+        return prepare(
+            case.mechanism, Request(tuple(path.motions), case.points, style=style), path
+        )(1e-12)
 
     return solved
 
@@ -104,7 +141,11 @@ WAYS = [
     *(pytest.param(by_style(style), id=style) for style in STYLES),
     pytest.param(by_sparse, id="sparse"),
     *(
-        pytest.param(by_engine(make()), id=name, marks=pytest.mark.skipif(make().version() is None, reason="not installed"))
+        pytest.param(
+            by_engine(make()),
+            id=name,
+            marks=pytest.mark.skipif(make().version() is None, reason="not installed"),
+        )
         for name, make in ENGINES.items()
     ),
 ]
@@ -117,7 +158,9 @@ def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved):
         mechanism = arm(degrees)
         found = solved(case_of(mechanism, circling(mechanism, phases_of(degrees))))
         assert found.solved.all(), found.message
-        assert found.points["r"].position[:, 0] == pytest.approx(2.0 * math.pi * RADIUS * TIMES, abs=1e-12), degrees
+        assert found.points["r"].position[:, 0] == pytest.approx(
+            2.0 * math.pi * RADIUS * TIMES, abs=1e-12
+        ), degrees
         assert found.details["start"]["time"] == 0.0
         assert "notes" not in found.details
 
@@ -131,11 +174,16 @@ def test_six_typed_digits_are_as_good_as_all(solved, kind):
         motions = circling(mechanism, map(six, phases) if kind == "sine" else phases, kind)
         found = solved(case_of(mechanism, motions))
         assert found.solved.all(), found.message
-        assert found.points["r"].position[:, 0] == pytest.approx(2.0 * math.pi * RADIUS * TIMES, abs=1e-4), degrees
+        assert found.points["r"].position[:, 0] == pytest.approx(
+            2.0 * math.pi * RADIUS * TIMES, abs=1e-4
+        ), degrees
         assert "notes" not in found.details
-        # what is between the design and the path is travelled: at time zero the tip is where its drivers are
+        # what is between the design and the path is travelled: at time zero the tip is where its
+        # drivers are
         middle = found.points["tip"].position[6, :2]
-        assert middle == pytest.approx([motion.motion.at(np.zeros(1))[0][0] for motion in motions.values()], abs=1e-14)
+        assert middle == pytest.approx(
+            [motion.motion.at(np.zeros(1))[0][0] for motion in motions.values()], abs=1e-14
+        )
 
 
 @pytest.mark.parametrize("solved", WAYS)
@@ -147,22 +195,34 @@ def test_relative_drivers_and_a_phase_of_whole_half_turns(solved, turns):
         motions = {"u": Sine(-9.0, 0.5, phase), "v": Ramp(0.3)}
         found = solved(case_of(mechanism, motions))
         assert found.solved.all(), found.message
-        assert found.points["r"].position[:, 0] == pytest.approx(RADIUS * motions["u"].at(TIMES)[0], abs=1e-13)
+        assert found.points["r"].position[:, 0] == pytest.approx(
+            RADIUS * motions["u"].at(TIMES)[0], abs=1e-13
+        )
         assert found.details["start"]["time"] == 0.0
 
 
 def test_a_design_value_that_is_rounding_itself_is_zero_to_a_driver_held_there():
     mechanism = arm(180.0)
     assert 0.0 < mechanism.design_value("y") < 1e-15
-    motions = {"x": Absolute(Sine(1.0, 1.0, -math.pi / 2.0), mechanism.design_value("x")), "y": Absolute(Ramp(0.0), 0.0)}
-    start = start_of(mechanism, Path({**motions, "y": Absolute(Ramp(0.0), mechanism.design_value("y"))}, TIMES))
+    motions = {
+        "x": Absolute(Sine(1.0, 1.0, -math.pi / 2.0), mechanism.design_value("x")),
+        "y": Absolute(Ramp(0.0), 0.0),
+    }
+    start = start_of(
+        mechanism, Path({**motions, "y": Absolute(Ramp(0.0), mechanism.design_value("y"))}, TIMES)
+    )
     assert (start.time, start.lead, start.stands) == (0.0, None, True)
 
 
 def test_what_is_exact_is_where_it_was():
     mechanism = arm(30.0, relative=True)
     start = start_of(mechanism, Path({"x": Sine(0.1, 1.0), "y": Ramp(0.1)}, TIMES))
-    assert (start.time, start.lead, start.other, start.facts) == (0.0, None, None, {"time": 0.0, "lead": {}})
+    assert (start.time, start.lead, start.other, start.facts) == (
+        0.0,
+        None,
+        None,
+        {"time": 0.0, "lead": {}},
+    )
 
 
 def test_a_table_that_does_not_know_time_zero_begins_at_its_first_sample():
@@ -183,7 +243,9 @@ def test_a_sample_at_which_the_design_stands_is_a_start(solved):
     phases = [phase - 1.5 * math.pi for phase in phases_of(degrees)]
     found = solved(case_of(mechanism, circling(mechanism, phases), times))
     assert found.solved.all(), found.message
-    assert found.points["r"].position[:, 0] == pytest.approx(2.0 * math.pi * RADIUS * (times - 0.75), abs=1e-12)
+    assert found.points["r"].position[:, 0] == pytest.approx(
+        2.0 * math.pi * RADIUS * (times - 0.75), abs=1e-12
+    )
     assert found.details["start"]["time"] == 0.75
 
 
@@ -209,12 +271,17 @@ def test_two_ways_to_one_motion_are_one():
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     found = by_style("native")(case_of(mechanism, {"u": Sine(2.0, 1.0, 1.0), "v": Ramp(0.3)}))
     (note,) = found.details["notes"]
-    assert note.startswith("the design position is not on the path: all drivers go straight from it to time zero (u = 1.68")
+    assert note.startswith(
+        "the design position is not on the path: all drivers go straight from it to time zero (u ="
+        " 1.68"
+    )
 
 
 @pytest.mark.parametrize("solved", WAYS)
 def test_where_one_way_is_closed_the_other_is_taken(solved):
-    """Straight to time zero, the tip would go through the hinge, where links of different lengths cannot bring it."""
+    """Straight to time zero, the tip would go through the hinge, where links of different lengths
+    cannot bring it.
+    """
     mechanism = arm(0.0)
     short = replace(mechanism.joints[1], point=(0.55, math.sqrt(0.6**2 - 0.55**2), 0.0))
     mechanism = replace(mechanism, joints=[mechanism.joints[0], short, mechanism.joints[2]])
@@ -237,7 +304,9 @@ def test_components_start_alike():
 
 @pytest.mark.parametrize("phase", [3.0 * math.pi, six(3.0 * math.pi)])
 def test_a_singular_pose_between_the_start_and_the_first_sample_is_passed(phase):
-    """The cranks of a parallelogram pass their base line, 1.87 rad from design, before any sample."""
+    """The cranks of a parallelogram pass their base line, 1.87 rad from design, before any
+    sample.
+    """
     path = Path({"turn": Sine(2.5, 0.25, phase)}, np.array([-0.95, -0.9]))
     found = prepare(chain(1), Request(("turn",), ("end",)), path)(1e-12)
     assert found.solved.all(), found.message
@@ -251,7 +320,9 @@ def test_a_start_nearer_than_rounding_may_be_a_dead_centre():
     found = solve(slider_crank(), "turn", np.linspace(-0.4, 0.4, 5), motions={})
     path = Path({"turn": Sine(-0.4, 0.25, math.pi)}, np.array([-1.0, 0.0, 1.0]))
     other = prepare(slider_crank(), Request(("turn",), ("end",)), path)(1e-12)
-    assert other.points["end"].position == pytest.approx(found.points["end"].position[::2], abs=1e-15)
+    assert other.points["end"].position == pytest.approx(
+        found.points["end"].position[::2], abs=1e-15
+    )
 
 
 def test_many_designs_start_alike():
@@ -263,13 +334,18 @@ def test_many_designs_start_alike():
         for k, tip in enumerate(tips.tolist()):
             one = replace(mechanism, points=[Point("tip", "b", tuple(tip)), mechanism.points[1]])
             alone = solve(one, "u", values, motions=motions)
-            assert found.points["tip"].position[k] == pytest.approx(alone.points["tip"].position, abs=1e-12)
+            assert found.points["tip"].position[k] == pytest.approx(
+                alone.points["tip"].position, abs=1e-12
+            )
 
 
 def test_what_is_assumed_of_many_designs_is_said():
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     tips = {"points.tip.position": np.array([(1.0, 0.1, 0.0)])}
-    near, far = (designs(mechanism, "u", TIMES, tips, motions={"v": Sine(0.5, 0.3, phase)}).notes for phase in (six(math.pi), 1.0))
+    near, far = (
+        designs(mechanism, "u", TIMES, tips, motions={"v": Sine(0.5, 0.3, phase)}).notes
+        for phase in (six(math.pi), 1.0)
+    )
     assert [*near] == []
     assert "the design position is not on the path: all drivers go straight" in "; ".join(far)
 
@@ -286,16 +362,23 @@ def test_what_is_assumed_of_a_study_is_said(phase, said, tmp_path):
 
 
 def test_a_simulator_starts_there_too():
-    """Turns of a coupled joint are counted from the design, where a typed phase begins as well as an exact one."""
+    """Turns of a coupled joint are counted from the design, where a typed phase begins as well as
+    an exact one.
+    """
     if static().version() is None:
         pytest.skip("not installed")
     mechanism = arm(60.0)
     mechanism = replace(mechanism, drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    near, far = (case_of(mechanism, {"u": Sine(1.0, 0.3, phase), "v": Ramp(0.1)}) for phase in (six(math.pi), 1.0))
+    near, far = (
+        case_of(mechanism, {"u": Sine(1.0, 0.3, phase), "v": Ramp(0.1)})
+        for phase in (six(math.pi), 1.0)
+    )
     assert static().unsupported(near) is None
     assert "counted from the design" in str(static().unsupported(far))
     found = static().solve(static().build(near), near, 1e-12)
-    assert found.points["r"].position[:, 0] == pytest.approx(RADIUS * near.sweep.motions["u"].at(TIMES)[0], abs=1e-9)
+    assert found.points["r"].position[:, 0] == pytest.approx(
+        RADIUS * near.sweep.motions["u"].at(TIMES)[0], abs=1e-9
+    )
 
 
 def test_a_written_start_is_reached_from_the_design():
@@ -305,7 +388,9 @@ def test_a_written_start_is_reached_from_the_design():
     way = way_to(case, 0.5)
     assert way["rack"].r[0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
     assert way["a"].p[0] == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-15)
-    assert way["rack"].r[-1, 0] == pytest.approx(RADIUS * case.sweep.motions["u"].at(np.array([0.5]))[0][0], abs=1e-12)
+    assert way["rack"].r[-1, 0] == pytest.approx(
+        RADIUS * case.sweep.motions["u"].at(np.array([0.5]))[0][0], abs=1e-12
+    )
 
 
 def test_typed_digits_are_proved():

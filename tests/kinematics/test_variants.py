@@ -1,4 +1,6 @@
-"""Variants as lanes: the same as solving each variant alone, whatever the path, and whichever are solved beside it."""
+"""Variants as lanes: the same as solving each variant alone, whatever the path, and whichever are
+solved beside it.
+"""
 
 from dataclasses import replace
 
@@ -33,7 +35,8 @@ from ..support.mechanisms import four_bar
 from .test_chain import LEAN, chain
 
 TOL = 1e-12
-# Two ways to the same pose: the variant's lanes and a model of its own differ in the order of operations, not in equations.
+# Two ways to the same pose: the variant's lanes and a model of its own differ in the order of
+# operations, not in equations.
 SAME = 1e-13
 
 
@@ -44,7 +47,9 @@ def strut():
 
 def drawn(mechanism, varied, count, spread, seed=0):
     nominal = np.array([x for name in varied for x in places(mechanism)[name]])
-    return nominal[:, None] + np.random.default_rng(seed).normal(size=(len(nominal), count)) * spread
+    return (
+        nominal[:, None] + np.random.default_rng(seed).normal(size=(len(nominal), count)) * spread
+    )
 
 
 def variant(mechanism, varied, numbers):
@@ -94,9 +99,14 @@ ROUGH = {
 @pytest.mark.parametrize("order", [0, 2])
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("values", [FINE, *ROUGH.values()], ids=["fine", *ROUGH])
-def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(values, compiled, order, monkeypatch):
+def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(
+    values, compiled, order, monkeypatch
+):
     mechanism, varied = strut()
-    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), order=order, varied=varied, compiled=compiled))
+    model = compile_model(
+        mechanism,
+        Request(("stroke",), ("wheel_center",), order=order, varied=varied, compiled=compiled),
+    )
     path, numbers = Path({"stroke": Ramp(1.0)}, values), drawn(mechanism, varied, 11, 2e-3)
     found = solve_variants(Route(model, path), numbers, TOL)
     assert found.solved.all()
@@ -104,19 +114,28 @@ def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(valu
     iterations = found.kept[model.rows["iterations"].start]
     assert values is not FINE or (iterations[NODES:] == 1).all()
     monkeypatch.setattr(
-        "kincheck.core.kinematics.compiled.samples.weights_of_samples", lambda times: np.full((NODES, len(times)), np.nan)
+        "kincheck.core.kinematics.compiled.samples.weights_of_samples",
+        lambda times: np.full((NODES, len(times)), np.nan),
     )
     by_rates = solve_variants(Route(model, path), numbers, TOL)
     assert by_rates.retried == 0
     rows = slice(0, model.rows["closure"].start)
     np.testing.assert_allclose(found.kept[rows], by_rates.kept[rows], rtol=0, atol=SAME)
-    assert np.array_equal(found.kept[rows], by_rates.kept[rows]) == (values is ROUGH["every sample twice"])  # weights are infinite
+    # weights are infinite
+    assert np.array_equal(found.kept[rows], by_rates.kept[rows]) == (
+        values is ROUGH["every sample twice"]
+    )
 
 
-@pytest.mark.parametrize("path", [PATHS["from design, both ways"], Path({"stroke": Ramp(1.0)}, np.linspace(-0.06, 0.06, 61))])
+@pytest.mark.parametrize(
+    "path",
+    [PATHS["from design, both ways"], Path({"stroke": Ramp(1.0)}, np.linspace(-0.06, 0.06, 61))],
+)
 def test_a_lane_does_not_see_its_neighbours(path):
     mechanism, varied = strut()
-    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), order=0, varied=varied))
+    model = compile_model(
+        mechanism, Request(("stroke",), ("wheel_center",), order=0, varied=varied)
+    )
     route = Route(model, path)
     numbers = drawn(mechanism, varied, 40, 2e-3)
     together = solve_variants(route, numbers, TOL).kept
@@ -128,10 +147,17 @@ def test_a_lane_does_not_see_its_neighbours(path):
 
 @pytest.mark.parametrize("compiled", [True, False])
 def test_the_worst_of_each_lane_is_found_on_the_way(compiled):
-    """Over both sides of the start, and of lanes that are lost on one of them, in the middle and at the end of a vector."""
+    """Over both sides of the start, and of lanes that are lost on one of them, in the middle and at
+    the end of a vector.
+    """
     mechanism, varied = strut()
-    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), varied=varied, compiled=compiled))
-    path, numbers = Path({"stroke": Ramp(1.0)}, np.linspace(-0.25, 0.25, 41)), drawn(mechanism, varied, 19, 2e-3)
+    model = compile_model(
+        mechanism, Request(("stroke",), ("wheel_center",), varied=varied, compiled=compiled)
+    )
+    path, numbers = (
+        Path({"stroke": Ramp(1.0)}, np.linspace(-0.25, 0.25, 41)),
+        drawn(mechanism, varied, 19, 2e-3),
+    )
     numbers[2, [3, 18]] += 0.28  # as below: their way is shorter
     kept, closes, worst = design_batch._together(Route(model, path), numbers, TOL)
     assert closes.all()
@@ -142,7 +168,9 @@ def test_the_worst_of_each_lane_is_found_on_the_way(compiled):
     np.testing.assert_array_equal(worst["sigma"], np.where(lost, np.nan, sigma.min(axis=0)))
 
 
-@pytest.mark.parametrize("times", [np.linspace(-0.25, 0.25, 11), np.array([0.1, -0.2, 0.25, 0.0, -0.25, 0.2, -0.1])])
+@pytest.mark.parametrize(
+    "times", [np.linspace(-0.25, 0.25, 11), np.array([0.1, -0.2, 0.25, 0.0, -0.25, 0.2, -0.1])]
+)
 def test_what_cannot_be_followed_is_nan_with_the_reason_and_the_others_are_there(times):
     """A ball 0.28 m higher shortens the way of the arm; samples in no order find their places."""
     mechanism, _ = strut()
@@ -153,7 +181,13 @@ def test_what_cannot_be_followed_is_nan_with_the_reason_and_the_others_are_there
     model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), varied=varied))
     found = solve_variants(Route(model, path), numbers, TOL)
     own = follow(
-        Route(compile_model(variant(mechanism, varied, numbers[:, 1]), Request(("stroke",), ("wheel_center",))), path), TOL
+        Route(
+            compile_model(
+                variant(mechanism, varied, numbers[:, 1]), Request(("stroke",), ("wheel_center",))
+            ),
+            path,
+        ),
+        TOL,
     )
     assert 0 < own.solved.sum() < len(times)
     np.testing.assert_array_equal(found.solved[:, 1], own.solved)
@@ -184,9 +218,14 @@ def test_a_lane_that_gets_lost_on_the_way_to_the_first_sample_is_solved_again_al
 def test_a_variant_that_does_not_close_says_so():
     """A rod that is a third of the distance it has to span."""
     case = load("mcpherson_strut")
-    joints = [replace(joint, length=0.32) if joint.name == "tie_rod" else joint for joint in case.mechanism.joints]
+    joints = [
+        replace(joint, length=0.32) if joint.name == "tie_rod" else joint
+        for joint in case.mechanism.joints
+    ]
     mechanism = replace(case.mechanism, joints=joints)
-    model = compile_model(mechanism, Request(("stroke",), ("wheel_center",), varied=("joints.tie_rod.length",)))
+    model = compile_model(
+        mechanism, Request(("stroke",), ("wheel_center",), varied=("joints.tie_rod.length",))
+    )
     found = solve_variants(Route(model, PATHS["one side"]), np.array([[0.32, 0.05]]), TOL)
     assert found.solved.all(axis=0).tolist() == [True, False]
     assert found.messages[1].startswith("does not close at its design position; check")
@@ -206,7 +245,8 @@ def test_a_variant_that_cannot_move_is_not_solved_at_its_design_either(values):
         assert message == str(own.value)
 
 
-@pytest.mark.parametrize("room", [design_sweep.ROOM, 0])  # of their table: many at once, or the least
+# of their table: many at once, or the least
+@pytest.mark.parametrize("room", [design_sweep.ROOM, 0])
 def test_designs_are_solved_as_one_by_one(monkeypatch, room):
     monkeypatch.setattr(design_sweep, "ROOM", room)
     mechanism, _ = strut()
@@ -218,18 +258,36 @@ def test_designs_are_solved_as_one_by_one(monkeypatch, room):
     assert found.solved.all()
     assert found.messages == {}
     for k in (0, 255, 256, 299):
-        own = solve(placed(mechanism, {"joints.tie_rod.points.0": tuple(moved[k])}), "stroke", values)
-        np.testing.assert_allclose(found.points["wheel_center"].position[k], own.points["wheel_center"].position, rtol=0, atol=SAME)
-        np.testing.assert_allclose(found.points["wheel_center"].velocity[k], own.points["wheel_center"].velocity, rtol=0, atol=SAME)
+        own = solve(
+            placed(mechanism, {"joints.tie_rod.points.0": tuple(moved[k])}), "stroke", values
+        )
+        np.testing.assert_allclose(
+            found.points["wheel_center"].position[k],
+            own.points["wheel_center"].position,
+            rtol=0,
+            atol=SAME,
+        )
+        np.testing.assert_allclose(
+            found.points["wheel_center"].velocity[k],
+            own.points["wheel_center"].velocity,
+            rtol=0,
+            atol=SAME,
+        )
 
 
 @pytest.mark.parametrize(
     ("geometry", "message"),
     [
-        ({"joints.tie_rod.end": np.zeros((4, 3))}, "no place to vary 'joints.tie_rod.end'; did you mean 'joints.tie_rod.points.1'"),
+        (
+            {"joints.tie_rod.end": np.zeros((4, 3))},
+            "no place to vary 'joints.tie_rod.end'; did you mean 'joints.tie_rod.points.1'",
+        ),
         ({"joints.ball.point": np.zeros((4, 2))}, r"has shape \(4, 2\), expected \(designs, 3\)"),
         ({"joints.ball.point": np.full((4, 3), np.nan)}, "is not finite everywhere"),
-        ({"joints.ball.point": np.ones((4, 3)), "joints.strut_top.point": np.ones((5, 3))}, r"found \[4, 5\] designs"),
+        (
+            {"joints.ball.point": np.ones((4, 3)), "joints.strut_top.point": np.ones((5, 3))},
+            r"found \[4, 5\] designs",
+        ),
         ({}, "^solve_designs: geometry names no place to vary; known: joints.lca_pivot.point, "),
     ],
 )
@@ -246,7 +304,9 @@ def test_an_argument_that_makes_no_sense_is_told_by_who_was_asked():
 def test_samples_that_are_nearly_singular_are_refused():
     """What a run by itself would solve more closely; a study of many does not, and says so."""
     mechanism, samples = chain(1), [0.0, 1.8, LEAN + np.pi / 2.0 - 1e-4, 1.9]
-    ends = np.array([mechanism.point("end").position]) + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]])
+    ends = np.array([mechanism.point("end").position]) + np.array(
+        [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]
+    )
     found = solve_designs(mechanism, "turn", samples, {"points.end.position": ends})
     assert found.solved.tolist() == [[True, True, False, False]] * 2
     assert np.isnan(found.points["end"].position[:, 2:]).all()
@@ -259,9 +319,18 @@ def test_samples_that_are_nearly_singular_are_refused():
 def test_the_lead_of_a_screw_varies():
     """In the rows it is a weight, which is known only when the programs run."""
     thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), lead=0.01)
-    mechanism = Mechanism("nut", [Body("nut")], [thread], [Point("rim", "nut", (1.0, 0.0, 0.0))], [JointAngle("turn", "thread")])
-    turns, leads = np.array([0.0, 1.0, 2.0]), [0.01, 0.011, 50.0]  # the last larger than all else there is
-    found = solve_designs(mechanism, "turn", turns, {"joints.thread.lead": leads}, order=1).points["rim"]
+    mechanism = Mechanism(
+        "nut",
+        [Body("nut")],
+        [thread],
+        [Point("rim", "nut", (1.0, 0.0, 0.0))],
+        [JointAngle("turn", "thread")],
+    )
+    # the last larger than all else there is
+    turns, leads = np.array([0.0, 1.0, 2.0]), [0.01, 0.011, 50.0]
+    found = solve_designs(mechanism, "turn", turns, {"joints.thread.lead": leads}, order=1).points[
+        "rim"
+    ]
     for k, lead in enumerate(leads):
         slope = lead / (2.0 * np.pi)
         place = np.column_stack([np.cos(turns), np.sin(turns), slope * turns])
@@ -271,18 +340,26 @@ def test_the_lead_of_a_screw_varies():
 
 
 def test_a_variant_that_ends_early_is_told_that_it_may_go_on_by_itself():
-    found = solve_designs(strut()[0], "stroke", [0.0, 0.5], {"joints.ball.point": [strut()[0].joint("ball").point]})
+    found = solve_designs(
+        strut()[0], "stroke", [0.0, 0.5], {"joints.ball.point": [strut()[0].joint("ball").point]}
+    )
     assert "cannot be followed beyond stroke = 0.293" in found.messages[0]
-    assert found.messages[0].endswith("by itself, a variant may pass a singular pose; many at once do not")
+    assert found.messages[0].endswith(
+        "by itself, a variant may pass a singular pose; many at once do not"
+    )
 
 
 def test_a_variant_that_other_rows_would_follow_is_told_so():
-    """A kite off by a twentieth, its rod on universals: one row too many, and the one that is left out does not stay so."""
+    """A kite off by a twentieth, its rod on universals: one row too many, and the one that is left
+    out does not stay so.
+    """
     Z, X, turn = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), np.linspace(0.0, 1.6, 17)
     pin = 1.25 * np.array([np.cos(1.1), -np.sin(1.1)])
     d = np.array([1.2, 0.0]) - pin
     side = np.sqrt(0.49 / (d @ d) - 0.25)
-    pin, meet = ((*each.tolist(), 0.0) for each in (pin, pin + 0.5 * d + side * np.array([-d[1], d[0]])))
+    pin, meet = (
+        (*each.tolist(), 0.0) for each in (pin, pin + 0.5 * d + side * np.array([-d[1], d[0]]))
+    )
     joints = [
         Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), Z),
         Revolute("rest", "ground", "rocker", (1.2, 0.0, 0.0), Z),
@@ -290,9 +367,14 @@ def test_a_variant_that_other_rows_would_follow_is_told_so():
         Universal("end", "rod", "rocker", meet, (Z, X)),
     ]
     bodies = [Body(name) for name in ("crank", "rod", "rocker")]
-    kite = Mechanism("kite", bodies, joints, [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")])
+    kite = Mechanism(
+        "kite", bodies, joints, [Point("meet", "rocker", meet)], [JointAngle("turn", "pivot")]
+    )
     assert solve(kite, "turn", turn).solved.all()
     found = solve_designs(kite, "turn", turn, {"points.meet.position": np.array([meet])})
     assert not found.solved.all()
-    assert "what is singular may be the 18 rows chosen at the nominal design out of 19" in found.messages[0]
+    assert (
+        "what is singular may be the 18 rows chosen at the nominal design out of 19"
+        in found.messages[0]
+    )
     assert "solve this variant by itself" in found.messages[0]

@@ -1,4 +1,6 @@
-"""Arguments that are no numbers, or complex ones, whose imaginary part would be lost: refused by name, by every function."""
+"""Arguments that are no numbers, or complex ones, whose imaginary part would be lost: refused by
+name, by every function.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -35,7 +37,11 @@ def test_one_number(number):
         ("solve", "rate", lambda: solve(mcpherson(), "stroke", VALUES, rate=number)),
         ("solve", "tol", lambda: solve(mcpherson(), "stroke", VALUES, tol=number)),
         ("solve", "order", lambda: solve(mcpherson(), "stroke", VALUES, order=number)),
-        ("solve_designs", "rate", lambda: solve_designs(mcpherson(), "stroke", VALUES, BALL, rate=number)),
+        (
+            "solve_designs",
+            "rate",
+            lambda: solve_designs(mcpherson(), "stroke", VALUES, BALL, rate=number),
+        ),
         ("assemble", "tol", lambda: assemble(mcpherson(), {}, tol=number)),
         ("find_assemblies", "tol", lambda: find_assemblies(mcpherson(), {}, tol=number)),
         ("trace", "tol", lambda: trace(mcpherson(), "stroke", tol=number)),
@@ -45,14 +51,24 @@ def test_one_number(number):
             call()
 
 
-@pytest.mark.parametrize("numbers", [VALUES + 0j, "x", ["a"], [[1.0], [2.0, 3.0]]], ids=["complex", "text", "texts", "ragged"])
+@pytest.mark.parametrize(
+    "numbers",
+    [VALUES + 0j, "x", ["a"], [[1.0], [2.0, 3.0]]],
+    ids=["complex", "text", "texts", "ragged"],
+)
 def test_several_numbers(numbers):
     ball = {"joints.ball.point": numbers}
     poses = {mcpherson().moving[0].name: (numbers, np.array([1.0, 0.0, 0.0, 0.0]))}
     for message, call in (
         ("solve: values are .*, expected numbers", lambda: solve(mcpherson(), "stroke", numbers)),
-        ("solve_designs: values are .*, expected numbers", lambda: solve_designs(mcpherson(), "stroke", numbers, BALL)),
-        ("solve_designs: joints.ball.point are ", lambda: solve_designs(mcpherson(), "stroke", VALUES, ball)),
+        (
+            "solve_designs: values are .*, expected numbers",
+            lambda: solve_designs(mcpherson(), "stroke", numbers, BALL),
+        ),
+        (
+            "solve_designs: joints.ball.point are ",
+            lambda: solve_designs(mcpherson(), "stroke", VALUES, ball),
+        ),
         ("assemble: origin r of body .* are ", lambda: assemble(mcpherson(), poses)),
         ("find_assemblies: origin r of body .* are ", lambda: find_assemblies(mcpherson(), poses)),
     ):
@@ -61,8 +77,16 @@ def test_several_numbers(numbers):
 
 
 def test_an_order_is_a_whole_number_of_any_kind():
-    assert solve(mcpherson(), "stroke", VALUES, order=np.float64(1.0)).points["wheel"].acceleration is None
-    assert solve_designs(mcpherson(), "stroke", VALUES, BALL, order=np.float64(1.0)).points["wheel"].acceleration is None
+    assert (
+        solve(mcpherson(), "stroke", VALUES, order=np.float64(1.0)).points["wheel"].acceleration
+        is None
+    )
+    assert (
+        solve_designs(mcpherson(), "stroke", VALUES, BALL, order=np.float64(1.0))
+        .points["wheel"]
+        .acceleration
+        is None
+    )
 
 
 def test_descriptions_of_complex_numbers():
@@ -99,7 +123,10 @@ def with_an_arm(loops):
     return replace(
         there,
         bodies=[*there.bodies, Body("arm")],
-        joints=[*there.joints, Revolute("shoulder", "ground", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))],
+        joints=[
+            *there.joints,
+            Revolute("shoulder", "ground", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+        ],
         points=[Point("hand", "arm", (1.0, 0.0, 1.0))],
         drivers=[*there.drivers, JointAngle("swing", "shoulder")],
     )
@@ -107,7 +134,12 @@ def with_an_arm(loops):
 
 @pytest.mark.parametrize("loops", [1, 12], ids=["one program", "components"])
 def test_numbers_that_may_change_are_read_at_each_call(loops):
-    mechanism, turn, rate, numbers = with_an_arm(loops), np.linspace(0.0, 0.4, 5), np.array(1.0), [0.5]
+    mechanism, turn, rate, numbers = (
+        with_an_arm(loops),
+        np.linspace(0.0, 0.4, 5),
+        np.array(1.0),
+        [0.5],
+    )
     for _ in range(2):
         found = solve(mechanism, "turn", turn, rate=rate, motions={"swing": Held(numbers)})
         assert found.solved.all(), found.message

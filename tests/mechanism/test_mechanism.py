@@ -1,4 +1,6 @@
-"""A mechanism is data that does not change: numbers may be given as lists or arrays, and what is no point is told so."""
+"""A mechanism is data that does not change: numbers may be given as lists or arrays, and what is no
+point is told so.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Distance, JointAngle, Mechanism, MechanismError, Point, PointCoordinate, Revolute, solve
+from kincheck.core import (
+    Body,
+    Distance,
+    JointAngle,
+    Mechanism,
+    MechanismError,
+    Point,
+    PointCoordinate,
+    Revolute,
+    solve,
+)
 from kincheck.core.joints import Gear, Joint, RackPinion, Screw
 from kincheck.core.mechanism.motions import Ramp, Table
 from kincheck.core.studies.joint_check.specimens import specimens
@@ -22,7 +34,9 @@ def rssr(held=tuple):
         [
             Revolute("input", "ground", "crank", held((0.0, 0.0, 0.0)), held((0.0, 0.0, 1.0))),
             Revolute("output", "ground", "rocker", held((2.0, 1.0, 3.0)), held((1.0, 0.0, 0.0))),
-            Distance("rod", "crank", "rocker", held([held((1.0, 0.0, 0.0)), held((2.0, 4.9, 2.2))])),
+            Distance(
+                "rod", "crank", "rocker", held([held((1.0, 0.0, 0.0)), held((2.0, 4.9, 2.2))])
+            ),
         ],
         [Point("end", "rocker", held((2.0, 4.9, 2.2)))],
         [JointAngle("turn", "input")],
@@ -37,10 +51,16 @@ def test_points_may_be_lists_and_arrays(held):
     turn = np.linspace(0.0, 1.0, 5)
     expected = solve(rssr(), "turn", turn).points["end"].acceleration.copy()
     forget_recent()
-    np.testing.assert_array_equal(solve(rssr(held), "turn", turn).points["end"].acceleration, expected)
-    assert PointCoordinate("lift", "end", held((0.0, 0.0, 1.0))) == PointCoordinate("lift", "end", (0.0, 0.0, 1.0))
+    np.testing.assert_array_equal(
+        solve(rssr(held), "turn", turn).points["end"].acceleration, expected
+    )
+    assert PointCoordinate("lift", "end", held((0.0, 0.0, 1.0))) == PointCoordinate(
+        "lift", "end", (0.0, 0.0, 1.0)
+    )
     assert Table(held([0.0, 1.0]), held([0.0, 2.0])) == Table((0.0, 1.0), (0.0, 2.0))
-    assert Gear("gear", ["input", "output"], ratio=2.0) == Gear("gear", ("input", "output"), ratio=2.0)
+    assert Gear("gear", ["input", "output"], ratio=2.0) == Gear(
+        "gear", ("input", "output"), ratio=2.0
+    )
 
 
 def test_what_changes_afterwards_changes_no_mechanism():
@@ -56,42 +76,138 @@ WRONG = {
         "joint 'a' (revolute): point is (1, 2), expected a point",
     ),
     "a number": (lambda: Revolute("a", "b", "c", 3.0, (0, 0, 1)), "point is 3.0, expected a point"),
-    "a word": (lambda: Revolute("a", "b", "c", "xyz", (0, 0, 1)), "point is 'xyz', expected a point"),
-    "one point for two": (lambda: Distance("a", "b", "c", (1, 2, 3)), "points is (1, 2, 3), expected two points"),
-    "two short points": (lambda: Distance("a", "b", "c", ((1, 2, 3), (1, 2))), "(1, 2), expected two points"),
-    "no place": (lambda: Point("end", "b", None), "point 'end': position is None, expected a point"),
-    "an origin of four": (lambda: Body("b", (0, 0, 0, 1)), "body 'b': origin is (0, 0, 0, 1), expected a point"),
-    "a flat direction": (lambda: PointCoordinate("d", "end", (0, 1)), "driver 'd': direction is (0, 1), expected a direction"),
-    "an origin that is nowhere": (lambda: Body("b", (0, np.nan, 0)), "body 'b': origin = (0, nan, 0) is not finite; give a point"),
-    "a point at infinity": (lambda: Point("P", "b", (np.inf, 0, 0)), "point 'P': position = (inf, 0, 0) is not finite"),
-    "a point of words": (lambda: Point("P", "b", ("1", "2", "3")), "position = ('1', '2', '3') is not finite; give a point"),
-    "a driver of nowhere": (lambda: PointCoordinate("d", "P", (0, np.nan, 1)), "direction = (0, nan, 1) is not finite"),
-    "an axis of nearly zero": (lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e-200)), "axis has length 1e-200, whose square"),
-    "an axis without end": (lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e200)), "axis has length 1e+200, whose square"),
-    "a driver of nearly zero": (lambda: PointCoordinate("d", "P", (0, 1e-170, 0)), "driver 'd': direction has length 1e-170"),
-    "a driver of zero": (lambda: PointCoordinate("d", "P", (0, 0, 0)), "driver 'd': direction is zero"),
+    "a word": (
+        lambda: Revolute("a", "b", "c", "xyz", (0, 0, 1)),
+        "point is 'xyz', expected a point",
+    ),
+    "one point for two": (
+        lambda: Distance("a", "b", "c", (1, 2, 3)),
+        "points is (1, 2, 3), expected two points",
+    ),
+    "two short points": (
+        lambda: Distance("a", "b", "c", ((1, 2, 3), (1, 2))),
+        "(1, 2), expected two points",
+    ),
+    "no place": (
+        lambda: Point("end", "b", None),
+        "point 'end': position is None, expected a point",
+    ),
+    "an origin of four": (
+        lambda: Body("b", (0, 0, 0, 1)),
+        "body 'b': origin is (0, 0, 0, 1), expected a point",
+    ),
+    "a flat direction": (
+        lambda: PointCoordinate("d", "end", (0, 1)),
+        "driver 'd': direction is (0, 1), expected a direction",
+    ),
+    "an origin that is nowhere": (
+        lambda: Body("b", (0, np.nan, 0)),
+        "body 'b': origin = (0, nan, 0) is not finite; give a point",
+    ),
+    "a point at infinity": (
+        lambda: Point("P", "b", (np.inf, 0, 0)),
+        "point 'P': position = (inf, 0, 0) is not finite",
+    ),
+    "a point of words": (
+        lambda: Point("P", "b", ("1", "2", "3")),
+        "position = ('1', '2', '3') is not finite; give a point",
+    ),
+    "a driver of nowhere": (
+        lambda: PointCoordinate("d", "P", (0, np.nan, 1)),
+        "direction = (0, nan, 1) is not finite",
+    ),
+    "an axis of nearly zero": (
+        lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e-200)),
+        "axis has length 1e-200, whose square",
+    ),
+    "an axis without end": (
+        lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e200)),
+        "axis has length 1e+200, whose square",
+    ),
+    "a driver of nearly zero": (
+        lambda: PointCoordinate("d", "P", (0, 1e-170, 0)),
+        "driver 'd': direction has length 1e-170",
+    ),
+    "a driver of zero": (
+        lambda: PointCoordinate("d", "P", (0, 0, 0)),
+        "driver 'd': direction is zero",
+    ),
     "a motion of words": (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
-    "no axis": (lambda: Revolute("a", "b", "c", (0, 0, 0), None), "joint 'a' (revolute): axis is None, expected a direction"),
-    "no rod": (lambda: Distance("a", "b", "c", None), "joint 'a' (distance): points is None, expected two points"),
+    "no axis": (
+        lambda: Revolute("a", "b", "c", (0, 0, 0), None),
+        "joint 'a' (revolute): axis is None, expected a direction",
+    ),
+    "no rod": (
+        lambda: Distance("a", "b", "c", None),
+        "joint 'a' (distance): points is None, expected two points",
+    ),
     "a negative rod": (
         lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), -4.0),
-        "length is -4 m, expected a positive one; the points are 0.4 m apart at design, which is the length where none is given",
+        (
+            "length is -4 m, expected a positive one; the points are 0.4 m apart at design, which"
+            " is the length where none is given"
+        ),
     ),
-    "a rod of zero": (lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), 0.0), "length is 0 m, expected a positive one"),
-    "a rod of one point": (lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0), "the points coincide at design"),
-    "no lead": (lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None), "joint 'a' (screw): lead is None, expected a length"),
-    "no ratio": (lambda: Gear("g", ("a", "b"), ratio=None), "joint 'g' (gear): ratio = None is not finite; give a finite number"),
-    "a radius of words": (lambda: RackPinion("r", ("a", "b"), radius="2"), "joint 'r' (rack_pinion): radius = 2 is not finite"),
-    "a column": (lambda: Body("b", np.zeros((3, 1))), "body 'b': origin = ([0.0], [0.0], [0.0]) is not finite"),
-    "a joint at a column": (lambda: Revolute("a", "b", "c", np.zeros((3, 1)), (0, 0, 1)), "point = ([0.0], [0.0], [0.0]) is not"),
-    "columns": (lambda: Distance("a", "b", "c", np.zeros((2, 3, 1))), "points = ([0.0], [0.0], [0.0]) is not finite"),
-    "a lead in a list": (lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), [1.0]), "lead = [1.0] is not finite; give a length"),
-    "a ratio in a list": (lambda: Gear("g", ("a", "b"), ratio=[1.0]), "ratio = [1.0] is not finite; give a finite number"),
-    "a complex ratio": (lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)), "ratio = (1+2j) is not finite"),
-    "a complex rate": (lambda: Ramp(np.complex128(0.1 + 5j)), "ramp motion: rate is np.complex128(0.1+5j); give a finite number"),
-    "a table of words": (lambda: Table((0.0, 1.0), ("a", 1.0)), "table motion: a time or value is not finite; give numbers"),
-    "a complex table": (lambda: Table((0.0, 1.0), (0.0, np.complex128(1 + 2j))), "table motion: a time or value is not finite"),
-    "half a table": (lambda: Table((0.0, 1.0), None), "table motion: values is None, expected as many numbers as samples"),
+    "a rod of zero": (
+        lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), 0.0),
+        "length is 0 m, expected a positive one",
+    ),
+    "a rod of one point": (
+        lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0),
+        "the points coincide at design",
+    ),
+    "no lead": (
+        lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None),
+        "joint 'a' (screw): lead is None, expected a length",
+    ),
+    "no ratio": (
+        lambda: Gear("g", ("a", "b"), ratio=None),
+        "joint 'g' (gear): ratio = None is not finite; give a finite number",
+    ),
+    "a radius of words": (
+        lambda: RackPinion("r", ("a", "b"), radius="2"),
+        "joint 'r' (rack_pinion): radius = 2 is not finite",
+    ),
+    "a column": (
+        lambda: Body("b", np.zeros((3, 1))),
+        "body 'b': origin = ([0.0], [0.0], [0.0]) is not finite",
+    ),
+    "a joint at a column": (
+        lambda: Revolute("a", "b", "c", np.zeros((3, 1)), (0, 0, 1)),
+        "point = ([0.0], [0.0], [0.0]) is not",
+    ),
+    "columns": (
+        lambda: Distance("a", "b", "c", np.zeros((2, 3, 1))),
+        "points = ([0.0], [0.0], [0.0]) is not finite",
+    ),
+    "a lead in a list": (
+        lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), [1.0]),
+        "lead = [1.0] is not finite; give a length",
+    ),
+    "a ratio in a list": (
+        lambda: Gear("g", ("a", "b"), ratio=[1.0]),
+        "ratio = [1.0] is not finite; give a finite number",
+    ),
+    "a complex ratio": (
+        lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)),
+        "ratio = (1+2j) is not finite",
+    ),
+    "a complex rate": (
+        lambda: Ramp(np.complex128(0.1 + 5j)),
+        "ramp motion: rate is np.complex128(0.1+5j); give a finite number",
+    ),
+    "a table of words": (
+        lambda: Table((0.0, 1.0), ("a", 1.0)),
+        "table motion: a time or value is not finite; give numbers",
+    ),
+    "a complex table": (
+        lambda: Table((0.0, 1.0), (0.0, np.complex128(1 + 2j))),
+        "table motion: a time or value is not finite",
+    ),
+    "half a table": (
+        lambda: Table((0.0, 1.0), None),
+        "table motion: values is None, expected as many numbers as samples",
+    ),
     "one joint for two": (lambda: Gear("g", "ab", ratio=1.0), "joints is 'ab', expected two names"),
 }
 
@@ -104,7 +220,9 @@ def test_what_is_no_point_is_told_so(name):
     assert message in str(told.value)
 
 
-@pytest.mark.parametrize("given", [None, "abcd", 1.0, (1.0, 0.0, 0.0), (float("nan"), 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "given", [None, "abcd", 1.0, (1.0, 0.0, 0.0), (float("nan"), 0.0, 0.0, 0.0)]
+)
 def test_euler_parameters_that_are_none_are_told(given):
     with pytest.raises(MechanismError, match="body 'a': euler_parameters"):
         Body("a", euler_parameters=given)
@@ -113,7 +231,10 @@ def test_euler_parameters_that_are_none_are_told(given):
 def test_an_array_that_is_a_number_is_one():
     """It may change, and has no hash."""
     lead, ratio = np.array(0.5), np.array([2.0])
-    screw, gear = Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), lead), Gear("g", ("a", "b"), ratio=ratio)
+    screw, gear = (
+        Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), lead),
+        Gear("g", ("a", "b"), ratio=ratio),
+    )
     lead[...] = ratio[...] = 7.0
     assert (screw.lead, gear.ratio) == (0.5, 2.0)
     assert hash(screw) == hash(Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), 0.5))
@@ -124,19 +245,32 @@ def held(*joints, drivers=(), couplers=()):
     bodies = [Body("bed", fixed=True), Body("bench", (1.0, 2.0, 3.0), fixed=True), Body("crank")]
     pivot = Revolute("pivot", "bed", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     tip = Point("tip", "crank", (1.0, 0.0, 0.0))
-    return Mechanism("held", bodies, [*joints, pivot], [tip], [JointAngle("turn", "pivot"), *drivers], couplers)
+    return Mechanism(
+        "held", bodies, [*joints, pivot], [tip], [JointAngle("turn", "pivot"), *drivers], couplers
+    )
 
 
-@pytest.mark.parametrize("name", sorted(name for name, kind in Joint.registry.items() if kind.__module__.startswith("kincheck.")))
+@pytest.mark.parametrize(
+    "name",
+    sorted(
+        name for name, kind in Joint.registry.items() if kind.__module__.startswith("kincheck.")
+    ),
+)
 def test_a_joint_between_fixed_bodies_is_left_out(name):
-    (joint,) = (replace(each, i="bed", j="bench") for each in specimens(Joint.registry[name], np.random.default_rng(1), 1))
+    (joint,) = (
+        replace(each, i="bed", j="bench")
+        for each in specimens(Joint.registry[name], np.random.default_rng(1), 1)
+    )
     mechanism = held(joint)
     assert mechanism.joints == held().joints
     assert mechanism.grounded == (joint,)
     assert replace(mechanism, name="again").grounded == (joint,)
     freed = replace(mechanism, bodies=[Body("bed", fixed=True), Body("bench"), Body("crank")])
     assert (freed.joints, freed.grounded) == ((*held().joints, joint), ())
-    found, expected = (each.points["tip"] for each in (solve(each, "turn", [0.0, 1.0]) for each in (mechanism, held())))
+    found, expected = (
+        each.points["tip"]
+        for each in (solve(each, "turn", [0.0, 1.0]) for each in (mechanism, held()))
+    )
     np.testing.assert_array_equal(found.position, expected.position)
 
 
@@ -144,13 +278,22 @@ def test_a_joint_between_fixed_bodies_must_hold_and_nothing_may_need_it_to_move(
     apart = ((0.0, 0.0, 0.0), (0.4, 0.0, 0.0))
     assert held(Distance("rod", "bed", "ground", apart, 0.4 + 1e-10)).grounded
     with pytest.raises(
-        MechanismError, match=r"joint 'rod' \(distance\): 'bed' and 'ground' are both fixed, and at the design .* off by 0.1"
+        MechanismError,
+        match=(
+            r"joint 'rod' \(distance\): 'bed' and 'ground' are both fixed, and at the design .* off"
+            r" by 0.1"
+        ),
     ):
         held(Distance("rod", "bed", "ground", apart, 0.5124))
     hinge = Revolute("hinge", "ground", "bench", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    with pytest.raises(MechanismError, match="'bench' are both fixed, and driver 'd' needs it to move; free one of them"):
+    with pytest.raises(
+        MechanismError,
+        match="'bench' are both fixed, and driver 'd' needs it to move; free one of them",
+    ):
         held(hinge, drivers=[JointAngle("d", "hinge")])
-    with pytest.raises(MechanismError, match=r"are both fixed, and joint 'g' \(gear\) needs it to move"):
+    with pytest.raises(
+        MechanismError, match=r"are both fixed, and joint 'g' \(gear\) needs it to move"
+    ):
         held(hinge, couplers=[Gear("g", ("pivot", "hinge"), ratio=2.0)])
     with pytest.raises(MechanismError, match="the name 'pivot' is used more than once"):
         held(replace(hinge, name="pivot"))

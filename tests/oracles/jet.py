@@ -1,4 +1,6 @@
-"""A truncated Taylor scalar: a value with its first and second derivative by time; floats or arrays of lanes."""
+"""A truncated Taylor scalar: a value with its first and second derivative by time; floats or arrays
+of lanes.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -7,7 +9,13 @@ import numpy as np
 
 
 def _lift(a):
-    return a if isinstance(a, Jet) else Jet(a, 0.0, 0.0) if isinstance(a, float | int | np.ndarray) else None
+    return (
+        a
+        if isinstance(a, Jet)
+        else Jet(a, 0.0, 0.0)
+        if isinstance(a, float | int | np.ndarray)
+        else None
+    )
 
 
 @dataclass(frozen=True)
@@ -21,7 +29,9 @@ class Jet:
 
     def __add__(self, other):
         b = _lift(other)
-        return NotImplemented if b is None else Jet(self.x + b.x, self.x_t + b.x_t, self.x_tt + b.x_tt)
+        return (
+            NotImplemented if b is None else Jet(self.x + b.x, self.x_t + b.x_t, self.x_tt + b.x_tt)
+        )
 
     def __neg__(self):
         return Jet(-self.x, -self.x_t, -self.x_tt)

@@ -1,8 +1,9 @@
 """The paper's equations as they stand: slow, obvious, unsimplified, in the paper's own variables.
 
-A body is its position r and its Euler parameters p; vectors s, f, g, h are fixed in a body and given in its own axes (primes
-dropped). Nothing is expanded, shared or simplified, and nothing here comes from the code under test. Every function takes
-complex numbers too, so that derivatives can be taken along a path.
+A body is its position r and its Euler parameters p; vectors s, f, g, h are fixed in a body and
+given in its own axes (primes dropped). Nothing is expanded, shared or simplified, and nothing here
+comes from the code under test. Every function takes complex numbers too, so that derivatives can be
+taken along a path.
 
 Equation numbers are those of SAE 943745 as read in the formulation notes.
 """
@@ -14,7 +15,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Body:
-    """Position r, global [m], and Euler parameters p = [e0, e] of the rotation body -> global [-]."""
+    """Position r, global [m], and Euler parameters p = [e0, e] of the rotation body -> global
+    [-].
+    """
 
     r: np.ndarray
     p: np.ndarray
@@ -75,7 +78,11 @@ def dot11(i, j, axes_i, axes_j):
 def dot12(i, j, axes_i, axes_j):
     """(17)  B_i [g_i . h_j, h_i . f_j, f_i . g_j]."""
     (f_i, g_i, h_i), (f_j, g_j, h_j) = axes_i, axes_j
-    return np.column_stack(axes_i) @ [dot10(i, j, g_i, h_j), dot10(i, j, h_i, f_j), dot10(i, j, f_i, g_j)]
+    return np.column_stack(axes_i) @ [
+        dot10(i, j, g_i, h_j),
+        dot10(i, j, h_i, f_j),
+        dot10(i, j, f_i, g_j),
+    ]
 
 
 def dot20(i, j, a, s_i, s_j):
@@ -153,16 +160,26 @@ class Pair:
         return [dot20(self.i, self.j, h, self.s_i, self.s_j) - self._i0.A @ h @ self.d0]
 
     def angle(self):
-        """The cosine of the angle between the first axis, on i, and the second, on j, with its design value taken off."""
+        """The cosine of the angle between the first axis, on i, and the second, on j, with its
+        design value taken off.
+        """
         a, b = (np.asarray(axis) / np.linalg.norm(axis) for axis in self.joint.axes)
         return [dot10(self.i, self.j, self._i0.A.T @ a, self._j0.A.T @ b) - a @ b]
 
     def distance(self):
         length = getattr(self.joint, "length", None)
-        return distance(self.i, self.j, self.s_i, self.s_j, np.linalg.norm(self.d0) if length is None else length)
+        return distance(
+            self.i,
+            self.j,
+            self.s_i,
+            self.s_j,
+            np.linalg.norm(self.d0) if length is None else length,
+        )
 
     def twist(self):
-        """f_i . g_j - g_i . f_j: constant velocity; shaft j's axes are shaft i's carried over by the shortest rotation."""
+        """f_i . g_j - g_i . f_j: constant velocity; shaft j's axes are shaft i's carried over by
+        the shortest rotation.
+        """
         h, k = (np.asarray(axis) / np.linalg.norm(axis) for axis in self.joint.axes)
         f, g, _ = triad(h)
         N = tilde(np.cross(h, k))
@@ -171,7 +188,9 @@ class Pair:
         return [dot10(self.i, self.j, f_i, g_j) - dot10(self.i, self.j, g_i, f_j)]
 
     def thread(self):
-        """d = lead theta / 2 pi, as the sine of the difference of the two turns: smooth, and good for any number of turns."""
+        """d = lead theta / 2 pi, as the sine of the difference of the two turns: smooth, and good
+        for any number of turns.
+        """
         radius = self.joint.lead / (2.0 * np.pi)
         turn = self.plane()[0] / radius
         (f_i, g_i, _), (f_j, _, _) = self.axes_i, self.axes_j
@@ -208,32 +227,45 @@ def joint_residuals(joint, i0, j0, i, j):
 
 def design(mechanism):
     """All bodies of a mechanism at the design position, by name."""
-    return {"ground": GROUND} | {b.name: Body(np.array(b.origin), np.array(b.euler_parameters)) for b in mechanism.bodies}
+    return {"ground": GROUND} | {
+        b.name: Body(np.array(b.origin), np.array(b.euler_parameters)) for b in mechanism.bodies
+    }
 
 
 def residuals(mechanism, now):
-    """The residuals of all joints with the bodies (by name; those not named are at design) where they are now."""
+    """The residuals of all joints with the bodies (by name; those not named are at design) where
+    they are now.
+    """
     before = design(mechanism)
     after = before | now
     return np.concatenate(
-        [joint_residuals(each, before[each.i], before[each.j], after[each.i], after[each.j]) for each in mechanism.joints]
+        [
+            joint_residuals(each, before[each.i], before[each.j], after[each.i], after[each.j])
+            for each in mechanism.joints
+        ]
     )
 
 
 def taylor(function, radius=0.1, points=32):
-    """Value, first and second derivative at t = 0 of an analytic function, real for real t, from values on a circle (Cauchy).
+    """Value, first and second derivative at t = 0 of an analytic function, real for real t, from
+    values on a circle (Cauchy).
 
-    No step size to trade: aliasing is (radius / radius of convergence)^points, round-off 1e-16 / radius^order.
+    No step size to trade: aliasing is (radius / radius of convergence)^points, round-off 1e-16 /
+    radius^order.
     """
     circle = radius * np.exp(2j * np.pi * np.arange(points // 2 + 1) / points)
     values = np.array([function(t) for t in circle])
     # the lower half is conjugate to the upper: all but the two real points count twice
     weights = np.r_[1.0, np.full(points // 2 - 1, 2.0), 1.0] / points
-    return [factorial * np.real((weights * circle**-k) @ values) for k, factorial in enumerate((1.0, 1.0, 2.0))]
+    return [
+        factorial * np.real((weights * circle**-k) @ values)
+        for k, factorial in enumerate((1.0, 1.0, 2.0))
+    ]
 
 
 def along(bodies):
-    """Bodies moving with their velocities and accelerations: t -> poses, exact to second order in t.
+    """Bodies moving with their velocities and accelerations: t -> poses, exact to second order in
+    t.
 
     bodies: name -> (r, p, [rdot, omega'], [rddot, omega'dot]).
     """
@@ -242,7 +274,9 @@ def along(bodies):
         poses = {}
         for name, (r, p, v, a) in bodies.items():
             p_t, p_tt = p_rate(p, v[3:]), p_acceleration(p, v[3:], a[3:])
-            poses[name] = Body(r + t * v[:3] + 0.5 * t * t * a[:3], p + t * p_t + 0.5 * t * t * p_tt)
+            poses[name] = Body(
+                r + t * v[:3] + 0.5 * t * t * a[:3], p + t * p_t + 0.5 * t * t * p_tt
+            )
         return poses
 
     return at
@@ -250,4 +284,6 @@ def along(bodies):
 
 def sample(found, k):
     """One sample of a solution's bodies, as `along` takes them."""
-    return {name: (each.r[k], each.p[k], each.v[k], each.a[k]) for name, each in found.bodies.items()}
+    return {
+        name: (each.r[k], each.p[k], each.v[k], each.a[k]) for name, each in found.bodies.items()
+    }

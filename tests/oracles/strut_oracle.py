@@ -1,7 +1,9 @@
-"""The strut of cases/mcpherson_suspension.toml in 60 digits, by other means than any engine or output of kincheck.
+"""The strut of cases/mcpherson_suspension.toml in 60 digits, by other means than any engine or
+output of kincheck.
 
-The knuckle's pose is six numbers that close two rods, a line and the stroke; outputs come from its rotation matrix and from
-differences of poses over steps so small that only digits beyond the fortieth know of them. The file's CSV was made with `rows`.
+The knuckle's pose is six numbers that close two rods, a line and the stroke; outputs come from its
+rotation matrix and from differences of poses over steps so small that only digits beyond the
+fortieth know of them. The file's CSV was made with `rows`.
 """
 
 from collections.abc import Iterator
@@ -13,9 +15,13 @@ mp.dps = 60
 STEP = mpf("1e-12")  # squared it is what differences are off by
 
 P, L, U, K = (
-    [mpf(x) for x in each.split()] for each in ("1.17 0.353 0.005", "0.9676 0.66 -0.01", "1 0.55 0.6", "0.97772 0.605 0.18")
+    [mpf(x) for x in each.split()]
+    for each in ("1.17 0.353 0.005", "0.9676 0.66 -0.01", "1 0.55 0.6", "0.97772 0.605 0.18")
 )
-T, R, W = ([mpf(x) for x in each.split()] for each in ("1.115 0.665 0.118", "1.14 0.355 0.1455", "0.975 0.715 0.101"))
+T, R, W = (
+    [mpf(x) for x in each.split()]
+    for each in ("1.115 0.665 0.118", "1.14 0.355 0.1455", "0.975 0.715 0.101")
+)
 RADIUS, WHEELBASE, CG, BRAKES = mpf("0.3"), mpf("2.6"), mpf("0.55"), mpf("0.7")
 
 
@@ -55,7 +61,8 @@ def pose(stroke):
     def closed(*unknowns):
         k = Pose(unknowns)
         ball, foot, axis = k.place(L), k.place(K), k.turn(sub(U, K))
-        missed = cross(axis, sub(U, foot))  # two of its three components say that the line meets the top
+        # two of its three components say that the line meets the top
+        missed = cross(axis, sub(U, foot))
         arm, rod = sub(ball, P), sub(k.place(T), R)
         return [
             k.d[2] - stroke,
@@ -74,14 +81,17 @@ def level_with(k):
     """Contact centre: down from the wheel centre along the steepest line of the wheel plane."""
     s, up = k.turn([0, 1, 0]), [0, 0, 1]
     fall = sub([dot(up, s) * x for x in s], up)
-    return [x + RADIUS * y / mp.sqrt(dot(fall, fall)) for x, y in zip(k.place(W), fall, strict=True)]
+    return [
+        x + RADIUS * y / mp.sqrt(dot(fall, fall)) for x, y in zip(k.place(W), fall, strict=True)
+    ]
 
 
 def attitudes(stroke) -> dict:
     """Outputs of the pose alone; x of the frame is rearward, y outboard."""
     k = pose(stroke)
     s, contact, center = k.turn([0, 1, 0]), level_with(k), k.place(W)
-    front = cross([0, 0, 1], s)  # in the wheel plane and in the road plane; rearward is positive x, so this points forward
+    # in the wheel plane and in the road plane; rearward is positive x, so this points forward
+    front = cross([0, 0, 1], s)
     length = mp.sqrt(dot(front, front))
     ball = k.place(L)
     share = (contact[2] - ball[2]) / (U[2] - ball[2])
@@ -109,7 +119,10 @@ def ratios(stroke) -> dict:
     arm = sub(contact, here.place(W))
     back = Pose([*here.d, *(-x for x in here.c)]).turn(arm)
     material = [x + y for x, y in zip(W, back, strict=True)]
-    v = [(b - a) / (2 * STEP) for a, b in zip(before.place(material), after.place(material), strict=True)]
+    v = [
+        (b - a) / (2 * STEP)
+        for a, b in zip(before.place(material), after.place(material), strict=True)
+    ]
     strut = [mp.sqrt(dot(sub(U, k.place(K)), sub(U, k.place(K)))) for k in (before, after)]
     return {
         "motion_ratio": (strut[0] - strut[1]) / (2 * STEP),
@@ -119,7 +132,9 @@ def ratios(stroke) -> dict:
 
 
 def rows(strokes) -> Iterator[dict]:
-    """Value and derivatives by the stroke of every output, under the names that columns of a reference have."""
+    """Value and derivatives by the stroke of every output, under the names that columns of a
+    reference have.
+    """
     for stroke in strokes:
         row = {"stroke": stroke}
         for outputs, step, orders in ((attitudes, STEP, 2), (ratios, mpf("1e-11"), 1)):

@@ -9,7 +9,17 @@ from kincheck.core.algebra import Quat, Vec3
 from kincheck.core.primitives.paper import PaperDot12
 
 from ..oracles import naive
-from ..support.specimens import LANES, alike, body, direction, discovered, entry, make, rotation, vector
+from ..support.specimens import (
+    LANES,
+    alike,
+    body,
+    direction,
+    discovered,
+    entry,
+    make,
+    rotation,
+    vector,
+)
 
 # Sums of a dozen products of numbers up to ten, each rounded at 1e-16.
 ROUND_OFF = 1e-13
@@ -25,7 +35,9 @@ def lane(value, k):
     if isinstance(value, Vec3 | Quat):
         return np.array([float(lane(x, k)) for x in value])
     if is_dataclass(value):
-        return type(value)(**{each.name: lane(getattr(value, each.name), k) for each in fields(value)})
+        return type(value)(
+            **{each.name: lane(getattr(value, each.name), k) for each in fields(value)}
+        )
     return float(np.broadcast_to(value, LANES)[k])
 
 
@@ -48,26 +60,35 @@ TWINS = {
     p.Spherical: lambda x, i, j: naive.spherical(i, j, x.s_i, x.s_j),
     p.NamedSlide: lambda x, i, j: naive.spherical(i, j, x.s_i, x.s_j) - x.drive.c * (i.A @ x.h),
     p.Distance: lambda x, i, j: half(naive.distance(i, j, x.s_i, x.s_j, x.length), x.length),
-    p.DrivenCoordinate: lambda x, i, j: [x.k @ (naive.line(naive.GROUND, j, NO_ARM, x.s) - x.s) - x.drive.c],
+    p.DrivenCoordinate: lambda x, i, j: [
+        x.k @ (naive.line(naive.GROUND, j, NO_ARM, x.s) - x.s) - x.drive.c
+    ],
 }
-"""Primitives with the same phi as the paper's -> that phi of one lane. The others are compared below, where they agree."""
+"""Primitives with the same phi as the paper's -> that phi of one lane. The others are compared
+below, where they agree.
+"""
 
 SAME_PHI = [kind for kind in discovered() if entry(TWINS, kind)]
 
 
 @pytest.mark.parametrize("kind", SAME_PHI)
 def test_phi_is_the_papers(kind, rng):
-    """At any pose. The bodies' axes are the global ones at design, which is all the paper's frames may be asked to be."""
+    """At any pose. The bodies' axes are the global ones at design, which is all the paper's frames
+    may be asked to be.
+    """
     specimen = make(kind, rng)
     i, j = body(rng), body(rng)
     found = np.array(specimen.primitive.phi(i.pose, j.pose))
     for k in range(0, LANES, 20):
         x = lane(specimen.primitive, k)
-        # the design position of body i is the origin, that of body j such that d0 lies between the points
+        # the design position of body i is the origin, that of body j such that d0 lies between the
+        # points
         origin = x.d0 + x.s_i - x.s_j if hasattr(x, "d0") else np.zeros(3)
         at_i = naive.Body(lane(i.u, k), lane(i.q, k))
         at_j = naive.Body(origin + lane(j.u, k), lane(j.q, k))
-        assert found[:, k] == pytest.approx(entry(TWINS, kind)(x, at_i, at_j), rel=ROUND_OFF, abs=ROUND_OFF)
+        assert found[:, k] == pytest.approx(
+            entry(TWINS, kind)(x, at_i, at_j), rel=ROUND_OFF, abs=ROUND_OFF
+        )
 
 
 def test_dot12_is_the_papers_to_first_order(rng):
@@ -84,7 +105,9 @@ def test_dot12_is_the_papers_to_first_order(rng):
 
 
 def test_dot21_is_the_papers_where_the_bodies_turn_alike(rng):
-    """(23) with the bodies turned alike; otherwise (23) sees body j's arm turn, the const-C form does not."""
+    """(23) with the bodies turned alike; otherwise (23) sees body j's arm turn, the const-C form
+    does not.
+    """
     specimen = make(p.Dot21, rng)
     arms = vector(rng)
     i, other = body(rng), body(rng)

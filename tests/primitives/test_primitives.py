@@ -1,7 +1,8 @@
 """Every primitive against its own derivatives.
 
-The equations run over any scalar, so phi is differentiated by running it on jets: no step size, no symbolic work. States are
-lanes: a thousand random ones are one evaluation. The primitives are discovered; one without a maker in specimens.py fails.
+The equations run over any scalar, so phi is differentiated by running it on jets: no step size, no
+symbolic work. States are lanes: a thousand random ones are one evaluation. The primitives are
+discovered; one without a maker in specimens.py fails.
 """
 
 from dataclasses import dataclass, replace
@@ -12,9 +13,20 @@ from kincheck.core import primitives as p
 from kincheck.core.algebra import Vec3
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Primitive
 
-from ..support.specimens import MAKERS, admissible, direction, discovered, lanes, make, retyped, rotation, vector
+from ..support.specimens import (
+    MAKERS,
+    admissible,
+    direction,
+    discovered,
+    lanes,
+    make,
+    retyped,
+    rotation,
+    vector,
+)
 
-# Sums of some thirty products of numbers of size one, each rounded at 1e-16; relative to the largest of their terms.
+# Sums of some thirty products of numbers of size one, each rounded at 1e-16; relative to the
+# largest of their terms.
 ROUND_OFF = 1e-13
 
 TYPES = discovered()
@@ -28,13 +40,18 @@ def rng():
 
 def products(row, a_i, b_i, a_j, b_j):
     """The terms of row . (a_i, b_i, a_j, b_j)."""
-    return [x * y for block, part in zip(row, (a_i, b_i, a_j, b_j), strict=True) for x, y in zip(block, part, strict=True)]
+    return [
+        x * y
+        for block, part in zip(row, (a_i, b_i, a_j, b_j), strict=True)
+        for x, y in zip(block, part, strict=True)
+    ]
 
 
 def defect(terms, right, derivative):
     """|sum of terms - right - derivative| by lane, relative to the largest number involved."""
     numbers = lanes((*terms, -right, -derivative))
-    largest = np.maximum(np.abs(numbers).max(axis=0), np.finfo(float).tiny)  # a row may meet nothing but zeros
+    # a row may meet nothing but zeros
+    largest = np.maximum(np.abs(numbers).max(axis=0), np.finfo(float).tiny)
     return np.abs(numbers.sum(axis=0)) / largest
 
 
@@ -47,9 +64,16 @@ def phi_jets(specimen, i, j, primitive=None):
 def velocity_defect(specimen, i, j):
     """d phi / dt against rows . velocity - nu, by lane."""
     primitive = specimen.primitive
-    found = zip(phi_jets(specimen, i, j), primitive.rows(i.pose, j.pose), primitive.nu(i.pose, j.pose), strict=True)
+    found = zip(
+        phi_jets(specimen, i, j),
+        primitive.rows(i.pose, j.pose),
+        primitive.nu(i.pose, j.pose),
+        strict=True,
+    )
     i, j = i.in_axes_of(primitive), j.in_axes_of(primitive)
-    return np.max([defect(products(row, i.v, i.w, j.v, j.w), nu, phi.x_t) for phi, row, nu in found], axis=0)
+    return np.max(
+        [defect(products(row, i.v, i.w, j.v, j.w), nu, phi.x_t) for phi, row, nu in found], axis=0
+    )
 
 
 def acceleration_defect(specimen, i, j):
@@ -59,13 +83,18 @@ def acceleration_defect(specimen, i, j):
     i, j = i.in_axes_of(primitive), j.in_axes_of(primitive)
     gamma = primitive.gamma(i.pose, j.pose, i.motion, j.motion)
     found = zip(phi, rows, gamma, strict=True)
-    return np.max([defect(products(row, i.v_t, i.w_t, j.v_t, j.w_t), b, phi.x_tt) for phi, row, b in found], axis=0)
+    return np.max(
+        [defect(products(row, i.v_t, i.w_t, j.v_t, j.w_t), b, phi.x_tt) for phi, row, b in found],
+        axis=0,
+    )
 
 
 def worst_defect(specimen, rng):
     i, j = admissible(specimen, rng)
     any_velocity = replace(j, v=vector(rng), w=vector(rng))
-    return max(velocity_defect(specimen, i, any_velocity).max(), acceleration_defect(specimen, i, j).max())
+    return max(
+        velocity_defect(specimen, i, any_velocity).max(), acceleration_defect(specimen, i, j).max()
+    )
 
 
 @pytest.mark.parametrize("kind", TYPES)
@@ -84,23 +113,30 @@ def test_number_of_equations(kind, rng):
 
 @pytest.mark.parametrize("kind", [kind for kind in TYPES if kind.n > 1])
 def test_rows_are_steady_that_say_so(kind, rng):
-    """Global directions, of shifts or else of turns of body i, that are the same in all poses; and no other rows are."""
+    """Global directions, of shifts or else of turns of body i, that are the same in all poses; and
+    no other rows are.
+    """
     specimen = make(kind, rng)
     i, j = admissible(specimen, rng)
     steady = True
     for row in specimen.primitive.rows(i.pose, j.pose):
         shift, turn = lanes(row.ri), lanes(i.pose.turn(row.pi) if kind.body_axes else row.pi)
         along = shift if np.abs(shift).max() > 0.0 else turn
-        steady = steady and float(np.ptp(along, axis=1).max()) <= 1e-14  # round-off of turning there and back
+        # round-off of turning there and back
+        steady = steady and float(np.ptp(along, axis=1).max()) <= 1e-14
     assert steady == kind.steady
 
 
 @pytest.mark.parametrize("kind", TYPES)
 def test_satisfied_on_the_manifold(kind, rng):
-    """The makers' manifold is where phi = 0, and its motions are those with rows . velocity = nu."""
+    """The makers' manifold is where phi = 0, and its motions are those with rows . velocity =
+    nu.
+    """
     specimen = make(kind, rng)
     if specimen.on_manifold is None:
-        undriven = replace(specimen.primitive, drive=Drive()) if specimen.drive else specimen.primitive
+        undriven = (
+            replace(specimen.primitive, drive=Drive()) if specimen.drive else specimen.primitive
+        )
         if issubclass(kind, p.Distance):
             undriven = replace(undriven, length=undriven.design_length)
         at_design = lanes(undriven.phi(GROUND_POSE, GROUND_POSE))
@@ -124,14 +160,18 @@ def test_rows_are_the_derivative_of_phi(kind, rng):
 
 @pytest.mark.parametrize("kind", TYPES)
 def test_gamma_is_the_rest_of_the_second_derivative(kind, rng):
-    """For any acceleration: exact ones at any pose and velocity, simplified ones where both are admissible."""
+    """For any acceleration: exact ones at any pose and velocity, simplified ones where both are
+    admissible.
+    """
     specimen = make(kind, rng)
     assert acceleration_defect(specimen, *admissible(specimen, rng)).max() <= ROUND_OFF
 
 
 @pytest.mark.parametrize("kind", SIMPLIFIED)
 def test_simplified_rows_are_off_by_the_misalignment(kind, rng):
-    """Off the manifold simplified rows are wrong, in proportion: why Newton converges, and why they need care."""
+    """Off the manifold simplified rows are wrong, in proportion: why Newton converges, and why they
+    need care.
+    """
     specimen = make(kind, rng)
     i, j = admissible(specimen, rng)
     off = direction(rng)
@@ -157,7 +197,11 @@ def test_simplified_gamma_needs_admissible_velocities(kind, rng):
 def changed(primitive, method, change):
     """The primitive with what one of its methods gives changed."""
     original = getattr(type(primitive), method)
-    mutant = type("Mutant", (type(primitive),), {method: lambda self, *arguments: change(original(self, *arguments))})
+    mutant = type(
+        "Mutant",
+        (type(primitive),),
+        {method: lambda self, *arguments: change(original(self, *arguments))},
+    )
     return retyped(primitive, mutant)
 
 
@@ -170,15 +214,22 @@ def row_nudged(rows):
 
 
 @pytest.mark.parametrize("kind", TYPES)
-@pytest.mark.parametrize(("method", "change"), [("rows", row_nudged), ("gamma", nudged), ("nu", nudged)])
+@pytest.mark.parametrize(
+    ("method", "change"), [("rows", row_nudged), ("gamma", nudged), ("nu", nudged)]
+)
 def test_battery_finds_a_mistake_of_1e_9(kind, method, change, rng):
     specimen = make(kind, rng)
     assert worst_defect(specimen, rng) <= ROUND_OFF
-    assert worst_defect(replace(specimen, primitive=changed(specimen.primitive, method, change)), rng) > 10.0 * ROUND_OFF
+    assert (
+        worst_defect(replace(specimen, primitive=changed(specimen.primitive, method, change)), rng)
+        > 10.0 * ROUND_OFF
+    )
 
 
 def test_battery_finds_the_printed_gamma_of_dot11(rng):
-    """(16) as printed has wrong signs (formulation section 9); in native axes its second row comes out negated."""
+    """(16) as printed has wrong signs (formulation section 9); in native axes its second row comes
+    out negated.
+    """
     specimen = make(p.Dot11, rng)
     printed = changed(specimen.primitive, "gamma", lambda values: (values[0], -values[1]))
     assert worst_defect(replace(specimen, primitive=printed), rng) > 0.1

@@ -1,11 +1,20 @@
-"""The rows as the paper prints them are the rows of the row styles: conventional ones before, simplified ones after."""
+"""The rows as the paper prints them are the rows of the row styles: conventional ones before,
+simplified ones after.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from kincheck.core.algebra import Vec3, cross
-from kincheck.core.studies.paper.textbook import PrintedDot11, PrintedDot12, PrintedDot21, chain, conditions, skew
+from kincheck.core.studies.paper.textbook import (
+    PrintedDot11,
+    PrintedDot12,
+    PrintedDot21,
+    chain,
+    conditions,
+    skew,
+)
 
 from ..support.specimens import alike, body, frame, rotation, vector
 
@@ -41,10 +50,17 @@ def test_dot_products_as_printed_are_the_conventional_rows(rng, number, formed):
     i, j = body(rng), body(rng)
     placed = replace(j, u=s_i - s_j + j.u)
     for mine, theirs in zip(printed, conventional, strict=True):
-        assert np.array(mine.phi(i.pose, placed.pose)) == pytest.approx(np.array(theirs.phi(i.pose, j.pose)), abs=ROUND_OFF)
-    rows, expected = ([row for e in each for row in e.rows(i.pose, p.pose)] for each, p in ((printed, placed), (conventional, j)))
+        assert np.array(mine.phi(i.pose, placed.pose)) == pytest.approx(
+            np.array(theirs.phi(i.pose, j.pose)), abs=ROUND_OFF
+        )
+    rows, expected = (
+        [row for e in each for row in e.rows(i.pose, p.pose)]
+        for each, p in ((printed, placed), (conventional, j))
+    )
     assert entries(rows) == pytest.approx(entries(expected), abs=ROUND_OFF)
-    assert gammas(printed, i, placed) == pytest.approx(gammas(conventional, i, j), abs=100.0 * ROUND_OFF)
+    assert gammas(printed, i, placed) == pytest.approx(
+        gammas(conventional, i, j), abs=100.0 * ROUND_OFF
+    )
 
 
 @pytest.mark.parametrize("formed", [True, False])
@@ -52,7 +68,11 @@ def test_simplified_rows_as_printed_are_the_papers(rng, formed):
     """The rows at any pose; d11's gamma where the condition holds, for it is simplified too."""
     f, g, h = frame(rng)
     s_i, s_j = vector(rng), vector(rng)
-    paper = {each.name: each.simplified("paper") for each in conditions(f, g, h, s_i, s_j) if each.is_simplified}
+    paper = {
+        each.name: each.simplified("paper")
+        for each in conditions(f, g, h, s_i, s_j)
+        if each.is_simplified
+    }
     i, j = body(rng), body(rng)
     placed = replace(j, u=s_i - s_j + j.u)
     printed = {
@@ -63,15 +83,29 @@ def test_simplified_rows_as_printed_are_the_papers(rng, formed):
     assert printed.keys() == paper.keys()
     for name, mine in printed.items():
         (theirs,) = paper[name]
-        assert entries(mine.rows(i.pose, placed.pose)) == pytest.approx(entries(theirs.rows(i.pose, j.pose)), abs=ROUND_OFF)
+        assert entries(mine.rows(i.pose, placed.pose)) == pytest.approx(
+            entries(theirs.rows(i.pose, j.pose)), abs=ROUND_OFF
+        )
     (d21,) = paper["d21"]
     assert gammas([d21], i, j) == pytest.approx(
-        np.array(PrintedDot21(f, g).gamma(i.pose, placed.pose, i.in_axes_of(d21).motion, j.in_axes_of(d21).motion)), abs=1e-10
+        np.array(
+            PrintedDot21(f, g).gamma(
+                i.pose, placed.pose, i.in_axes_of(d21).motion, j.in_axes_of(d21).motion
+            )
+        ),
+        abs=1e-10,
     )
-    pinned = replace(i, q=i.q * rotation(h, rng.uniform(-3.0, 3.0, 1000)), w=i.w + rng.normal(size=1000) * i.pose.turn(h))
-    assert gammas([printed["d11"]], i, pinned) == pytest.approx(gammas(paper["d11"], i, pinned), abs=ROUND_OFF)
+    pinned = replace(
+        i,
+        q=i.q * rotation(h, rng.uniform(-3.0, 3.0, 1000)),
+        w=i.w + rng.normal(size=1000) * i.pose.turn(h),
+    )
+    assert gammas([printed["d11"]], i, pinned) == pytest.approx(
+        gammas(paper["d11"], i, pinned), abs=ROUND_OFF
+    )
     assert np.abs(gammas([printed["d11"]], i, pinned)).max() > 1.0
-    assert gammas([printed["d11"]], *alike(i, pinned)) == pytest.approx(0.0, abs=ROUND_OFF)  # no turning, no gamma
+    # no turning, no gamma
+    assert gammas([printed["d11"]], *alike(i, pinned)) == pytest.approx(0.0, abs=ROUND_OFF)
 
 
 def test_chain_and_skew():

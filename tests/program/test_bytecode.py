@@ -1,4 +1,6 @@
-"""Programs that are interpreted: the same numbers as compiled, to the last bit, and compiled only where they are run often."""
+"""Programs that are interpreted: the same numbers as compiled, to the last bit, and compiled only
+where they are run often.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +68,11 @@ def every_slot(made: LlvmCode, name: str, lanes: int = 19) -> np.ndarray:
 
 
 @pytest.mark.parametrize("width", [2, 4, 8])
-@pytest.mark.parametrize("mechanism", [mcpherson(), four_bar(), cases.load("delta_robot").mechanism], ids=lambda each: each.name)
+@pytest.mark.parametrize(
+    "mechanism",
+    [mcpherson(), four_bar(), cases.load("delta_robot").mechanism],
+    ids=lambda each: each.name,
+)
 def test_programs_of_models(mechanism, width, monkeypatch):
     if width > compiler.vector_width():
         pytest.skip("no such vectors here")
@@ -90,7 +96,16 @@ def test_operations(name):
 def test_outputs_that_take_the_place_of_inputs():
     tape = Tape()
     x = [tape.input(k) for k in range(6)]
-    outputs = {0: x[1], 1: x[0], 2: x[0] * x[1] + x[2], 3: x[3], 4: x[2], 5: 2.0, 6: x[4] - x[0] * x[1], 7: x[4]}
+    outputs = {
+        0: x[1],
+        1: x[0],
+        2: x[0] * x[1] + x[2],
+        3: x[3],
+        4: x[2],
+        5: 2.0,
+        6: x[4] - x[0] * x[1],
+        7: x[4],
+    }
     plan = Plan({"f": program("f", tape, outputs)}, {str(k): k for k in range(8)})
     values = np.arange(1.0, 7.0)
     executor = LlvmExecutor(LlvmCode(plan), 1)
@@ -102,7 +117,12 @@ def test_outputs_that_take_the_place_of_inputs():
 
 def test_a_program_that_is_run_several_times():
     tape = Tape()
-    nodes = program("f", tape, {9: absolute(tape.input(0) - tape.input(4)), 10: absolute(tape.input(0))}, times=3)
+    nodes = program(
+        "f",
+        tape,
+        {9: absolute(tape.input(0) - tape.input(4)), 10: absolute(tape.input(0))},
+        times=3,
+    )
     plan = Plan({"f": nodes}, {str(k): k for k in range(11)})
     values = np.array([1.0, -7.0, 2.0, 0.0, 1.5, -6.0, 9.0, 0.0, 0.0])
     executor = LlvmExecutor(LlvmCode(plan), 1)
@@ -120,7 +140,13 @@ def test_a_product_is_part_of_the_only_sum_it_goes_into():
     tape = Tape()
     a, b, c, d = (tape.input(k) for k in range(4))
     once, twice = a * b, c * d
-    found = lowered(program("f", tape, {4: c + once, 5: c - a * c, 6: a * d - b, 7: twice + a, 8: twice, 9: b * b + b * d}))
+    found = lowered(
+        program(
+            "f",
+            tape,
+            {4: c + once, 5: c - a * c, 6: a * d - b, 7: twice + a, 8: twice, 9: b * b + b * d},
+        )
+    )
     assert [node[0] for node in found.nodes if node[0] != "input"].count("fma") == 2
     kinds = sorted(node[0] for node in found.nodes if node[0] != "input")
     assert kinds == ["*", "*", "+", "fma", "fma", "fms", "fnma"]
@@ -146,7 +172,9 @@ def test_cells_are_used_again():
 
 
 def sweeps(mechanism, driver: str, values: np.ndarray, **asked) -> tuple[Model, list[np.ndarray]]:
-    model = compile_model(mechanism, Request((driver,), tuple(each.name for each in mechanism.points), **asked))
+    model = compile_model(
+        mechanism, Request((driver,), tuple(each.name for each in mechanism.points), **asked)
+    )
     route = Route(model, Path({driver: Ramp(1.0)}, values))
 
     def positions() -> np.ndarray:
@@ -174,7 +202,11 @@ def test_one_sweep_compiles_nothing():
 
 def request_of(mechanism) -> Request:
     """That of `solve` with all it gives by itself."""
-    return Request(("stroke",), tuple(each.name for each in mechanism.points), tuple(each.name for each in mechanism.moving))
+    return Request(
+        ("stroke",),
+        tuple(each.name for each in mechanism.points),
+        tuple(each.name for each in mechanism.moving),
+    )
 
 
 @pytest.mark.parametrize("way", ["designs", "components"])
@@ -199,7 +231,9 @@ def test_designs_and_components_are_the_same_before_and_after(way, monkeypatch):
 def test_many_designs_compile_their_programs():
     mechanism, place = mcpherson(), "joints.tie_rod.points.0"
     request = Request(("stroke",), ("wheel",), varied=(place,))
-    route = Route(compile_model(mechanism, request), Path({"stroke": Ramp(1.0)}, np.linspace(-0.05, 0.05, 41)))
+    route = Route(
+        compile_model(mechanism, request), Path({"stroke": Ramp(1.0)}, np.linspace(-0.05, 0.05, 41))
+    )
     rod = np.array([[1.115], [0.665], [0.118]]) + np.linspace(0.0, 0.01, 17)
     assert route.model._code.interpreted
     for _ in range(2):
@@ -231,7 +265,8 @@ def test_long_programs_are_walked_for_longer():
 
 
 def test_programs_that_another_process_walked_are_compiled_in_the_first_sweep():
-    plan = compile_model(mcpherson(), Request(("stroke",), ())).plan  # its tables are in the cache now
+    # its tables are in the cache now
+    plan = compile_model(mcpherson(), Request(("stroke",), ())).plan
     made = LlvmCode(plan)
     made.count(llvm.AGAIN - 1)
     assert made.interpreted

@@ -1,4 +1,6 @@
-"""What is kept on disk between processes: found again where it is whole, and no more than there is room for."""
+"""What is kept on disk between processes: found again where it is whole, and no more than there is
+room for.
+"""
 
 import os
 
@@ -25,7 +27,11 @@ def test_what_was_made_is_found(here):
     assert disk_cache.size() == disk_cache.DIGEST + len(b"made")
 
 
-@pytest.mark.parametrize("spoil", [lambda was: was[:-1], lambda was: was[::-1], lambda was: b""], ids=["short", "turned", "empty"])
+@pytest.mark.parametrize(
+    "spoil",
+    [lambda was: was[:-1], lambda was: was[::-1], lambda was: b""],
+    ids=["short", "turned", "empty"],
+)
 def test_what_is_not_whole_is_made_again(here, spoil):
     disk_cache.kept(b"asked", lambda: b"made")
     (entry,) = here.iterdir()
@@ -47,5 +53,9 @@ def test_what_was_not_used_for_longest_goes(here, monkeypatch):
     os.utime(here / "read since", (read.st_atime + 4 * DAY, read.st_mtime))
     disk_cache.kept(b"asked", lambda: bytes(200))
     assert disk_cache.find(b"asked") == bytes(200)
-    assert {each.name for each in here.iterdir() if len(each.name) < 20} == {"a folder", "yesterday", "read since"}
+    assert {each.name for each in here.iterdir() if len(each.name) < 20} == {
+        "a folder",
+        "yesterday",
+        "read since",
+    }
     assert disk_cache.size() <= 1000

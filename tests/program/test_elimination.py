@@ -23,7 +23,9 @@ def random_matrix(rng, n, lanes, density, literal):
 
 
 def eliminate(values, literals, right):
-    """Solutions by a traced elimination, shape (lanes, n); the smallest pivot of each lane; the elimination."""
+    """Solutions by a traced elimination, shape (lanes, n); the smallest pivot of each lane; the
+    elimination.
+    """
     lanes, n, _ = values.shape
     tape = Tape()
     used = np.any(values != 0.0, axis=0)
@@ -35,7 +37,9 @@ def eliminate(values, literals, right):
     elimination = Elimination(rows)
     b = [tape.input(n * n + i) if np.any(right[:, i]) else 0.0 for i in range(n)]
     smallest = reduce(minimum, (absolute(x) for x in elimination.pivots), 1e300)
-    outputs = {n * (n + 1) + i: x for i, x in enumerate(elimination.solve(b))} | {n * (n + 2): smallest}
+    outputs = {n * (n + 1) + i: x for i, x in enumerate(elimination.solve(b))} | {
+        n * (n + 2): smallest
+    }
     block = np.zeros((n * (n + 2) + 1, lanes))
     block[: n * n], block[n * n : n * (n + 1)] = values.reshape(lanes, -1).T, right.T
     run_on([program("p", tape, outputs)], block)
@@ -60,7 +64,9 @@ def test_elimination_solves(n, density, literal):
 
 
 def test_every_lane_pivots_for_itself():
-    """Each lane is another permutation matrix: a pivot order that serves one lane is zero in another."""
+    """Each lane is another permutation matrix: a pivot order that serves one lane is zero in
+    another.
+    """
     rng = np.random.default_rng(5)
     values = np.array([np.eye(5)[rng.permutation(5)] for _ in range(60)])
     right = rng.normal(size=(60, 5))
@@ -73,7 +79,9 @@ def test_every_lane_pivots_for_itself():
 def test_partial_pivoting_takes_the_largest():
     """The classic: without exchange the answer is lost to round-off."""
     values = np.array([[[1e-20, 1.0], [1.0, 1.0]], [[1.0, 1.0], [1e-20, 1.0]]])
-    found, _, _ = eliminate(values, np.zeros((2, 2), dtype=bool), np.array([[1.0, 2.0], [2.0, 1.0]]))
+    found, _, _ = eliminate(
+        values, np.zeros((2, 2), dtype=bool), np.array([[1.0, 2.0], [2.0, 1.0]])
+    )
     assert found == pytest.approx(np.ones((2, 2)), rel=1e-15)
 
 
@@ -86,10 +94,15 @@ def test_a_small_literal_is_no_safe_pivot():
 
 
 def test_constant_blocks_are_used_up_first():
-    """The +-I blocks of the simplified rows leave a core of the rest only, whatever stands beside them."""
+    """The +-I blocks of the simplified rows leave a core of the rest only, whatever stands beside
+    them.
+    """
     tape = Tape()
     rows = [{k: 1.0, 3: tape.input(3 * k), 4: tape.input(3 * k + 1)} for k in range(3)]
-    rows += [{0: tape.input(9), 1: tape.input(10), 3: tape.input(11)}, {2: tape.input(12), 4: tape.input(13)}]
+    rows += [
+        {0: tape.input(9), 1: tape.input(10), 3: tape.input(11)},
+        {2: tape.input(12), 4: tape.input(13)},
+    ]
     assert Elimination(rows).core_size <= 2
     identity = Elimination([{k: -1.0} for k in range(6)])
     assert identity.core_size == 0
@@ -109,7 +122,9 @@ def test_singular_lanes_show_and_spoil_no_other():
     assert not np.isfinite(found[4]).all()
     sound = [0, 1, 3, 5]
     assert pivots[sound].min() > 1e-3
-    assert found[sound] == pytest.approx(np.linalg.solve(values[sound], right[sound, :, None])[:, :, 0], rel=1e-10)
+    assert found[sound] == pytest.approx(
+        np.linalg.solve(values[sound], right[sound, :, None])[:, :, 0], rel=1e-10
+    )
 
 
 def dependent_literals():
@@ -128,10 +143,14 @@ def empty_column():
 
 def three_rows_in_two_columns():
     tape = Tape()
-    return [{0: tape.input(3 * k), 1: tape.input(3 * k + 1)} for k in range(2)] + [{0: tape.input(6), 1: tape.input(7)}]
+    return [{0: tape.input(3 * k), 1: tape.input(3 * k + 1)} for k in range(2)] + [
+        {0: tape.input(6), 1: tape.input(7)}
+    ]
 
 
-@pytest.mark.parametrize("rows", [dependent_literals, empty_row, empty_column, three_rows_in_two_columns])
+@pytest.mark.parametrize(
+    "rows", [dependent_literals, empty_row, empty_column, three_rows_in_two_columns]
+)
 def test_structurally_singular_matrices_raise(rows):
     with pytest.raises(ZeroDivisionError, match="singular whatever the pose"):
         Elimination(rows())

@@ -64,12 +64,21 @@ def test_an_image_does_what_its_text_says():
 def test_many_images_stand_side_by_side():
     text = "define i64 @f(i64 %k) {{ %sum = add i64 %k, {} ret i64 %sum }}".format
     made = [elf_loader.placed(elf_loader.joined(compiler.emitted(text(k)))) for k in range(5)]
-    assert [CFUNCTYPE(c_int64, c_int64)(address("f"))(100) for address in made] == [100, 101, 102, 103, 104]
+    assert [CFUNCTYPE(c_int64, c_int64)(address("f"))(100) for address in made] == [
+        100,
+        101,
+        102,
+        103,
+        104,
+    ]
 
 
 @images
 def test_code_that_calls_something_outside_makes_no_image():
-    text = "declare double @outside(double)\ndefine double @f(double %x) { %y = call double @outside(double %x) ret double %y }"
+    text = (
+        "declare double @outside(double)\ndefine double @f(double %x) { %y = call double"
+        " @outside(double %x) ret double %y }"
+    )
     with pytest.raises(ValueError, match="'outside'"):
         elf_loader.joined(compiler.emitted(text))
 
@@ -112,7 +121,9 @@ def test_who_comes_back_does_not_import_llvm(tmp_path):
     here = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
 
     def imported() -> str:
-        return subprocess.run([sys.executable, "-c", SOLVE], env=here, capture_output=True, text=True, check=True).stdout.strip()
+        return subprocess.run(
+            [sys.executable, "-c", SOLVE], env=here, capture_output=True, text=True, check=True
+        ).stdout.strip()
 
     assert [imported() for _ in range(2)] == ["True", "False"]
 
@@ -146,7 +157,9 @@ def test_what_llvm_says_of_the_processor_is_kept_for_this_one(tmp_path, monkeypa
 def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
     described = compiler._described()
     assert described is not None
-    assert {line.split(b"\t")[0] for line in described.splitlines() if b"\t" in line} == {*compiler.TRAITS}
+    assert {line.split(b"\t")[0] for line in described.splitlines() if b"\t" in line} == {
+        *compiler.TRAITS
+    }
     assert b"MHz" not in described  # changes from one moment to the next
     from llvmlite import __version__
 

@@ -1,4 +1,6 @@
-"""Programs of many lanes and eliminations as one table: the numbers that programs give one by one, and dense factors give."""
+"""Programs of many lanes and eliminations as one table: the numbers that programs give one by one,
+and dense factors give.
+"""
 
 from __future__ import annotations
 
@@ -34,11 +36,19 @@ def test_lanes_of_a_program_read_and_write_rows_of_their_own(lanes):
     tape = Tape()
     a, b, c = (tape.input(k) for k in range(3))
     product = a * b
-    values = {3: root(product * product) + c, 4: where_larger(a, c, product - 0.1, cos(b)), 5: 7.25, 6: product}
+    values = {
+        3: root(product * product) + c,
+        4: where_larger(a, c, product - 0.1, cos(b)),
+        5: 7.25,
+        6: product,
+    }
     traced, memory, rng = program("f", tape, values), Memory(), np.random.default_rng(lanes)
     # the lanes share their third input, and stand in any order
     inputs, shared, outputs = memory.take(2 * lanes), memory.take(1).start, memory.take(4 * lanes)
-    places = rng.permutation(numbers(inputs)).reshape(2, lanes), rng.permutation(numbers(outputs)).reshape(4, lanes)
+    places = (
+        rng.permutation(numbers(inputs)).reshape(2, lanes),
+        rng.permutation(numbers(outputs)).reshape(4, lanes),
+    )
     slots = np.concatenate([places[0], np.full((1, lanes), shared), places[1]])
     parts = [Linker(WIDTH).lanes(traced, slots, memory)]
     given = {k: rng.normal(size=WIDTH) for k in (*numbers(inputs), shared)}
@@ -58,7 +68,9 @@ def test_operations_are_done_in_their_order_and_stage_by_stage():
         link.operations("+", at, at, np.roll(at, 1)),  # the second takes what the first has become
         link.operations("copy", to, at),
         link.operations("copy", to[:0], at[:0]),
-        link.staged(3, ("*", np.array([2, 0, 0]), (to, to, to)), ("+", np.array([1, 2, 0]), (to, to, at[0]))),
+        link.staged(
+            3, ("*", np.array([2, 0, 0]), (to, to, to)), ("+", np.array([1, 2, 0]), (to, to, at[0]))
+        ),
     ]
     found = gone_through(parts, memory, {0: 1.0 * width, 1: 10.0 * width, 2: 100.0 * width})
     assert found[:3, 0].tolist() == [101.0, 111.0, 211.0]
@@ -81,14 +93,24 @@ def test_factors_in_a_given_order_solve_what_dense_ones_do(n):
     matrix, factors, inverse, right = (memory.take(k) for k in (len(rows), fixed.count, n, n))
     factor = fixed.factor(link, numbers(matrix), factors, inverse, (zero, one))
     b = rng.normal(size=(n, WIDTH))
-    given = {zero: np.zeros(WIDTH), one: np.ones(WIDTH), **dict(zip(numbers(matrix), values, strict=True))}
+    given = {
+        zero: np.zeros(WIDTH),
+        one: np.ones(WIDTH),
+        **dict(zip(numbers(matrix), values, strict=True)),
+    }
     given |= dict(zip(numbers(right), b, strict=True))
     found = gone_through([*factor, *fixed.solve(link, factors, inverse, right)], memory, given)
-    np.testing.assert_allclose(found[right], np.linalg.solve(matrices, b.T[..., None])[..., 0].T, rtol=1e-10)
-    there = gone_through([*factor, *fixed.solve(link, factors, inverse, right, transposed=True)], memory, given)
+    np.testing.assert_allclose(
+        found[right], np.linalg.solve(matrices, b.T[..., None])[..., 0].T, rtol=1e-10
+    )
+    there = gone_through(
+        [*factor, *fixed.solve(link, factors, inverse, right, transposed=True)], memory, given
+    )
     transposed = np.linalg.solve(matrices.swapaxes(1, 2), b.T[..., None])[..., 0].T
     np.testing.assert_allclose(there[right], transposed, rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(found[factors][fixed.pivots].prod(axis=0), np.linalg.det(matrices), rtol=1e-10)
+    np.testing.assert_allclose(
+        found[factors][fixed.pivots].prod(axis=0), np.linalg.det(matrices), rtol=1e-10
+    )
     np.testing.assert_array_equal(found[matrix], values)
     # that of L is what elimination by hand has
     lower = matrices[0].copy()
@@ -96,7 +118,9 @@ def test_factors_in_a_given_order_solve_what_dense_ones_do(n):
         lower[k + 1 :, k] /= lower[k, k]
         lower[k + 1 :, k + 1 :] -= np.outer(lower[k + 1 :, k], lower[k, k + 1 :])
     largest = np.abs(np.tril(lower, -1)).max(initial=0.0)
-    assert np.abs(found[factors][fixed.multipliers][:, 0]).max(initial=0.0) == pytest.approx(largest, rel=1e-12)
+    assert np.abs(found[factors][fixed.multipliers][:, 0]).max(initial=0.0) == pytest.approx(
+        largest, rel=1e-12
+    )
 
 
 def test_a_pivot_that_cannot_be_anything_but_zero_is_refused():

@@ -1,4 +1,6 @@
-"""Machine code against numpy: every operation, whole models, lanes that end in the middle of a vector, and the cache on disk."""
+"""Machine code against numpy: every operation, whole models, lanes that end in the middle of a
+vector, and the cache on disk.
+"""
 
 from __future__ import annotations
 
@@ -85,10 +87,14 @@ def test_all_lanes_may_read_a_few_of_their_group():
     lanes = compiler.vector_width()
     values = np.random.default_rng(0).normal(size=(1, lanes))
     read = values[0, [place_of(k, lanes)[1] for k in range(NODES)]]
-    for executor in executors(lambda x: sum((10.0**k * x.tape.at(k, 0) for k in range(NODES)), 0.0), 1, lanes):
+    for executor in executors(
+        lambda x: sum((10.0**k * x.tape.at(k, 0) for k in range(NODES)), 0.0), 1, lanes
+    ):
         executor.put([0], values)
         executor.run("f")
-        np.testing.assert_allclose(executor.get([1])[0], np.full(lanes, 10.0 ** np.arange(NODES) @ read), rtol=1e-14)
+        np.testing.assert_allclose(
+            executor.get([1])[0], np.full(lanes, 10.0 ** np.arange(NODES) @ read), rtol=1e-14
+        )
 
 
 @pytest.mark.parametrize(("traced", "true"), [(sin, np.sin), (cos, np.cos)])
@@ -99,12 +105,16 @@ def test_sine_and_cosine_hold_over_thousands_of_turns(traced, true):
         x = rng.uniform(-extent, extent, size=256)
         executor.put([0], x[None])
         executor.run("f")
-        assert np.abs(executor.get([1])[0] - true(x)).max() <= 4e-16  # two units in the last place of one
+        # two units in the last place of one
+        assert np.abs(executor.get([1])[0] - true(x)).max() <= 4e-16
 
 
 @pytest.mark.parametrize("style", Style)
 def test_models_give_numpys_results(style):
-    for mechanism, values in ((mcpherson(), np.linspace(-0.08, 0.08, 33)), (four_bar(), np.linspace(0.0, 2.0 * np.pi, 37))):
+    for mechanism, values in (
+        (mcpherson(), np.linspace(-0.08, 0.08, 33)),
+        (four_bar(), np.linspace(0.0, 2.0 * np.pi, 37)),
+    ):
         driver = mechanism.drivers[0].name
         path = Path({driver: Ramp(1.0)}, values)
         found = []
@@ -114,7 +124,8 @@ def test_models_give_numpys_results(style):
             found.append(sweep(compile_model(mechanism, request), path, 1e-12))
         for name in found[0].points:
             a, b = (each.points[name] for each in found)
-            # ten units in the last place of one, each derivative losing the mechanisms' condition (about ten) once more
+            # ten units in the last place of one, each derivative losing the mechanisms' condition
+            # (about ten) once more
             assert np.abs(a.position - b.position).max() <= 2e-15
             assert np.abs(a.velocity - b.velocity).max() <= 2e-14
             assert np.abs(a.acceleration - b.acceleration).max() <= 2e-13
@@ -147,7 +158,8 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
 
     fresh = positions()
     interpreted = {*(tmp_path / "kincheck").iterdir()}
-    assert len(interpreted) == 4  # what was traced, its tables, what goes through them and the loops
+    # what was traced, its tables, what goes through them and the loops
+    assert len(interpreted) == 4
     np.testing.assert_array_equal(positions(often=True), fresh)
     entries = [*(tmp_path / "kincheck").iterdir()]
     assert len(entries) == 5  # and its machine code
@@ -160,10 +172,17 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
     (code,) = {*entries} - interpreted
     for entry, other in zip(entries, [*entries[1:], entries[0]], strict=True):
         kept = entry.read_bytes()
-        for damage in (b"", kept[:100], kept[:-1] + bytes([kept[-1] ^ 1]), b"\0" * len(kept), other.read_bytes()):
+        for damage in (
+            b"",
+            kept[:100],
+            kept[:-1] + bytes([kept[-1] ^ 1]),
+            b"\0" * len(kept),
+            other.read_bytes(),
+        ):
             entry.write_bytes(damage)
             if entry != code:
-                code.unlink()  # where there is code, neither tables nor what goes through them is looked for
+                # where there is code, neither tables nor what goes through them is looked for
+                code.unlink()
             np.testing.assert_array_equal(positions(often=True), fresh)
             assert entry.read_bytes() == kept
 
@@ -172,7 +191,9 @@ def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     times: list[str] = []
     trace = program_cache._trace
-    monkeypatch.setattr(program_cache, "_trace", lambda *given: times.append("traced") or trace(*given))
+    monkeypatch.setattr(
+        program_cache, "_trace", lambda *given: times.append("traced") or trace(*given)
+    )
     mechanism = four_bar()
     request = Request((mechanism.drivers[0].name,), ())
     moved = replace(mechanism.bodies[0], origin=(1e-16, 0.0, 0.0))
@@ -180,7 +201,10 @@ def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
         lambda: (mechanism, request),
         lambda: (mechanism, replace(request, order=1)),
         lambda: (replace(mechanism, bodies=[moved, *mechanism.bodies[1:]]), request),
-        lambda: monkeypatch.setattr(program_cache, "_source", lambda: b"changed") or (mechanism, request),
+        lambda: (
+            monkeypatch.setattr(program_cache, "_source", lambda: b"changed")
+            or (mechanism, request)
+        ),
     ):
         times.clear()
         for _ in range(2):
@@ -196,7 +220,9 @@ def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
     class Mine(Revolute):
         type = "mine"
 
-    monkeypatch.setattr(Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine"})
+    monkeypatch.setattr(
+        Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine"}
+    )
     mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
     mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])
     program_cache.traced(mechanism, Request((known.drivers[0].name,), ()))
@@ -207,8 +233,19 @@ def test_a_program_may_need_more_values_at_once_than_there_are_registers_and_exc
     tape, rng, n = Tape(), np.random.default_rng(0), 80
     x = [tape.input(k) for k in range(n)]
     products = [a * b for a, b in pairwise(x)]
-    back = [where_larger(a, b, a - c, a * b) for a, b, c in zip(products, reversed(products), reversed(x[1:]), strict=True)]
-    outputs = {0: x[1], 1: x[0], 2: sum(back[1:], back[0]), 3: products[40], 70: x[30], n: products[7], n + 1: products[7]}
+    back = [
+        where_larger(a, b, a - c, a * b)
+        for a, b, c in zip(products, reversed(products), reversed(x[1:]), strict=True)
+    ]
+    outputs = {
+        0: x[1],
+        1: x[0],
+        2: sum(back[1:], back[0]),
+        3: products[40],
+        70: x[30],
+        n: products[7],
+        n + 1: products[7],
+    }
     traced = program("f", tape, outputs | {slot: back[slot] for slot in range(4, 60)})
     plan = Plan({"f": traced}, {str(k): k for k in range(n + 2)})
     values, found = rng.normal(size=(n, 9)), list[Any]()
@@ -216,7 +253,8 @@ def test_a_program_may_need_more_values_at_once_than_there_are_registers_and_exc
         executor.put(range(n), values)
         executor.run("f")
         found.append(executor.get(range(n + 2)))
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-13)  # a product and a sum may be rounded once
+    # a product and a sum may be rounded once
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-13)
 
 
 def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
@@ -239,7 +277,9 @@ def test_the_width_is_that_of_the_processor():
 
 WAYS = {
     "one program": lambda: solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points,
-    "one program, positions": lambda: solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33), order=0).points,
+    "one program, positions": lambda: (
+        solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33), order=0).points
+    ),
     "components": lambda: solve(chain(8), "turn", np.linspace(-0.5, 0.5, 33)).points,
     "designs": lambda: (
         solve_designs(

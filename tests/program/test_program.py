@@ -31,11 +31,15 @@ def run(outputs, block):
 
 
 def traced(function, *columns):
-    """The program of function(inputs...) -> sequence of scalars, and what it gives for the inputs' lanes."""
+    """The program of function(inputs...) -> sequence of scalars, and what it gives for the inputs'
+    lanes.
+    """
     tape = Tape()
     values = function(*(tape.input(k) for k in range(len(columns))))
     compiled = program("p", tape, {len(columns) + k: value for k, value in enumerate(values)})
-    block = np.vstack([np.array(columns, dtype=float), np.full((len(values), len(columns[0])), np.nan)])
+    block = np.vstack(
+        [np.array(columns, dtype=float), np.full((len(values), len(columns[0])), np.nan)]
+    )
     run_on([compiled], block)
     return compiled, block[len(columns) :]
 
@@ -57,9 +61,17 @@ class Operation:
 
 def expressions():
     def extend(smaller):
-        binary = st.builds(lambda op, a, b: Operation(op, (a, b)), st.sampled_from("+-*/<>"), smaller, smaller)
-        unary = st.builds(lambda op, a: Operation(op, (a,)), st.sampled_from(["neg", "neg", "sqrt", "abs"]), smaller)
-        select = st.builds(lambda *each: Operation("where", each), smaller, smaller, smaller, smaller)
+        binary = st.builds(
+            lambda op, a, b: Operation(op, (a, b)), st.sampled_from("+-*/<>"), smaller, smaller
+        )
+        unary = st.builds(
+            lambda op, a: Operation(op, (a,)),
+            st.sampled_from(["neg", "neg", "sqrt", "abs"]),
+            smaller,
+        )
+        select = st.builds(
+            lambda *each: Operation("where", each), smaller, smaller, smaller, smaller
+        )
         twice = st.builds(lambda op, a: Operation(op, (a, a)), st.sampled_from("+-*<>"), smaller)
         return binary | unary | select | twice
 
@@ -97,7 +109,9 @@ def evaluate(expression, inputs):
 
 
 def directly(expression, inputs):
-    """The expression in plain floats, nothing folded; ArithmeticError or ValueError where it is not defined."""
+    """The expression in plain floats, nothing folded; ArithmeticError or ValueError where it is not
+    defined.
+    """
     if isinstance(expression, int):
         return inputs[expression]
     if isinstance(expression, float):
@@ -135,7 +149,9 @@ numbers = st.floats(-8.0, 8.0).map(lambda x: round(x, 3)) | CONSTANTS
     st.lists(st.tuples(*[numbers] * INPUTS), min_size=1, max_size=5),
 )
 def test_tracing_changes_no_bit(wanted, samples):
-    """Outputs go where inputs stand, lane by lane; all folds are exact in floating-point arithmetic."""
+    """Outputs go where inputs stand, lane by lane; all folds are exact in floating-point
+    arithmetic.
+    """
     try:
         expected = np.array([[directly(each, sample) for sample in samples] for each in wanted])
     except (ZeroDivisionError, ValueError):
@@ -222,8 +238,11 @@ def test_flops_count_every_operation_once():
     tape = Tape()
     x, y = tape.input(0), tape.input(1)
     z = root(x * x + y * y)
-    compiled = program("p", tape, {2: where_larger(x, y, z, -z), 3: maximum(z, absolute(x)) / (z - 1.0)})
-    assert compiled.flops == sum(compiled.operations.values()) - 2 - 1  # but the two inputs and the one constant
+    compiled = program(
+        "p", tape, {2: where_larger(x, y, z, -z), 3: maximum(z, absolute(x)) / (z - 1.0)}
+    )
+    # but the two inputs and the one constant
+    assert compiled.flops == sum(compiled.operations.values()) - 2 - 1
     assert compiled.flops == 11
 
 
@@ -250,7 +269,9 @@ def test_programs_share_a_block():
     tape = Tape()
     x, y = tape.input(0), tape.input(1)
     block = np.array([[1.0], [2.0]])
-    executor = numpy_executor([program("sum", tape, {0: x + y}), program("product", tape, {1: x * y})], block)
+    executor = numpy_executor(
+        [program("sum", tape, {0: x + y}), program("product", tape, {1: x * y})], block
+    )
     for name in ("sum", "product", "sum"):
         executor.run(name)
     assert executor.get([0, 1])[:, 0].tolist() == [9.0, 6.0]
@@ -259,7 +280,9 @@ def test_programs_share_a_block():
 def test_lanes_choose_for_themselves():
     a, b = [1.0, -3.0, 2.0, np.nan], [2.0, 1.0, -2.0, 1.0]
     p, q = [10.0, 20.0, 30.0, 40.0], [-10.0, -20.0, -30.0, -40.0]
-    _, found = traced(lambda a, b, p, q: [where_larger(a, b, p, q), where_larger(a, b, p, 0.0)], a, b, p, q)
+    _, found = traced(
+        lambda a, b, p, q: [where_larger(a, b, p, q), where_larger(a, b, p, 0.0)], a, b, p, q
+    )
     assert found.tolist() == [[-10.0, 20.0, -30.0, -40.0], [0.0, 20.0, 0.0, 0.0]]
 
 
@@ -269,7 +292,9 @@ NAN = float("nan")
 @pytest.mark.parametrize("extreme", [minimum, maximum])
 @pytest.mark.parametrize(("a", "b"), [(NAN, 1.0), (1.0, NAN)])
 def test_nan_is_not_lost(extreme, a, b):
-    """Of two lanes, of a lane and a number, of two numbers: a NaN residual must never look converged."""
+    """Of two lanes, of a lane and a number, of two numbers: a NaN residual must never look
+    converged.
+    """
     _, found = traced(lambda x, y: [extreme(x, y), extreme(x, b), extreme(a, y)], [a], [b])
     assert np.isnan(found).all()
     assert math.isnan(extreme(a, b))

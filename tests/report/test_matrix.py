@@ -1,4 +1,6 @@
-"""The matrix of cases and engines, on the terminal and as Markdown, and that of all joint types in the README."""
+"""The matrix of cases and engines, on the terminal and as Markdown, and that of all joint types in
+the README.
+"""
 
 import re
 from pathlib import Path
@@ -22,7 +24,9 @@ BUILT_IN = [
 
 @pytest.fixture
 def run(monkeypatch, tmp_path, capsys):
-    """Runs the command line with fake engines; (exit status, what it printed, the Markdown it wrote)."""
+    """Runs the command line with fake engines; (exit status, what it printed, the Markdown it
+    wrote).
+    """
 
     def main(*argv, engines, cases=()):
         by_name = {engine.name: engine for engine in engines}
@@ -67,7 +71,9 @@ def test_cells_say_how_far_off_or_why_not(run):
 
 
 def test_joints_are_run_instead_of_the_built_in_cases_and_printed_as_a_matrix(run):
-    """A fake engine has no such points, so every cell is an error; what counts here is which cells there are."""
+    """A fake engine has no such points, so every cell is an error; what counts here is which cells
+    there are.
+    """
     _, printed, markdown = run("--joints", engines=[Fake("native"), Fake("other")], cases=[crank()])
     found = re.findall(r"^\| `(\w+)` \|", markdown, re.MULTILINE)
     assert sorted(found) == sorted([*Joint.registry, *Coupler.registry])

@@ -1,4 +1,6 @@
-"""The report holds the numbers of its records, escapes what comes from files, and needs no network."""
+"""The report holds the numbers of its records, escapes what comes from files, and needs no
+network.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"
 
 
 class Page(HTMLParser):
-    """What the tests read off a page: its text outside scripts and styles, its scripts, its tags."""
+    """What the tests read off a page: its text outside scripts and styles, its scripts, its
+    tags.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -277,7 +281,9 @@ def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
 
 
 def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
-    """What the legend shows is what is drawn: symbols without one would all be told by the same cross."""
+    """What the legend shows is what is drawn: symbols without one would all be told by the same
+    cross.
+    """
     records = [record("strut", "closed_form", f"engine {k}", 1e-12, GRID) for k in range(len(SYMBOLS))]
     write_report(Results(run={}, records=records), tmp_path / "report.html")
     legend = (tmp_path / "report.html").read_text("utf-8").split("Curves shown")[1].split("</div>")[0]

@@ -1,4 +1,6 @@
-"""The report in a browser: it opens without errors, draws what the results hold, and obeys mouse and keyboard."""
+"""The report in a browser: it opens without errors, draws what the results hold, and obeys mouse
+and keyboard.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not instal
 
 @pytest.fixture
 def visit(tmp_path: Path) -> Any:
-    """Writes a report, opens it, and does something there; what that returned. Anything on the console is a failure."""
+    """Writes a report, opens it, and does something there; what that returned. Anything on the
+    console is a failure.
+    """
 
     def opened(run: Results, act: str, **further: Any) -> Any:
         path = tmp_path / "report.html"
@@ -124,7 +128,8 @@ def test_plots_hold_the_numbers_of_the_results(visit: Any) -> None:
         """,
     )
     drawn = dict(told)
-    assert list(drawn) == ["case-0-0", "case-0-1", "case-0-0-position", "case-0-0-velocity"]  # others wait; no history, no efforts
+    # others wait; no history, no efforts
+    assert list(drawn) == ["case-0-0", "case-0-1", "case-0-0-position", "case-0-0-velocity"]
     for each in run.records[:2]:
         [curve] = [trace for trace in drawn["case-0-0"] if (trace["meta"], trace["mode"]) == (each.engine, "lines")]
         assert curve["y"] == pytest.approx([1000 * d for d in GRID], abs=1e-12)

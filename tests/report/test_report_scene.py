@@ -1,4 +1,6 @@
-"""The mechanism in the results and as the report draws it: hardpoints where the native engine says, and nothing it did not say."""
+"""The mechanism in the results and as the report draws it: hardpoints where the native engine says,
+and nothing it did not say.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,8 @@ def test_hardpoints_are_drawn_where_the_native_engine_has_them():
     motion = solve(STRUT.mechanism, "stroke", STRUT.sweep.values[shown.frames]).points["wheel_center"]
     [path] = drawn.paths
     for frame in (0, 17, 60):
-        assert place(drawn, path, frame) == pytest.approx(motion.position[frame], abs=2e-6)  # rounded to a millionth
+        # rounded to a millionth
+        assert place(drawn, path, frame) == pytest.approx(motion.position[frame], abs=2e-6)
     assert shown.frames[drawn.start] == 80
     assert drawn.steps[0] == "sample 0 · wheel travel −80 mm"
 
@@ -86,7 +89,8 @@ def test_points_that_only_show_how_a_body_turns_are_no_hardpoints():
     names = [point.name for point in shown.points]
     assert "wheel_center" in names
     assert not [name for name in names if name.startswith(MARKER)]
-    assert "strut_top" in {text for *_, text in drawing(shown, AXIS).labels}  # a joint and a point of one name, said once
+    # a joint and a point of one name, said once
+    assert "strut_top" in {text for *_, text in drawing(shown, AXIS).labels}
 
 
 @pytest.mark.parametrize(("count", "nodes", "links"), [(1, 2, 1), (2, 2, 1), (4, 4, 6), (7, 8, 7)])
@@ -201,4 +205,5 @@ def test_large_mechanisms_have_fewer_frames_and_the_largest_no_scene():
         return Case(made.name, "", Truth.CONSENSUS_ONLY, made, Sweep("turn", np.linspace(0.0, 0.1, 101)), ())
 
     assert len(scene(case(30)).frames) == POSES // 61
-    assert with_scenes(Results(run={}, records=[]), [case(LARGEST // 2)]).scenes == {}  # one crank more than loops
+    # one crank more than loops
+    assert with_scenes(Results(run={}, records=[]), [case(LARGEST // 2)]).scenes == {}

@@ -1,4 +1,6 @@
-"""The benchmark of engines: turns are taken, error and outcome stand beside the time, modes are kept apart. No time is judged."""
+"""The benchmark of engines: turns are taken, error and outcome stand beside the time, modes are
+kept apart. No time is judged.
+"""
 
 from __future__ import annotations
 
@@ -40,11 +42,13 @@ def test_contestants_take_turns(monkeypatch):
 
 def test_quick_work_is_done_several_times_and_warmed(monkeypatch):
     clock = iter(range(1000))
-    monkeypatch.setattr(rounds, "perf_counter", lambda: 1.1e-3 * next(clock))  # every work seems to take a millisecond
+    # every work seems to take a millisecond
+    monkeypatch.setattr(rounds, "perf_counter", lambda: 1.1e-3 * next(clock))
     called = []
     found = rounds.take_turns({"a": lambda: called.append("a")}, 2)
     assert len(called) == rounds.FIRST + 2 * (1 + 2)  # a turn of 2 ms, and a call before each
-    assert found["a"].median == pytest.approx(0.55e-3)  # the clock goes on once in a turn, for two calls
+    # the clock goes on once in a turn, for two calls
+    assert found["a"].median == pytest.approx(0.55e-3)
 
 
 def test_work_that_is_slow_at_first_is_timed_by_what_it_takes_later(monkeypatch):
@@ -63,7 +67,13 @@ def test_work_that_is_slow_at_first_is_timed_by_what_it_takes_later(monkeypatch)
 
 def test_spread():
     found = rounds.spread([4.0, 1.0, 2.0, 3.0, 100.0])
-    assert (found.least, found.lower, found.median, found.upper, found.rounds) == (1.0, 2.0, 3.0, 4.0, 5)
+    assert (found.least, found.lower, found.median, found.upper, found.rounds) == (
+        1.0,
+        2.0,
+        3.0,
+        4.0,
+        5,
+    )
     assert found.times(10.0).upper == 40.0
 
 
@@ -86,9 +96,17 @@ class Measured(Fake):
 
 def test_an_entry_has_error_and_outcome():
     coarse, fine = precision.contestants(crank(), Measured().efforts(), TOL)
-    assert (coarse.entry.setting, coarse.entry.outcome, fine.entry.outcome) == ("coarse", Outcome.FAIL, Outcome.PASS)
+    assert (coarse.entry.setting, coarse.entry.outcome, fine.entry.outcome) == (
+        "coarse",
+        Outcome.FAIL,
+        Outcome.PASS,
+    )
     assert coarse.entry.errors.position == pytest.approx(1e-6)
-    assert (fine.entry.errors.velocity, fine.entry.iterations, fine.entry.against) == (0.0, 3.0, "closed_form")
+    assert (fine.entry.errors.velocity, fine.entry.iterations, fine.entry.against) == (
+        0.0,
+        3.0,
+        "closed_form",
+    )
     entry = fine.timed(rounds.spread([9e-6]))
     assert entry.us_per_sample.median == pytest.approx(1.0)  # nine samples
 
@@ -116,7 +134,10 @@ def entries():
     case = crank()
     efforts = {**Measured().efforts(), "finest": Fake()}
     found = precision.contestants(case, efforts, TOL)
-    return [each.timed(rounds.spread([seconds])) for each, seconds in zip(found, (9e-6, 18e-6, 27e-6), strict=True)]
+    return [
+        each.timed(rounds.spread([seconds]))
+        for each, seconds in zip(found, (9e-6, 18e-6, 27e-6), strict=True)
+    ]
 
 
 def test_the_fastest_effort_that_meets_the_error():
@@ -149,8 +170,21 @@ def test_a_case_without_a_reference_is_proved():
 
 def measured(tell=print):
     """Of fake engines in both modes."""
-    both = [Measured("native"), Measured("fake"), Measured("fake", mode="simulate"), Fake("gone", installed=None)]
-    return engines.measure({"crank": crank()}, both, tol=TOL, rounds=1, parts=("work",), command="kincheck bench", tell=tell)
+    both = [
+        Measured("native"),
+        Measured("fake"),
+        Measured("fake", mode="simulate"),
+        Fake("gone", installed=None),
+    ]
+    return engines.measure(
+        {"crank": crank()},
+        both,
+        tol=TOL,
+        rounds=1,
+        parts=("work",),
+        command="kincheck bench",
+        tell=tell,
+    )
 
 
 def test_modes_share_neither_table_nor_diagram():
@@ -161,14 +195,28 @@ def test_modes_share_neither_table_nor_diagram():
         ("fake", "simulate"),
         ("gone", "projection"),
     }
-    drawn = {mode: precision_diagram(found, "crank", mode).figure["data"] for mode in ("projection", "simulate")}
-    assert {trace["meta"] for trace in drawn["projection"]} == {"native", "fake", "native: floor", "fake: floor"}
+    drawn = {
+        mode: precision_diagram(found, "crank", mode).figure["data"]
+        for mode in ("projection", "simulate")
+    }
+    assert {trace["meta"] for trace in drawn["projection"]} == {
+        "native",
+        "fake",
+        "native: floor",
+        "fake: floor",
+    }
     captions = {mode: precision_diagram(found, "crank", mode).plot.caption for mode in drawn}
-    assert {mode for mode, caption in captions.items() if "A cross is a simulator's floor" in caption} == {"projection"}
+    assert {
+        mode for mode, caption in captions.items() if "A cross is a simulator's floor" in caption
+    } == {"projection"}
     assert {trace["meta"] for trace in drawn["simulate"]} == {"fake · simulate"}
     tables = {section.title: section.rows for section in report(found).sections}
     assert {row[0] for row in tables["crank, simulate: work and precision"]} == {"fake"}
-    assert {row[0] for row in tables["crank, projection: time at a required error"]} == {"native", "fake", "gone"}
+    assert {row[0] for row in tables["crank, projection: time at a required error"]} == {
+        "native",
+        "fake",
+        "gone",
+    }
     assert "none" in tables["crank, projection: time at a required error"][-1]
 
 
@@ -183,9 +231,9 @@ def test_results_are_read_as_they_were_written(tmp_path):
     file = tmp_path / "bench.json"
     file.write_bytes(msgspec.json.encode(found))
     efforts = engines.efforts_in(file)
-    assert [(each.engine, each.mode) for each in efforts["crank"]][2:] == [("fake", "projection")] * 2 + [
-        ("fake · simulate", "simulate")
-    ] * 2
+    assert [(each.engine, each.mode) for each in efforts["crank"]][2:] == [
+        ("fake", "projection")
+    ] * 2 + [("fake · simulate", "simulate")] * 2
     html = page(report(found))
     assert 'data-figure="crank-simulate"' in html
     assert "https:" not in html.partition("<script")[0]
@@ -201,7 +249,18 @@ def one_thread(monkeypatch):
 
 @pytest.mark.usefixtures("one_thread")
 def test_command_and_report_of_a_run(tmp_path, capsys):
-    asked = ["bench", "engines", "--rounds", "1", "--engine", "native", "--cases", "rssr", "--parts", "work"]
+    asked = [
+        "bench",
+        "engines",
+        "--rounds",
+        "1",
+        "--engine",
+        "native",
+        "--cases",
+        "rssr",
+        "--parts",
+        "work",
+    ]
     assert main.main([*asked, "--json", "-", "--out", str(tmp_path)]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["schema"] == "kincheck-bench/1"
@@ -219,7 +278,9 @@ def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
     found = measured()  # of an engine "gone" too
     monkeypatch.setattr(engines, "measure", lambda cases, engines, **options: found)
     for name, status in (("gone", 2), ("native", 0)):
-        monkeypatch.setattr("kincheck.core.cli.registry.House.find_engines", lambda house, names, *rest: [])
+        monkeypatch.setattr(
+            "kincheck.core.cli.registry.House.find_engines", lambda house, names, *rest: []
+        )
         assert main.main(["bench", "engines", "--engine", name, "--cases", "rssr"]) == status
         assert ("engine 'gone' is named and missing" in capsys.readouterr().err) is (status == 2)
 
@@ -237,7 +298,10 @@ def test_run_refuses_what_is_no_benchmark(tmp_path, capsys):
     bad = str(tmp_path / "bench.json")
     assert main.main(["run", "rssr", "--engine", "native", "--bench", bad]) == 2
     assert "give --out" in capsys.readouterr().err
-    assert main.main(["run", "rssr", "--engine", "native", "--bench", bad, "--out", str(tmp_path)]) == 2
+    assert (
+        main.main(["run", "rssr", "--engine", "native", "--bench", bad, "--out", str(tmp_path)])
+        == 2
+    )
     assert "kincheck bench wrote" in capsys.readouterr().err
 
 
@@ -245,7 +309,11 @@ def test_run_refuses_what_is_no_benchmark(tmp_path, capsys):
 def test_plain_bench_is_everything(monkeypatch, tmp_path):
     asked = {}
     found = measured()
-    monkeypatch.setattr(engines, "measure", lambda cases, engines, **options: asked.update(options, cases=cases) or found)
+    monkeypatch.setattr(
+        engines,
+        "measure",
+        lambda cases, engines, **options: asked.update(options, cases=cases) or found,
+    )
     monkeypatch.setattr(formulation, "STATES", 3)
     assert main.main(["bench", "--out", str(tmp_path)]) == 0
     assert (tuple(asked["cases"]), asked["parts"]) == (command.CASES, engines.PARTS)
@@ -258,7 +326,11 @@ def test_linear_algebra_has_one_thread(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     started = []
     monkeypatch.setattr(
-        subprocess, "run", lambda arguments, env, check: started.append((arguments, env)) or subprocess.CompletedProcess([], 5)
+        subprocess,
+        "run",
+        lambda arguments, env, check: (
+            started.append((arguments, env)) or subprocess.CompletedProcess([], 5)
+        ),
     )
     assert main.main(shlex.split("bench engines --rounds 2")) == 5
     ((arguments, env),) = started

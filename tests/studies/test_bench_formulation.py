@@ -1,4 +1,6 @@
-"""The benchmark of the paper's claims: rows as printed are right, counts are exact, round-off and sweeps bear the verdicts."""
+"""The benchmark of the paper's claims: rows as printed are right, counts are exact, round-off and
+sweeps bear the verdicts.
+"""
 
 import kincheck.cases
 import numpy as np
@@ -72,7 +74,8 @@ def by_way(counts):
 
 NATIVE = TRACED["native"]
 COUNTS = {
-    # formulation 8.1: d10 and d20 as printed, J and with the velocities; the gamma that Table 3 may print as 18
+    # formulation 8.1: d10 and d20 as printed, J and with the velocities; the gamma that Table 3 may
+    # print as 18
     ("d10", DOTS, MULTIPLIED_OUT): Operations(150, 161, 450, 288),
     ("d20", DOTS, FROM_THE_LEFT): Operations(147, 170, 468, 297),
     ("d11", SIMPLIFIED, FROM_THE_LEFT): Operations(60, 82, 184, 100),
@@ -82,7 +85,8 @@ COUNTS = {
     ("d10", DOTS, NATIVE): Operations(15 + 15 + 9, 50, 98, 77),
     ("d11", SIMPLIFIED, NATIVE): Operations(15 + 15, 52, 89, 65),
     ("d12", SIMPLIFIED, NATIVE): Operations(0, 3, 3, 0),
-    # A a, A s_i, A s_j (45), P_j - P_i (12 with the swings), r_j - r_i and S_i (6), two products (18)
+    # A a, A s_i, A s_j (45), P_j - P_i (12 with the swings), r_j - r_i and S_i (6), two products
+    # (18)
     ("d20", DOTS, NATIVE): Operations(45 + 12 + 6 + 18, 104, 189, 144),
     # A f, A g, r_j - r_i from its value at design, two products
     ("d21", SIMPLIFIED, NATIVE): Operations(30 + 6 + 18, 88, 153, 99),
@@ -104,7 +108,9 @@ def test_unit_axes_of_native_rows(found):
 
 
 def test_table_3_is_printed_beside_every_condition(found):
-    printed = {each.condition: each.general_axes for each in found.operations if each.way == TABLE_3}
+    printed = {
+        each.condition: each.general_axes for each in found.operations if each.way == TABLE_3
+    }
     assert list(printed) == ["d10", "d11", "d12", "d20", "d21"]
     assert printed["d20"] == Operations(144, 167, 398)
     assert found.operations == count_operations()
@@ -116,7 +122,11 @@ def test_what_the_simplification_gains_and_what_sharing_does(found):
         for axes in ("paper", "native"):
             full, dots, simple = (
                 counts[name, rows, way].general_axes
-                for rows, way in ((DOTS, MULTIPLIED_OUT), (DOTS, TRACED[axes]), (SIMPLIFIED, TRACED[axes]))
+                for rows, way in (
+                    (DOTS, MULTIPLIED_OUT),
+                    (DOTS, TRACED[axes]),
+                    (SIMPLIFIED, TRACED[axes]),
+                )
             )
             assert simple.jacobian < dots.jacobian < full.jacobian
             assert simple.gamma < dots.gamma < full.gamma
@@ -134,7 +144,10 @@ def test_tracing_shares_over_rows_and_execution_does_not():
     assert traced([*dots, *dots]).gamma == both.gamma
     tally = [0]
     pair = Pair.of(lambda: Executed(tally))
-    alone, two = (executed(each, pair, tally) for each in (condition.printed(formed=True)[:1], condition.printed(formed=True)))
+    alone, two = (
+        executed(each, pair, tally)
+        for each in (condition.printed(formed=True)[:1], condition.printed(formed=True))
+    )
     assert (two.jacobian, two.gamma) == (2 * alone.jacobian, 2 * alone.gamma)
 
 
@@ -142,7 +155,9 @@ def test_tracing_shares_over_rows_and_execution_does_not():
 
 
 def test_the_order_of_the_sum_keeps_the_digits(found):
-    """Printed (22) loses as many digits as the distance has; with r_j - r_i first no style loses any."""
+    """Printed (22) loses as many digits as the distance has; with r_j - r_i first no style loses
+    any.
+    """
     for each in found.roundoff:
         if each.distance is None:
             continue
@@ -153,14 +168,25 @@ def test_the_order_of_the_sum_keeps_the_digits(found):
             assert each.residual.max < 3e-15
             assert each.jacobian.max < 3e-15
             assert each.gamma.max < 1e-13
-    printed = {each.distance: each for each in found.roundoff if (each.condition, each.way) == ("d20", "as printed")}
+    printed = {
+        each.distance: each
+        for each in found.roundoff
+        if (each.condition, each.way) == ("d20", "as printed")
+    }
     assert printed[1e6].jacobian.rms > 1e4 * printed[1.0].jacobian.rms
     assert printed[1e6].gamma.rms > 1e4 * printed[1.0].gamma.rms
 
 
 def test_simplified_rows_gain_little(found):
-    errors = {(each.condition, each.rows, each.way): each for each in found.roundoff if each.distance in (None, 1.0)}
-    printed, simplified = errors["d11", DOTS, "as printed"], errors["d11", SIMPLIFIED, "paper's axes"]
+    errors = {
+        (each.condition, each.rows, each.way): each
+        for each in found.roundoff
+        if each.distance in (None, 1.0)
+    }
+    printed, simplified = (
+        errors["d11", DOTS, "as printed"],
+        errors["d11", SIMPLIFIED, "paper's axes"],
+    )
     assert 1.5 < printed.gamma.rms / simplified.gamma.rms < 5.0
     for quantity in ("residual", "jacobian"):
         assert 0.5 < getattr(printed, quantity).rms / getattr(simplified, quantity).rms < 2.0
@@ -190,7 +216,11 @@ def test_all_ways_get_the_same_inputs(rng):
         assert np.sqrt(i.u @ i.u) == pytest.approx(distance, rel=1e-9)
         for condition in known.conditions[2:]:
             for primitive in condition.simplified("paper"):
-                off = np.array(primitive.phi(bench_roundoff.Pose.of(i.u, i.q), bench_roundoff.Pose.of(j.u, j.q)))
+                off = np.array(
+                    primitive.phi(
+                        bench_roundoff.Pose.of(i.u, i.q), bench_roundoff.Pose.of(j.u, j.q)
+                    )
+                )
                 assert np.abs(off).max() < 20.0 * bench_roundoff.TILT
 
 
@@ -199,8 +229,13 @@ def test_all_ways_get_the_same_inputs(rng):
 
 def test_programs_are_those_the_solver_runs(found, case):
     sizes = {each.style: each for each in found.programs}
-    whole, places = (solve(case.mechanism, "stroke", [0.0], order=order).details["program"] for order in (2, 0))
-    assert (sizes["native"].newton, sizes["native"].motion) == (whole["newton"]["flops"], places["tangent"]["flops"])
+    whole, places = (
+        solve(case.mechanism, "stroke", [0.0], order=order).details["program"] for order in (2, 0)
+    )
+    assert (sizes["native"].newton, sizes["native"].motion) == (
+        whole["newton"]["flops"],
+        places["tangent"]["flops"],
+    )
     assert sizes["native"].newton < sizes["paper"].newton < sizes["conventional"].newton
     assert sizes["native"].motion < sizes["paper"].motion < sizes["conventional"].motion
 
@@ -230,4 +265,6 @@ def test_a_mechanism_moved_away_and_back_is_rounded_once(case):
     for one, other in zip(case.mechanism.points, back.points, strict=True):
         assert one.position != other.position
         assert other.position == pytest.approx(one.position, abs=1.2e-10)
-    assert away.joints[-1].points[0] == pytest.approx([x + y for x, y in zip((1.115, 0.665, 0.118), bench_whole.FAR, strict=True)])
+    assert away.joints[-1].points[0] == pytest.approx(
+        [x + y for x, y in zip((1.115, 0.665, 0.118), bench_whole.FAR, strict=True)]
+    )

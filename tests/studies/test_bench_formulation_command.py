@@ -18,7 +18,12 @@ def few(monkeypatch):
 
 @pytest.mark.usefixtures("few")
 def test_command_writes_tables_json_and_page(tmp_path, capsys):
-    assert main.main(["bench", "formulation", "--seed", "7", "--json", "-", "--out", str(tmp_path / "new")]) == 0
+    assert (
+        main.main(
+            ["bench", "formulation", "--seed", "7", "--json", "-", "--out", str(tmp_path / "new")]
+        )
+        == 0
+    )
     captured = capsys.readouterr()
     found = json.loads(captured.out)
     assert found["schema"] == "kincheck-bench-formulation/1"
@@ -51,7 +56,11 @@ def test_bad_destinations_are_named_before_the_work(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(bench_formulation, "measure", lambda *_: pytest.fail("worked"))
     (tmp_path / "file").write_text("")
     (tmp_path / "bench_formulation.html").mkdir()
-    for options in (["--out", tmp_path / "file"], ["--out", tmp_path], ["--json", tmp_path / "no" / "x.json"]):
+    for options in (
+        ["--out", tmp_path / "file"],
+        ["--out", tmp_path],
+        ["--json", tmp_path / "no" / "x.json"],
+    ):
         assert main.main(["bench", "formulation", *map(str, options)]) == 2
         assert "file" in capsys.readouterr().err
 

@@ -1,4 +1,6 @@
-"""The native engine's own benchmarks: they measure what they say, and solve what they time. No time is judged."""
+"""The native engine's own benchmarks: they measure what they say, and solve what they time. No time
+is judged.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +12,31 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core import SolveError
 from kincheck.core.harness.record import Outcome
-from kincheck.core.studies.bench import batch, native_breakdown, peak, precision, processes, rounds, size, study_throughput
+from kincheck.core.studies.bench import (
+    batch,
+    native_breakdown,
+    peak,
+    precision,
+    processes,
+    rounds,
+    size,
+    study_throughput,
+)
 
 TOL = 1e-12
 
 
 def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
-    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)  # twice four predict to 3e-9
+    # twice four predict to 3e-9
+    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)
     case = cases.load("rssr")
-    found = [each.entry for each in precision.contestants(case, adapters.engine("native").efforts(), TOL)]
-    errors, iterations = [each.errors.position for each in found], [each.iterations for each in found]
+    found = [
+        each.entry for each in precision.contestants(case, adapters.engine("native").efforts(), TOL)
+    ]
+    errors, iterations = (
+        [each.errors.position for each in found],
+        [each.iterations for each in found],
+    )
     assert iterations[0] == 1.0
     assert iterations == sorted(iterations)
     assert errors == sorted(errors, reverse=True)
@@ -30,7 +47,10 @@ def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
 
 def test_levels_give_what_is_asked_and_no_more():
     case = cases.load("rssr")
-    found = {each.entry.setting: each.entry for each in precision.contestants(case, native_breakdown.LEVELS, TOL)}
+    found = {
+        each.entry.setting: each.entry
+        for each in precision.contestants(case, native_breakdown.LEVELS, TOL)
+    }
     assert {each.outcome for each in found.values()} == {Outcome.PASS}
     assert found["every body and point: position"].errors.velocity is None
     assert found[native_breakdown.EVERYTHING].errors.acceleration < 1e-11
@@ -51,7 +71,9 @@ def test_flops_of_a_sample():
     sizes = {name: each["flops"] for name, each in model.sizes.items()}
     once, twice = (native_breakdown.flops_of(model, n) for n in (1.0, 2.0))
     assert twice - once == sizes["newton"]
-    assert once == sum(sizes[name] for name in ("extrapolate", "newton", "outputs", "joined_gaps", "joined"))
+    assert once == sum(
+        sizes[name] for name in ("extrapolate", "newton", "outputs", "joined_gaps", "joined")
+    )
 
 
 def test_the_peak_kernel_does_its_arithmetic():
@@ -78,7 +100,9 @@ def test_a_study_takes_turns_on_one_thread_and_on_two(monkeypatch):
     pytest.importorskip("llvmlite")
     monkeypatch.setattr(study_throughput, "VARIANTS", 512)
     monkeypatch.setattr(study_throughput.os, "cpu_count", lambda: 4)
-    one, two = study_throughput.measure_studies(cases.load("mcpherson_strut"), TOL, 3, peak.prepare())
+    one, two = study_throughput.measure_studies(
+        cases.load("mcpherson_strut"), TOL, 3, peak.prepare()
+    )
     assert (one.jobs, two.jobs, one.unsolved, two.unsolved) == (1, 2, 0, 0)
     assert (one.times.least, one.peak_times.median, one.us_per_sample.rounds) == (1.0, 1.0, 3)
     assert (two.times.rounds, two.peak_times.rounds) == (3, 3)
@@ -109,7 +133,16 @@ def test_chains_are_solved_until_they_take_too_long(monkeypatch):
 def test_growth_is_that_of_the_largest():
     timed = [(1, 1.0), (100, 2.0), (1000, 9.0), (10000, 200.0)]
     sizes = [
-        size.Size(mechanism="", loops=n, bodies=0, engine="", mode="", loop="", message="", us_per_sample=rounds.spread([t]))
+        size.Size(
+            mechanism="",
+            loops=n,
+            bodies=0,
+            engine="",
+            mode="",
+            loop="",
+            message="",
+            us_per_sample=rounds.spread([t]),
+        )
         for n, t in timed
     ]
     assert size.growth(sizes) == pytest.approx((100, 10000, 1.0))
@@ -121,7 +154,12 @@ def test_processes(monkeypatch):
     name = "mcpherson_strut"
     found = processes.measure_processes(cases.load(name), name, [adapters.engine("native")], TOL, 1)
     by_name = {each.what: each for each in found}
-    assert list(by_name) == [processes.NUMPY, processes.EMPTY, processes.CACHED, "kincheck run --engine native"]
+    assert list(by_name) == [
+        processes.NUMPY,
+        processes.EMPTY,
+        processes.CACHED,
+        "kincheck run --engine native",
+    ]
     assert {each.status for each in found} == {0}
     assert by_name[processes.EMPTY].beyond_numpy > 0.0
     assert by_name[processes.NUMPY].beyond_numpy is None

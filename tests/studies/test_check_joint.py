@@ -1,4 +1,6 @@
-"""The check of joint types: sound joints pass, and every kind of mistake is caught by the check that is there for it."""
+"""The check of joint types: sound joints pass, and every kind of mistake is caught by the check
+that is there for it.
+"""
 
 import dataclasses
 import importlib
@@ -24,8 +26,15 @@ from kincheck.core.studies.joint_check.loading import load_joint
 from ..support.fakes import Fake
 from .test_check_joint_mistakes import mistaken
 
-BUILT_IN = sorted(name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck."))
-USERS = {"pin_in_slot": "PinInSlot", "rzeppa": "Rzeppa", "point_on_parabola": "PointOnParabola", "line_no_twist": "LineNoTwist"}
+BUILT_IN = sorted(
+    name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck.")
+)
+USERS = {
+    "pin_in_slot": "PinInSlot",
+    "rzeppa": "Rzeppa",
+    "point_on_parabola": "PointOnParabola",
+    "line_no_twist": "LineNoTwist",
+}
 WITHOUT_EQUIVALENT = ("point_on_parabola", "line_no_twist")
 
 
@@ -44,13 +53,20 @@ def test_joints_of_users_pass(in_folder, module):
     engines = [adapters.engine(name) for name in adapters.ENGINES]
     report = check_joint(load_joint(f"{module}:{USERS[module]}"), engines=engines)
     assert report.passed, report
-    verdicts = {engine.name: report[f"loop: {engine.name}"] for engine in engines if engine.name != "native"}
+    verdicts = {
+        engine.name: report[f"loop: {engine.name}"] for engine in engines if engine.name != "native"
+    }
     if module in WITHOUT_EQUIVALENT:
-        assert all("no equivalent() to solve" in each.message or "not installed" in each.message for each in verdicts.values())
+        assert all(
+            "no equivalent() to solve" in each.message or "not installed" in each.message
+            for each in verdicts.values()
+        )
         assert {each.verdict for each in verdicts.values()} == {Verdict.SKIP}
     else:
         assert report["loop: native, equivalent"].verdict is Verdict.PASS
-        assert all(each.message in ("on the equivalent", "not installed") for each in verdicts.values())
+        assert all(
+            each.message in ("on the equivalent", "not installed") for each in verdicts.values()
+        )
 
 
 def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop():
@@ -61,7 +77,10 @@ def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop
 
     found = check_joint(Revolute, engines=[Fake("loose", answer=answer)])["loop: loose"]
     assert found.verdict is Verdict.FAIL
-    assert "the residual of samples that the engine calls solved is 0.001, tolerance 1e-12" in found.message
+    assert (
+        "the residual of samples that the engine calls solved is 0.001, tolerance 1e-12"
+        in found.message
+    )
 
 
 # Specimens
@@ -94,7 +113,10 @@ def test_no_specimen():
         def primitives(self, i, j):
             return (p.Dot12(),)
 
-    with pytest.raises(KincheckError, match=r"field 'teeth' has no kind; declare it by .* or offer some by a classmethod"):
+    with pytest.raises(
+        KincheckError,
+        match=r"field 'teeth' has no kind; declare it by .* or offer some by a classmethod",
+    ):
         check_joint(Odd)
     with pytest.raises(KincheckError, match="no specimens were offered"):
         check_joint(Revolute, specimens=[])
@@ -108,16 +130,27 @@ def test_an_equivalent_that_fails_is_not_told_as_missing():
     report = check_joint(mistaken(Revolute, equivalent=equivalent), engines=[lame])
     assert report["loop: native, equivalent"].message == "ValueError: no such bodies"
     assert report["loop: lame"].message == "unknown joint; equivalent() fails, see native"
-    assert "there is no equivalent()" in check_joint(mistaken(Revolute), engines=[lame])["loop: lame"].message
+    assert (
+        "there is no equivalent()"
+        in check_joint(mistaken(Revolute), engines=[lame])["loop: lame"].message
+    )
 
 
 def test_a_type_that_is_taken_is_refused_and_the_same_class_may_be_declared_anew():
-    with pytest.raises(MechanismError, match=r"Mine: type = 'revolute' is taken by kincheck.core.joints.revolute.Revolute; give"):
+    with pytest.raises(
+        MechanismError,
+        match=r"Mine: type = 'revolute' is taken by kincheck.core.joints.revolute.Revolute; give",
+    ):
         type("Mine", (Revolute,), {"type": "revolute"})
     assert Joint.registry["revolute"] is Revolute
-    with pytest.raises(MechanismError, match=r"type = 'gear' is taken by kincheck.core.joints.gear.Gear"):
+    with pytest.raises(
+        MechanismError, match=r"type = 'gear' is taken by kincheck.core.joints.gear.Gear"
+    ):
         type("Mine", (Gear,), {"type": "gear"})
-    first, second = (dataclass(frozen=True, slots=True)(type("Mine", (Revolute,), {"type": "mine"})) for _ in range(2))
+    first, second = (
+        dataclass(frozen=True, slots=True)(type("Mine", (Revolute,), {"type": "mine"}))
+        for _ in range(2)
+    )
     assert Joint.registry["mine"] is second is not first
 
 
@@ -158,7 +191,9 @@ steps = 5
 """
 
 
-def test_case_files_name_a_type_that_the_command_line_has_loaded(in_folder, capsys, tmp_path, monkeypatch):
+def test_case_files_name_a_type_that_the_command_line_has_loaded(
+    in_folder, capsys, tmp_path, monkeypatch
+):
     """A Scotch yoke: the block is where the pin's height is, 0.5 sin(turn)."""
     monkeypatch.delitem(Joint.registry, "pin_in_slot", raising=False)
     monkeypatch.delitem(sys.modules, "pin_in_slot", raising=False)
@@ -176,9 +211,16 @@ def test_case_files_name_a_type_that_the_command_line_has_loaded(in_folder, caps
     assert "pin_in_slot" in other.message
     capsys.readouterr()
     assert main(["list", "--joints", *given]) == 0
-    assert re.search(r"^  pin_in_slot +point, axes +4 rows  2 free: slide, turn +Body i has", capsys.readouterr().out, re.MULTILINE)
+    assert re.search(
+        r"^  pin_in_slot +point, axes +4 rows  2 free: slide, turn +Body i has",
+        capsys.readouterr().out,
+        re.MULTILINE,
+    )
     assert main(["explain", str(file), "--joint-type", "pin_in_slot:PinSlot"]) == 2
-    assert capsys.readouterr().err == "kincheck: module 'pin_in_slot' has no class 'PinSlot'; did you mean 'PinInSlot'?\n"
+    assert (
+        capsys.readouterr().err
+        == "kincheck: module 'pin_in_slot' has no class 'PinSlot'; did you mean 'PinInSlot'?\n"
+    )
 
 
 @pytest.mark.parametrize(
@@ -186,10 +228,22 @@ def test_case_files_name_a_type_that_the_command_line_has_loaded(in_folder, caps
     [
         (
             'type = "revolute"',
-            "is taken by kincheck.core.joints.revolute.Revolute; give it another name (own.py, line 2: class Mine(",
+            (
+                "is taken by kincheck.core.joints.revolute.Revolute; give it another name (own.py,"
+                " line 2: class Mine("
+            ),
         ),
-        ('type = "gear"', "own:Mine: the type 'gear' is that of joints that couple two others; give it another"),
-        ("pass", 'own:Mine has no type, the name of joints like it in case files; write type = "..." in the class'),
+        (
+            'type = "gear"',
+            "own:Mine: the type 'gear' is that of joints that couple two others; give it another",
+        ),
+        (
+            "pass",
+            (
+                'own:Mine has no type, the name of joints like it in case files; write type = "..."'
+                " in the class"
+            ),
+        ),
     ],
 )
 def test_a_type_that_no_case_file_can_name_is_refused(monkeypatch, tmp_path, capsys, body, message):
@@ -215,13 +269,18 @@ def test_command(in_folder, capsys):
 
 
 def test_command_tells_of_a_failure(monkeypatch, capsys, tmp_path):
-    text = (Path(__file__).parents[1] / "user_joints" / "pin_in_slot.py").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "user_joints" / "pin_in_slot.py").read_text(
+        encoding="utf-8"
+    )
     text = text.replace('("slide", "turn")', '("slide",)')
     (tmp_path / "faulty_joint.py").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert main(["check-joint", "faulty_joint:PinInSlot"]) == 1
     said = capsys.readouterr().out
-    assert "freedoms: leaves 2, names 1: slide; name each freedom that is left, or add the missing row" in said
+    assert (
+        "freedoms: leaves 2, names 1: slide; name each freedom that is left, or add the missing row"
+        in said
+    )
 
 
 @pytest.mark.parametrize(
@@ -247,7 +306,9 @@ def test_command_that_cannot_do_its_work(in_folder, capsys, where, message):
 
 RAISING = "def f():\n    return 1 / 0\n\nf()\n"
 ENDLESS = "def f():\n    f()\n\nf()\n"
-REFUSED = 'from kincheck.core import Spherical\nball = Spherical("ball", "a", "a", (0.0, 0.0, 0.0))\n'
+REFUSED = (
+    'from kincheck.core import Spherical\nball = Spherical("ball", "a", "a", (0.0, 0.0, 0.0))\n'
+)
 
 
 @pytest.mark.parametrize(
@@ -264,7 +325,9 @@ REFUSED = 'from kincheck.core import Spherical\nball = Spherical("ball", "a", "a
     ],
     ids=["syntax", "indent", "raises", "needs", "needs a name that begins its own", "imports", "recursion", "refused"],
 )  # fmt: skip
-def test_a_module_that_fails_is_one_message_with_its_place(tmp_path, monkeypatch, capsys, text, said):
+def test_a_module_that_fails_is_one_message_with_its_place(
+    tmp_path, monkeypatch, capsys, text, said
+):
     file, too = tmp_path / "broken_joint.py", tmp_path / "broken_too.py"
     file.write_text(text, encoding="utf-8")
     too.write_text("y = 1\nx = (\n", encoding="utf-8")
@@ -290,4 +353,7 @@ def test_a_script_that_ends_is_not_a_joint_that_passed(tmp_path, monkeypatch, ca
     (tmp_path / "ends_at_once.py").write_text("import sys\nsys.exit(0)\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     assert main(["check-joint", "ends_at_once:Joint"]) == 2
-    assert "module 'ends_at_once' ends the process when it is imported (status 0)" in capsys.readouterr().err
+    assert (
+        "module 'ends_at_once' ends the process when it is imported (status 0)"
+        in capsys.readouterr().err
+    )

@@ -5,7 +5,15 @@ import math
 from dataclasses import dataclass
 
 import pytest
-from kincheck.core import ConstantVelocity, InPlane, Revolute, Spherical, Translational, Universal, check_joint
+from kincheck.core import (
+    ConstantVelocity,
+    InPlane,
+    Revolute,
+    Spherical,
+    Translational,
+    Universal,
+    check_joint,
+)
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.joints.base import triad, unit
@@ -20,9 +28,16 @@ def mistaken(base, primitive=None, **changes):
 
     def primitives(self, i, j):
         composed = base.primitives(self, i, j)
-        return [_retyped(each, primitive, changes) if type(each) is primitive else each for each in composed]
+        return [
+            _retyped(each, primitive, changes) if type(each) is primitive else each
+            for each in composed
+        ]
 
-    body = {"type": "mistaken", "primitives": primitives} if primitive else {"type": "mistaken", **changes}
+    body = (
+        {"type": "mistaken", "primitives": primitives}
+        if primitive
+        else {"type": "mistaken", **changes}
+    )
     return dataclass(frozen=True)(type("Mistaken", (base,), body))
 
 
@@ -30,7 +45,10 @@ def _retyped(native, primitive, changes):
     fields = {each.name: getattr(native, each.name) for each in dataclasses.fields(native)}
     methods = {name: change for name, change in changes.items() if name not in fields}
     kind = type(f"Mistaken{primitive.__name__}", (primitive,), methods)
-    return kind(**fields | {name: change(fields[name]) for name, change in changes.items() if name in fields})
+    return kind(
+        **fields
+        | {name: change(fields[name]) for name, change in changes.items() if name in fields}
+    )
 
 
 def negative_gamma(self, i, j, vi, vj):
@@ -152,11 +170,20 @@ MISTAKES = {
     "a row as long as the axis": ("axis lengths", lambda: mistaken(InPlane, primitives=long_row)),
     "a row missing": ("freedoms", lambda: mistaken(Revolute, primitives=missing_row)),
     "a row twice": ("rank", lambda: mistaken(Revolute, primitives=repeated_row)),
-    "a freedom too many": ("freedoms", lambda: mistaken(Universal, freedoms=("rotation i", "rotation j", "slide"))),
+    "a freedom too many": (
+        "freedoms",
+        lambda: mistaken(Universal, freedoms=("rotation i", "rotation j", "slide")),
+    ),
     "rows miscounted": ("freedoms", lambda: mistaken(Universal, rows=property(lambda self: 5))),
     "nu": ("nu", lambda: mistaken(Spherical, p.Spherical, nu=steady)),
-    "sign of a branch test": ("branch tests", lambda: mistaken(Revolute, p.Dot11, branch=negative_branch)),
-    "no branch test": ("spurious branches", lambda: mistaken(ConstantVelocity, p.ConstantVelocity, branch=no_branch)),
+    "sign of a branch test": (
+        "branch tests",
+        lambda: mistaken(Revolute, p.Dot11, branch=negative_branch),
+    ),
+    "no branch test": (
+        "spurious branches",
+        lambda: mistaken(ConstantVelocity, p.ConstantVelocity, branch=no_branch),
+    ),
     "arm of the wrong body": ("rigid motion", lambda: mistaken(Spherical, primitives=wrong_body)),
     "global arms": ("place", lambda: mistaken(Spherical, primitives=global_arm)),
     "not closed at design": ("design", lambda: mistaken(Revolute, primitives=open_at_design)),
@@ -165,7 +192,10 @@ MISTAKES = {
     "not smooth": ("differences", lambda: mistaken(InPlane, p.Dot20, phi=rough)),
     "cancellation": ("round-off", lambda: mistaken(Spherical, p.Spherical, phi=cancelling)),
     "math.sqrt": ("equations", lambda: mistaken(Spherical, primitives=untraceable)),
-    "other coordinates": ("mixed style", lambda: mistaken(Revolute, freedoms=("rotation", "translation"))),
+    "other coordinates": (
+        "mixed style",
+        lambda: mistaken(Revolute, freedoms=("rotation", "translation")),
+    ),
     "loop": ("loop: acceleration", lambda: mistaken(Revolute, p.Dot11, gamma=negative_gamma)),
 }
 
@@ -181,7 +211,10 @@ def test_mistakes_are_caught(mistake):
 
 
 def test_a_joint_without_rows_is_told_what_is_missing():
-    assert "has 0 rows, expected one or more; return its primitives" in check_joint(MISTAKES["no rows"][1]())["equations"].message
+    assert (
+        "has 0 rows, expected one or more; return its primitives"
+        in check_joint(MISTAKES["no rows"][1]())["equations"].message
+    )
 
 
 def test_the_base_of_a_mistake_is_sound():

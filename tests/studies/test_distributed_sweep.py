@@ -1,4 +1,6 @@
-"""Sweeps on a dask.distributed cluster: a real scheduler and two workers on loopback, one of which is lost on the way."""
+"""Sweeps on a dask.distributed cluster: a real scheduler and two workers on loopback, one of which
+is lost on the way.
+"""
 
 import importlib
 import os
@@ -18,10 +20,15 @@ from kincheck.core.studies.tolerance.sweep import sweep_designs
 from ..case.test_vary import vary
 from ..support.fakes import crank
 
-POINTS = {"ball": {"at": "ball", "sigma": 1.0}, "axis": {"at": "joints.lca_pivot.axis", "sigma": 0.1}}
+POINTS = {
+    "ball": {"at": "ball", "sigma": 1.0},
+    "axis": {"at": "joints.lca_pivot.axis", "sigma": 0.1},
+}
 pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
-pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
 
 
 def timeless(results):
@@ -30,7 +37,9 @@ def timeless(results):
 
 
 def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluster, tmp_path):
-    """To the last bit, in whatever order the chunks were solved, and with those of the killed worker solved by the other."""
+    """To the last bit, in whatever order the chunks were solved, and with those of the killed
+    worker solved by the other.
+    """
     case = load("mcpherson_strut")
     variation = vary(tmp_path, case, **POINTS)
     victims = [nanny.pid for nanny in cluster.workers.values()]
@@ -42,7 +51,9 @@ def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluste
             os.kill(victims[0], signal.SIGKILL)
 
     common = {"samples": 40_000, "seed": 5, "order": 1}
-    there = sweep_designs(case, variation, source=on_cluster(cluster.scheduler_address), progress=hear, **common)
+    there = sweep_designs(
+        case, variation, source=on_cluster(cluster.scheduler_address), progress=hear, **common
+    )
     assert victims[0] not in [nanny.pid for nanny in cluster.workers.values()]
     assert seen == [*range(576, 40_000, 576), 40_000]
     assert there.measured["seconds"] > 0
@@ -50,7 +61,8 @@ def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluste
 
 
 def test_a_cluster_that_goes_is_a_message(cluster, tmp_path, monkeypatch):
-    monkeypatch.setattr(ours, "CONNECT", 1.0)  # the time that a client waits for it to come back, too
+    # the time that a client waits for it to come back, too
+    monkeypatch.setattr(ours, "CONNECT", 1.0)
     case = crank()
 
     def hear(progress):
@@ -71,9 +83,13 @@ def test_no_scheduler_is_a_message(tmp_path, monkeypatch):
     monkeypatch.setattr(ours, "ANSWER", 0.25)
     case = crank()
     variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})
-    with pytest.raises(ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"):
+    with pytest.raises(
+        ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"
+    ):
         sweep_designs(case, variation, samples=5, source=on_cluster("tcp://127.0.0.1:1"))
-    monkeypatch.setattr(importlib, "import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
+    monkeypatch.setattr(
+        importlib, "import_module", lambda name: (_ for _ in ()).throw(ImportError(name))
+    )
     with pytest.raises(ClusterError, match=r"pip install 'kincheck\[distributed\]'"):
         sweep_designs(case, variation, samples=5, source=on_cluster("tcp://127.0.0.1:1"))
 
@@ -86,5 +102,8 @@ def test_a_worker_solves_chunks_and_keeps_the_model(tmp_path):
     (kept,) = (ready for ready in chunk_execution._ready.values() if ready.study.samples == 600)
     solve_there(packed, 0, version)
     assert kept in chunk_execution._ready.values()
-    with pytest.raises(ClusterError, match=r"on the cluster's worker, expected 0.0.1 as in the sweep; install the same there"):
+    with pytest.raises(
+        ClusterError,
+        match=r"on the cluster's worker, expected 0.0.1 as in the sweep; install the same there",
+    ):
         solve_there(packed, 0, "0.0.1")

@@ -1,4 +1,6 @@
-"""kincheck doctor: what is missing or broken is named with its remedy, and never taken for sound."""
+"""kincheck doctor: what is missing or broken is named with its remedy, and never taken for
+sound.
+"""
 
 import importlib.metadata
 import json
@@ -39,12 +41,25 @@ def test_a_sound_installation_is_found_able(without_imports, tmp_path, capsys):
     assert "kincheck can do its work" in out
     found = json.loads((tmp_path / "found.json").read_text())
     names = {part["name"] for part in found["parts"]}
-    assert {"numpy", "scipy", "llvmlite", "mujoco", "pin", "exudyn", "python-flint", "distributed", "pyarrow", "chromium"} <= names
+    assert {
+        "numpy",
+        "scipy",
+        "llvmlite",
+        "mujoco",
+        "pin",
+        "exudyn",
+        "python-flint",
+        "distributed",
+        "pyarrow",
+        "chromium",
+    } <= names
     assert found["check"]["error"] < 1e-3 * found["check"]["tolerance"]
     assert found["machine"]["processor"]
 
 
-def test_a_missing_engine_is_no_obstacle_and_its_remedy_is_named(without_imports, monkeypatch, capsys):
+def test_a_missing_engine_is_no_obstacle_and_its_remedy_is_named(
+    without_imports, monkeypatch, capsys
+):
     missing(monkeypatch, "pin")
     assert main(["doctor"]) == 0
     (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("pin "))
@@ -58,7 +73,14 @@ def test_an_llvmlite_that_cannot_be_loaded_leaves_the_work_to_numpy(tmp_path):
         (tmp_path / "llvmlite" / file).write_text(text)
     here = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
     ran = subprocess.run(
-        [sys.executable, "-c", "import sys; from kincheck.core.cli.main import main; sys.exit(main())", "doctor", "--json", "-"],
+        [
+            sys.executable,
+            "-c",
+            "import sys; from kincheck.core.cli.main import main; sys.exit(main())",
+            "doctor",
+            "--json",
+            "-",
+        ],
         env=here,
         capture_output=True,
         text=True,

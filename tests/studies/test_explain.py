@@ -15,12 +15,18 @@ from kincheck.core.studies.explain import explain
 
 def totals(lines):
     """Operations with one iteration, by order."""
-    return [int(re.search(r": (\d+) with one iteration", line)[1]) for line in lines if "iteration" in line]
+    return [
+        int(re.search(r": (\d+) with one iteration", line)[1])
+        for line in lines
+        if "iteration" in line
+    ]
 
 
 def test_the_strut_names_what_is_not_in_its_programs():
     case = cases.load("mcpherson_strut")
-    mechanism = replace(case.mechanism, points=[*case.mechanism.points, Point("unread", "lca", (1.0, 0.5, 0.0))])
+    mechanism = replace(
+        case.mechanism, points=[*case.mechanism.points, Point("unread", "lca", (1.0, 0.5, 0.0))]
+    )
     lines = explain(replace(case, mechanism=mechanism))
     assert lines[0] == "mcpherson_strut: 18 unknowns for lca, knuckle, strut"
     assert "  fixed, in no program: chassis, rack" in lines
@@ -28,7 +34,8 @@ def test_the_strut_names_what_is_not_in_its_programs():
     assert "  points computed: wheel_center; not read by an output, not computed: unread" in lines
     positions, velocities, accelerations = totals(lines)
     assert positions < velocities < accelerations
-    assert totals(explain(case)) == [positions, velocities, accelerations]  # the unread point cost nothing
+    # the unread point cost nothing
+    assert totals(explain(case)) == [positions, velocities, accelerations]
 
 
 def test_redundant_rows_and_held_drivers_are_named():
@@ -58,6 +65,11 @@ def test_joints_between_fixed_bodies_are_named_and_in_no_engine(tmp_path, capsys
     file.write_text(case_text(replace(case, mechanism=bolted)))
     assert load(file).mechanism == bolted
     assert main(["run", str(file), "--explain", "--json", str(tmp_path / "out.json")]) == 0
-    assert "  joints between fixed bodies, which hold at the design: left out: bolt, stay" in capsys.readouterr().out.splitlines()
+    assert (
+        "  joints between fixed bodies, which hold at the design: left out: bolt, stay"
+        in capsys.readouterr().out.splitlines()
+    )
     for record in read_results(tmp_path / "out.json").records:
-        assert record.outcome in (Outcome.PASS, Outcome.UNJUDGED, Outcome.UNAVAILABLE), record.message
+        assert record.outcome in (Outcome.PASS, Outcome.UNJUDGED, Outcome.UNAVAILABLE), (
+            record.message
+        )

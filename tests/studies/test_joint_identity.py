@@ -1,4 +1,6 @@
-"""A run is another one when the code of its joint types is: --resume never puts records of two joints into one run."""
+"""A run is another one when the code of its joint types is: --resume never puts records of two
+joints into one run.
+"""
 
 import shutil
 import subprocess
@@ -17,7 +19,9 @@ HERE = Path(__file__).parents[1]
 def folder(tmp_path):
     shutil.copy(HERE / "user_joints" / "pin_in_slot.py", tmp_path)
     text = (tmp_path / "pin_in_slot.py").read_text()
-    (tmp_path / "pin_in_slot.py").write_text("import beside\n" + text.replace("from __future__ import annotations\n", ""))
+    (tmp_path / "pin_in_slot.py").write_text(
+        "import beside\n" + text.replace("from __future__ import annotations\n", "")
+    )
     (tmp_path / "beside.py").write_text("NUMBER = 1\n")
     (tmp_path / "elsewhere.py").write_text("NUMBER = 1\n")
     (tmp_path / "slot.toml").write_text(SLOT)
@@ -26,8 +30,20 @@ def folder(tmp_path):
 
 def run(folder, *arguments):
     """Run as a user does, in the folder of the module."""
-    command = [sys.executable, "-m", "kincheck", "run", "slot.toml", "--joint-type", "pin_in_slot:PinInSlot", "--engine", "native"]
-    done = subprocess.run([*command, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    command = [
+        sys.executable,
+        "-m",
+        "kincheck",
+        "run",
+        "slot.toml",
+        "--joint-type",
+        "pin_in_slot:PinInSlot",
+        "--engine",
+        "native",
+    ]
+    done = subprocess.run(
+        [*command, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     return done.stderr
 
@@ -43,7 +59,8 @@ def killed(folder):
 
 
 @pytest.mark.parametrize(
-    ("edited", "same"), [(None, True), ("pin_in_slot.py", False), ("beside.py", False), ("elsewhere.py", True)]
+    ("edited", "same"),
+    [(None, True), ("pin_in_slot.py", False), ("beside.py", False), ("elsewhere.py", True)],
 )
 def test_an_edit_of_the_joints_code_makes_another_run(folder, edited, same):
     run(folder, "--history", "h.sqlite")

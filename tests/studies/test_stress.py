@@ -30,7 +30,9 @@ FAMILIES = Family.registry
 @pytest.fixture(scope="module")
 def case():
     rng = np.random.default_rng(8)
-    return as_case(four_bar(any_plane(rng), *crank_rocker(rng), "rod"), "turn", np.linspace(-1.0, 1.0, 5))
+    return as_case(
+        four_bar(any_plane(rng), *crank_rocker(rng), "rod"), "turn", np.linspace(-1.0, 1.0, 5)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +66,9 @@ class Fake:
 
 
 def judge(case, truth, engine, **about):
-    return judged(Specimen("one", lambda: case, **about), case, truth, once(Pair(case, engine, 1e-12)))
+    return judged(
+        Specimen("one", lambda: case, **about), case, truth, once(Pair(case, engine, 1e-12))
+    )
 
 
 def moved(by, quantity="position", samples=slice(None)):
@@ -85,7 +89,9 @@ def test_a_right_answer_is_right(case, truth):
     assert all(0.0 < ratio < 0.1 for ratio in found.worst)
 
 
-@pytest.mark.parametrize(("quantity", "by"), [("position", 1e-12), ("velocity", 1e-10), ("acceleration", 1e-9)])
+@pytest.mark.parametrize(
+    ("quantity", "by"), [("position", 1e-12), ("velocity", 1e-10), ("acceleration", 1e-9)]
+)
 def test_an_error_beyond_round_off_is_silently_wrong(case, truth, quantity, by):
     found = judge(case, truth, Fake(moved(by, quantity, slice(1, 3))))
     assert list(found.verdicts == Verdict.SILENTLY_WRONG) == [False, True, True, False, False]
@@ -120,7 +126,12 @@ def test_what_the_truth_does_not_know_is_not_judged(case, truth):
         (True, "cannot be followed beyond turn = 0: dead centre", {}, 2),
         (True, "Newton gave up", {}, 0),  # which names no cause
         (False, "the tolerance is below round-off", {"reasons": "round-off", "excused": True}, 2),
-        (False, "the tolerance is below round-off", {"reasons": "round-off"}, 0),  # it can be solved, and is no excuse
+        (
+            False,
+            "the tolerance is below round-off",
+            {"reasons": "round-off"},
+            0,
+        ),  # it can be solved, and is no excuse
         (False, "it rains", {"reasons": "round-off", "excused": True}, 0),
     ],
 )
@@ -133,19 +144,33 @@ def test_a_refusal_is_as_right_as_its_reason(case, truth, singular, message, abo
 
 
 def test_errors_are_refusals_and_crashes_are_never_right(case):
-    assert judge(case, None, Fake(fails=SolveError("a body is free")), reasons="free").counts[Verdict.REFUSED_RIGHTLY] == 5
+    assert (
+        judge(case, None, Fake(fails=SolveError("a body is free")), reasons="free").counts[
+            Verdict.REFUSED_RIGHTLY
+        ]
+        == 5
+    )
     one = Specimen("one", lambda: case, None, reasons="free")
-    for outcome, verdict in ((Outcome.CRASHED, Verdict.REFUSED_WRONGLY), (Outcome.UNSUPPORTED, Verdict.UNSUPPORTED)):
+    for outcome, verdict in (
+        (Outcome.CRASHED, Verdict.REFUSED_WRONGLY),
+        (Outcome.UNSUPPORTED, Verdict.UNSUPPORTED),
+    ):
         assert judged(one, case, None, Failure(outcome, "free")).counts[verdict] == 5
     assert described_wrong(one, 3, "free").counts[Verdict.REFUSED_RIGHTLY] == 3
     assert described_wrong(one, 3, "odd").counts[Verdict.REFUSED_WRONGLY] == 3
-    assert described_wrong(Specimen("one", lambda: case), 3, "free").counts[Verdict.REFUSED_WRONGLY] == 3
+    assert (
+        described_wrong(Specimen("one", lambda: case), 3, "free").counts[Verdict.REFUSED_WRONGLY]
+        == 3
+    )
 
 
 def test_a_contradiction_must_be_told(case, truth):
     answer = once(Pair(case, NATIVE, 1e-12))
     assert isinstance(answer, Answer)
-    one, violated = Specimen("one", lambda: case, reported=True), replace(truth, violated=np.array([0.0, 1e-10, 0.0, 0.0, 0.0]))
+    one, violated = (
+        Specimen("one", lambda: case, reported=True),
+        replace(truth, violated=np.array([0.0, 1e-10, 0.0, 0.0, 0.0])),
+    )
     told = replace(answer, details={"redundant_residual": 5e-11})
     assert judged(one, case, violated, answer).counts[Verdict.SILENTLY_WRONG] == 1
     assert judged(one, case, violated, told).counts[Verdict.SILENTLY_WRONG] == 0
@@ -155,7 +180,9 @@ def test_a_contradiction_must_be_told(case, truth):
 
 
 def test_a_small_loop_hides_no_corner_of_the_large_one():
-    """A corner that is turned round between two samples; stepped over where one sigma is asked for all blocks of the rows."""
+    """A corner that is turned round between two samples; stepped over where one sigma is asked for
+    all blocks of the rows.
+    """
     rng = np.random.default_rng(164)
     samples = int(rng.choice([2, 3, 4, 5, 7]))
     made = FAMILIES["corners"].specimen(rng, samples)
@@ -169,7 +196,9 @@ def test_a_small_loop_hides_no_corner_of_the_large_one():
 def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
     """The same numbers for the same seed; and a case file says all of them."""
     for number in range(3):
-        one, again = (FAMILIES[name].specimen(np.random.default_rng([4, number]), 6) for _ in range(2))
+        one, again = (
+            FAMILIES[name].specimen(np.random.default_rng([4, number]), 6) for _ in range(2)
+        )
         assert one.name == again.name
         try:
             case = one.describe()
@@ -180,7 +209,11 @@ def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
         file = tmp_path / f"{number}.toml"
         file.write_text(case_text(case, ["a comment"]), encoding="utf-8")
         read = load_case(file)
-        assert (read.mechanism, read.outputs, read.sweep.motions) == (case.mechanism, case.outputs, case.sweep.motions)
+        assert (read.mechanism, read.outputs, read.sweep.motions) == (
+            case.mechanism,
+            case.outputs,
+            case.sweep.motions,
+        )
         assert (read.sweep.values == case.sweep.values).all()
         assert read.sweep.rate == case.sweep.rate
 
@@ -189,8 +222,12 @@ def test_no_family_is_silently_wrong_in_the_native_engine():
     """All families; the share of each in a run of two thousand samples."""
     found, _ = stress([*FAMILIES.values()], [NATIVE], samples=2000, seed=0)
     assert [cell.family for cell in found.cells] == [*FAMILIES]
-    assert {cell.family: cell.samples[Verdict.SILENTLY_WRONG] for cell in found.cells} == {cell.family: 0 for cell in found.cells}
-    assert {cell.family: cell.samples[Verdict.UNSUPPORTED] for cell in found.cells} == {cell.family: 0 for cell in found.cells}
+    assert {cell.family: cell.samples[Verdict.SILENTLY_WRONG] for cell in found.cells} == {
+        cell.family: 0 for cell in found.cells
+    }
+    assert {cell.family: cell.samples[Verdict.UNSUPPORTED] for cell in found.cells} == {
+        cell.family: 0 for cell in found.cells
+    }
     assert sum(sum(cell.samples.values()) for cell in found.cells) > 1800
     assert all(proof.proved == proof.tried and proof.worst < 1e-2 for proof in found.proofs)
     accepted = [each for each in found.acceptances if each.accepted]
@@ -204,18 +241,30 @@ def test_errors_do_not_grow_over_a_thousand_turns():
     assert made.truth is not None
     answer = once(Pair(made.case, NATIVE, 1e-12))
     assert isinstance(answer, Answer)
-    error = np.abs(answer.outputs["C.x"].position - made.truth.points["C"][0][:, 0]) / made.truth.bounds["C"][0]
+    error = (
+        np.abs(answer.outputs["C.x"].position - made.truth.points["C"][0][:, 0])
+        / made.truth.bounds["C"][0]
+    )
     first, last = float(error[:400].max()), float(error[-400:].max())  # a hundred turns each
     assert 0.0 < last < 2.0 * first < 0.1
 
 
 def test_nothing_nearly_singular_is_silently_wrong_without_machine_code():
-    found, _ = stress([FAMILIES["singular"]], [Interpreted(NATIVE)], samples=150, seed=0, prove=False)
+    found, _ = stress(
+        [FAMILIES["singular"]], [Interpreted(NATIVE)], samples=150, seed=0, prove=False
+    )
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
 @pytest.mark.parametrize(
-    "name", ["four_bar_in_one_step", "kite", "loop_of_four_bodies", "loop_of_eight_bodies", "platform_nearly_singular"]
+    "name",
+    [
+        "four_bar_in_one_step",
+        "kite",
+        "loop_of_four_bodies",
+        "loop_of_eight_bodies",
+        "platform_nearly_singular",
+    ],
 )
 def test_what_was_silently_wrong_is_so_no_longer(name):
     """The smallest mechanisms found so far, a sample each."""
@@ -229,12 +278,22 @@ def test_what_was_silently_wrong_is_so_no_longer(name):
 def test_a_bad_case_is_made_small():
     """Bad is whatever has a crank longer than 0.1 m that is turned by more than 0.3 rad."""
     rng = np.random.default_rng(8)
-    case = as_case(four_bar(any_plane(rng), *crank_rocker(rng), "revolutes"), "turn", np.linspace(-1.0, 1.0, 41))
+    case = as_case(
+        four_bar(any_plane(rng), *crank_rocker(rng), "revolutes"),
+        "turn",
+        np.linspace(-1.0, 1.0, 41),
+    )
 
     def bad(case):
         pivot = case.mechanism.joint("pivot").point
-        pins = [joint for joint in case.mechanism.joints if "crank" in joint.bodies and joint.name != "pivot"]
-        long = any(np.linalg.norm(np.subtract(getattr(pin, "point", pivot), pivot)) > 0.1 for pin in pins)
+        pins = [
+            joint
+            for joint in case.mechanism.joints
+            if "crank" in joint.bodies and joint.name != "pivot"
+        ]
+        long = any(
+            np.linalg.norm(np.subtract(getattr(pin, "point", pivot), pivot)) > 0.1 for pin in pins
+        )
         return long and np.abs(case.sweep.values).max() > 0.3
 
     few = fewer_samples(case, 3, bad)
@@ -269,7 +328,9 @@ def test_a_family_that_cannot_be_run_costs_no_other(monkeypatch):
         raise KincheckError("cannot be made")
 
     monkeypatch.setattr(FAMILIES["units"], "specimen", defective, raising=False)
-    found, _ = stress([FAMILIES["units"], FAMILIES["offset"]], [NATIVE], samples=20, seed=0, prove=False)
+    found, _ = stress(
+        [FAMILIES["units"], FAMILIES["offset"]], [NATIVE], samples=20, seed=0, prove=False
+    )
     assert found.unfinished == {"units": "cannot be made"}
     assert [cell.family for cell in found.cells] == ["offset"]
 

@@ -27,7 +27,9 @@ class Shifted(Native):
     def build(self, case):
         found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
         far = (np.abs(case.sweep.change) > 2.0)[:, None]
-        points = {name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()}
+        points = {
+            name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()
+        }
         return replace(found, points=points)
 
     def solve(self, model, case, tol):
@@ -37,12 +39,27 @@ class Shifted(Native):
 @pytest.fixture
 def shifted(monkeypatch):
     monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": Shifted())
-    monkeypatch.setattr("kincheck.core.studies.stress.run.suited", lambda engine, case, number: engine)
+    monkeypatch.setattr(
+        "kincheck.core.studies.stress.run.suited", lambda engine, case, number: engine
+    )
 
 
 def test_a_run_writes_tables_and_data(tmp_path, capsys):
     assert (
-        main.main(["stress", "--family", "units", "degenerate", "--samples", "40", "--out", str(tmp_path / "new"), "--json", "-"])
+        main.main(
+            [
+                "stress",
+                "--family",
+                "units",
+                "degenerate",
+                "--samples",
+                "40",
+                "--out",
+                str(tmp_path / "new"),
+                "--json",
+                "-",
+            ]
+        )
         == 0
     )
     out, err = capsys.readouterr()
@@ -52,13 +69,33 @@ def test_a_run_writes_tables_and_data(tmp_path, capsys):
     assert sum(found["cells"][0]["samples"].values()) >= 20
     assert found["findings"] == []
     assert "None of" in err
-    assert {file.name for file in (tmp_path / "new").iterdir()} == {"stress.json", "stress.html", "stress.md"}
-    assert "| units | native projection |" in (tmp_path / "new" / "stress.md").read_text(encoding="utf-8")
+    assert {file.name for file in (tmp_path / "new").iterdir()} == {
+        "stress.json",
+        "stress.html",
+        "stress.md",
+    }
+    assert "| units | native projection |" in (tmp_path / "new" / "stress.md").read_text(
+        encoding="utf-8"
+    )
     assert "silently wrong" in (tmp_path / "new" / "stress.html").read_text(encoding="utf-8")
 
 
 def test_what_is_silently_wrong_is_reduced_saved_and_replayed(tmp_path, capsys, shifted):
-    assert main.main(["stress", "--family", "units", "--samples", "30", "--out", str(tmp_path), "--no-proofs"]) == 1
+    assert (
+        main.main(
+            [
+                "stress",
+                "--family",
+                "units",
+                "--samples",
+                "30",
+                "--out",
+                str(tmp_path),
+                "--no-proofs",
+            ]
+        )
+        == 1
+    )
     capsys.readouterr()
     (file,) = tmp_path.glob("*.toml")
     (finding,) = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))["findings"]
@@ -78,7 +115,10 @@ def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("engine", "why"),
     [
-        (Fake("native", refusal="no joint of that kind"), "choose other families or another engine"),
+        (
+            Fake("native", refusal="no joint of that kind"),
+            "choose other families or another engine",
+        ),
         (Fake("native", installed=None, refusal="not there"), "it is not installed"),
     ],
     ids=["unable", "missing"],
@@ -89,7 +129,10 @@ def test_an_engine_that_supports_nothing_is_not_praised(tmp_path, capsys, monkey
     out, err = capsys.readouterr()
     count = re.search(r"^No sample was examined, (\d+) unsupported$", out, re.MULTILINE)
     assert count, out
-    assert f"kincheck: native projection: no sample was examined, {count[1]} unsupported: {why}\n" in err
+    assert (
+        f"kincheck: native projection: no sample was examined, {count[1]} unsupported: {why}\n"
+        in err
+    )
     file = tmp_path / "rssr.toml"
     file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
     assert main.main(["stress", "--replay", str(file)]) == 2
@@ -99,8 +142,20 @@ def test_an_engine_that_supports_nothing_is_not_praised(tmp_path, capsys, monkey
 
 
 def test_samples_without_a_verdict_are_counted_apart():
-    samples = {"right": 5, "refused, right reason": 2, "refused, wrong reason": 0, "silently wrong": 0}
-    cell = {"engine": "one", "mode": "projection", "version": "1", "settings": {}, "worst": [None] * 3, "seconds": 0.0}
+    samples = {
+        "right": 5,
+        "refused, right reason": 2,
+        "refused, wrong reason": 0,
+        "silently wrong": 0,
+    }
+    cell = {
+        "engine": "one",
+        "mode": "projection",
+        "version": "1",
+        "settings": {},
+        "worst": [None] * 3,
+        "seconds": 0.0,
+    }
     cell |= {"family": "arms", "specimens": 1, "elsewhere": 0, "bad": 0}
     found = Cell(samples=samples | {"not judged": 3, "unsupported": 4}, **cell)
     assert headline([found]) == "None of 7 samples silently wrong, 3 not judged, 4 unsupported"
@@ -133,9 +188,24 @@ def test_families_are_listed_with_their_sizes(capsys):
 def test_text_of_files_is_no_markup():
     """Names and messages come from files and simulators."""
     evil = "<script>|*x*`"
-    cell = {"engine": evil, "mode": "projection", "version": "1", "settings": {}, "worst": [None] * 3, "seconds": 0.0}
+    cell = {
+        "engine": evil,
+        "mode": "projection",
+        "version": "1",
+        "settings": {},
+        "worst": [None] * 3,
+        "seconds": 0.0,
+    }
     counts = dict.fromkeys(
-        ["right", "refused, right reason", "refused, wrong reason", "silently wrong", "not judged", "unsupported"], 1
+        [
+            "right",
+            "refused, right reason",
+            "refused, wrong reason",
+            "silently wrong",
+            "not judged",
+            "unsupported",
+        ],
+        1,
     )
     found = Stress(
         kincheck="1",
@@ -177,11 +247,22 @@ def same_after_writing(case, folder):
     file = folder / "case.toml"
     file.write_text(case_text(case, ["what it is", "and why"]), encoding="utf-8")
     read = load_case(file)
-    assert (read.name, read.source, read.mechanism, read.outputs) == (case.name, case.source, case.mechanism, case.outputs)
+    assert (read.name, read.source, read.mechanism, read.outputs) == (
+        case.name,
+        case.source,
+        case.mechanism,
+        case.outputs,
+    )
     assert read.sweep.motions == case.sweep.motions
-    assert (read.sweep.driver, read.sweep.rate, read.sweep.design) == (case.sweep.driver, case.sweep.rate, case.sweep.design)
+    assert (read.sweep.driver, read.sweep.rate, read.sweep.design) == (
+        case.sweep.driver,
+        case.sweep.rate,
+        case.sweep.design,
+    )
     # a grid in degrees is even but for its last places
-    assert np.abs(read.sweep.values - case.sweep.values).max() <= 4 * np.spacing(np.abs(case.sweep.values).max())
+    assert np.abs(read.sweep.values - case.sweep.values).max() <= 4 * np.spacing(
+        np.abs(case.sweep.values).max()
+    )
 
 
 def test_what_a_case_file_cannot_say_is_named():
@@ -196,9 +277,16 @@ def test_what_a_case_file_cannot_say_is_named():
 def test_names_that_need_quotes_get_them(tmp_path):
     case = next(case for case in probes() if case.name == "revolute")
     odd = 'ti "p"\\1'
-    points = [replace(point, name=odd) if point.name == "tip_1" else point for point in case.mechanism.points]
-    outputs = tuple(replace(each, point=odd) if each.point == "tip_1" else each for each in case.outputs)
-    same_after_writing(replace(case, mechanism=replace(case.mechanism, points=points), outputs=outputs), tmp_path)
+    points = [
+        replace(point, name=odd) if point.name == "tip_1" else point
+        for point in case.mechanism.points
+    ]
+    outputs = tuple(
+        replace(each, point=odd) if each.point == "tip_1" else each for each in case.outputs
+    )
+    same_after_writing(
+        replace(case, mechanism=replace(case.mechanism, points=points), outputs=outputs), tmp_path
+    )
 
 
 def test_what_is_replayed_is_only_printed(tmp_path, capsys):

@@ -1,4 +1,6 @@
-"""The truth of the stress run: conditions in extended precision, the motion followed from the design, proofs of it."""
+"""The truth of the stress run: conditions in extended precision, the motion followed from the
+design, proofs of it.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -26,7 +28,13 @@ from kincheck.core.studies.stress.truth.conditions import NotStatedError, condit
 from kincheck.core.studies.stress.truth.evaluation import Evaluator, Poses
 from kincheck.core.studies.stress.truth.long_double import extended
 from kincheck.core.studies.stress.truth.proofs import distance_from_proof
-from kincheck.core.studies.stress.truth.reference_motion import ROUND_OFF, DefectError, Reach, closed, followed
+from kincheck.core.studies.stress.truth.reference_motion import (
+    ROUND_OFF,
+    DefectError,
+    Reach,
+    closed,
+    followed,
+)
 
 PROBES = {case.name: case for case in probes()}
 CRANK, ROD = 0.3, 1.0
@@ -36,7 +44,8 @@ def worst(truth, positions):
     """The largest error of positions over what is round-off, where the truth is known."""
     known = truth.reach == Reach.REACHED
     errors = [
-        np.abs(positions[name] - x)[known].max(axis=1) / truth.bounds[name][0, known] for name, (x, _, _) in truth.points.items()
+        np.abs(positions[name] - x)[known].max(axis=1) / truth.bounds[name][0, known]
+        for name, (x, _, _) in truth.points.items()
     ]
     return max(float(each.max()) for each in errors)
 
@@ -53,9 +62,15 @@ def test_the_jacobian_and_what_is_beyond_it_are_derivatives(name, poses):
     case = PROBES[name]
     rows = Evaluator(conditions(case.mechanism))
     bodies, rng, h = rows.bodies, np.random.default_rng(5), 1e-5
-    at = poses if bodies == 2 else Poses.design(bodies, 1).moved(extended(rng.normal(size=(bodies, 6, 1))))
+    at = (
+        poses
+        if bodies == 2
+        else Poses.design(bodies, 1).moved(extended(rng.normal(size=(bodies, 6, 1))))
+    )
     rates, near = extended(rng.normal(size=(bodies, 6, 1))), rows.angles(at)
-    before, here, after = (rows.residual(at.moved(s * h * rates), extended(np.zeros((1, 1))), near) for s in (-1, 0, 1))
+    before, here, after = (
+        rows.residual(at.moved(s * h * rates), extended(np.zeros((1, 1))), near) for s in (-1, 0, 1)
+    )
     first, second = (after - before) / (2 * h), (after - 2 * here + before) / h**2
     # an angle's derivatives are those on the joint's own conditions, which these bodies are not
     others = np.setdiff1d(np.arange(len(second)), [term.row for term in rows.stated.turns])
@@ -65,7 +80,9 @@ def test_the_jacobian_and_what_is_beyond_it_are_derivatives(name, poses):
 
 @pytest.mark.parametrize("name", PROBES)
 def test_every_joint_type_moves_as_in_the_native_solver(name):
-    """That one is held to the paper's equations elsewhere; here it is the other way round: the same motion from other equations."""
+    """That one is held to the paper's equations elsewhere; here it is the other way round: the same
+    motion from other equations.
+    """
     case = PROBES[name]
     found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
     truth = followed(case)
@@ -73,9 +90,22 @@ def test_every_joint_type_moves_as_in_the_native_solver(name):
     assert worst(truth, {name: motion.position for name, motion in found.points.items()}) < 1.0
 
 
-@pytest.mark.parametrize("name", ["four_bar", "rssr", "rssr_other_branch", "hooke_joint", "stewart_platform", "bricard", "bennett"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "four_bar",
+        "rssr",
+        "rssr_other_branch",
+        "hooke_joint",
+        "stewart_platform",
+        "bricard",
+        "bennett",
+    ],
+)
 def test_the_motion_followed_is_the_closed_form(name):
-    """Position, velocity and acceleration, of mechanisms whose closed forms are in the case library."""
+    """Position, velocity and acceleration, of mechanisms whose closed forms are in the case
+    library.
+    """
     case = cases.load(name)
     truth = followed(case)
     assert (truth.reach == Reach.REACHED).all()
@@ -97,7 +127,10 @@ def test_a_joint_type_that_it_does_not_know_is_named():
 
     try:
         case = PROBES["spherical"]
-        joints = [Odd(j.name, j.i, j.j, j.point) if j.type == "spherical" else j for j in case.mechanism.joints]
+        joints = [
+            Odd(j.name, j.i, j.j, j.point) if j.type == "spherical" else j
+            for j in case.mechanism.joints
+        ]
         with pytest.raises(NotStatedError, match="odd"):
             conditions(replace(case.mechanism, joints=joints))
     finally:
@@ -118,18 +151,25 @@ def parallelogram(off, samples=9):
     c = at + along * d + np.sqrt(1.0 / e - along**2) * np.array([-d[1], d[0]])
     plane = any_plane(np.random.default_rng(1))
     points = b, (1.0, 0.0), (float(c[0]), float(c[1]))
-    return as_case(four_bar(plane, *points, "rod"), "turn", np.linspace(-3.0, 3.0, samples)), four_bar_motion(plane, *points)
+    return as_case(
+        four_bar(plane, *points, "rod"), "turn", np.linspace(-3.0, 3.0, samples)
+    ), four_bar_motion(plane, *points)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("ratio", [1.0, 1e-3])
 def test_two_loops_on_one_crank_move_as_followed(ratio, seed):
-    """The second with points of its own, of any size beside the first; its closed form is that of both."""
+    """The second with points of its own, of any size beside the first; its closed form is that of
+    both.
+    """
     rng = np.random.default_rng(seed)
     plane, first, second = any_plane(rng), crank_rocker(rng), crank_rocker(rng, ratio)
     mechanism = beside(four_bar(plane, *first), plane, *second, "rod", "second ")
     case = as_case(mechanism, "turn", np.linspace(-3.0, 3.0, 7))
-    truth = closed(case, beside_motion(four_bar_motion(plane, *first), four_bar_motion(plane, *second), "second "))
+    truth = closed(
+        case,
+        beside_motion(four_bar_motion(plane, *first), four_bar_motion(plane, *second), "second "),
+    )
     assert (truth.reach == Reach.REACHED).all()
     assert {"C", "second C"} < {*truth.points}
     assert worst(truth, {name: x for name, (x, _, _) in followed(case).points.items()}) < 1.0
@@ -137,13 +177,16 @@ def test_two_loops_on_one_crank_move_as_followed(ratio, seed):
 
 @pytest.mark.parametrize("off", [1e-9, 1e-6, 1e-3])
 def test_a_gap_narrower_than_the_grid_is_not_jumped(off):
-    """The sweep has nine samples; what is nearly a change point turns the motion round within the root of off."""
+    """The sweep has nine samples; what is nearly a change point turns the motion round within the
+    root of off.
+    """
     case, motion = parallelogram(off)
     truth, known = followed(case), closed(case, motion)
     assert (truth.reach == Reach.REACHED).all()
     assert worst(truth, {name: x for name, (x, _, _) in known.points.items()}) < 1.0
     x = known.points["C"][0] - known.points["B"][0]
-    assert min(np.abs(x[end] - x[4]).max() for end in (0, -1)) > 0.1  # at both ends it is no parallelogram any more
+    # at both ends it is no parallelogram any more
+    assert min(np.abs(x[end] - x[4]).max() for end in (0, -1)) > 0.1
 
 
 @pytest.mark.parametrize("off", [-1e-9, -1e-6, -1e-3])
@@ -179,14 +222,23 @@ def test_an_engine_may_give_up_behind_what_is_singular_to_rounding_only(off, tol
 
 def test_what_is_round_off_grows_with_size_and_condition():
     near, far = (parallelogram(off, samples=2)[0] for off in (1e-1, 1e-3))
-    bounds = [followed(replace(case, sweep=replace(case.sweep, values=np.array([-1.2])))).bounds["C"][0, 0] for case in (near, far)]
+    bounds = [
+        followed(replace(case, sweep=replace(case.sweep, values=np.array([-1.2])))).bounds["C"][
+            0, 0
+        ]
+        for case in (near, far)
+    ]
     assert ROUND_OFF < bounds[0] < 0.3 * bounds[1] < 1e-10
 
 
 def test_a_closed_form_that_is_wrong_is_a_defect_of_ours():
     case, motion = parallelogram(1e-3)
     wrong = replace(
-        case.mechanism, joints=[replace(j, length=1.0 + 1e-9) if j.type == "distance" else j for j in case.mechanism.joints]
+        case.mechanism,
+        joints=[
+            replace(j, length=1.0 + 1e-9) if j.type == "distance" else j
+            for j in case.mechanism.joints
+        ],
     )
     with pytest.raises(DefectError, match="correct the family"):
         closed(replace(case, mechanism=wrong), motion)
@@ -194,7 +246,9 @@ def test_a_closed_form_that_is_wrong_is_a_defect_of_ours():
 
 @pytest.mark.parametrize("name", ["rssr", "spatial_slider_crank", "gear", "rack_pinion", "screw"])
 def test_the_truth_is_proved(name):
-    """Krawczyk's test, about the equations of the engine: the two sets of equations have the same solution, to 19 digits."""
+    """Krawczyk's test, about the equations of the engine: the two sets of equations have the same
+    solution, to 19 digits.
+    """
     case = PROBES.get(name) or cases.load(name)
     truth = followed(case)
     assert distance_from_proof(truth, 3) < 1e-2
@@ -203,7 +257,9 @@ def test_the_truth_is_proved(name):
 
 
 def test_a_proof_is_about_rows_that_are_good_at_the_sample():
-    """The Bennett loop after a quarter turn, where those chosen at the design depend on each other."""
+    """The Bennett loop after a quarter turn, where those chosen at the design depend on each
+    other.
+    """
     case = cases.load("bennett")
     truth = followed(replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 45.0, 90.0]))))
     assert distance_from_proof(truth, 2) < 1e-2
@@ -211,7 +267,9 @@ def test_a_proof_is_about_rows_that_are_good_at_the_sample():
 
 @pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
 def test_what_is_no_mechanism_is_refused_by_its_reason(make, reasons):
-    """The reasons are searched for in messages: one that is worded anew is to be worded anew here too."""
+    """The reasons are searched for in messages: one that is worded anew is to be worded anew here
+    too.
+    """
 
     def solved():
         mechanism = make(np.random.default_rng(7))

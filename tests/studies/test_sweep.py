@@ -1,11 +1,23 @@
-"""Marching over a sweep: grids of all kinds, closed forms over several turns, the ends of travel."""
+"""Marching over a sweep: grids of all kinds, closed forms over several turns, the ends of
+travel.
+"""
 
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Distance, JointDisplacement, Mechanism, Point, PointCoordinate, Revolute, Spherical, Translational
+from kincheck.core import (
+    Body,
+    Distance,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    Revolute,
+    Spherical,
+    Translational,
+)
 from kincheck.core.kinematics.by_components.block_solver import Cascade
 from kincheck.core.kinematics.by_components.sweep import CascadeSweep
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
@@ -16,7 +28,15 @@ from kincheck.core.kinematics.solve import solve
 from kincheck.core.kinematics.sparse.sweep import solve_sparse
 from kincheck.core.mechanism.motions import Path, Ramp
 
-from ..support.mechanisms import CRANK, ROD, four_bar, four_bar_motion, mcpherson, slider_crank, slider_crank_motion
+from ..support.mechanisms import (
+    CRANK,
+    ROD,
+    four_bar,
+    four_bar_motion,
+    mcpherson,
+    slider_crank,
+    slider_crank_motion,
+)
 
 STROKES = np.linspace(-0.08, 0.08, 33)
 
@@ -41,7 +61,15 @@ def test_order_of_the_samples_does_not_matter():
 
 @pytest.mark.parametrize(
     "values",
-    [[0.0], [0.05], [-0.08], [0.05, 0.08], [-0.08, -0.03], [0.08, -0.08], [0.02, 0.02, -0.02, 0.02]],
+    [
+        [0.0],
+        [0.05],
+        [-0.08],
+        [0.05, 0.08],
+        [-0.08, -0.03],
+        [0.08, -0.08],
+        [0.02, 0.02, -0.02, 0.02],
+    ],
     ids=str,
 )
 def test_few_samples(values):
@@ -91,7 +119,8 @@ def test_slider_crank(angles, rate):
 
 def test_several_turns_come_back_to_the_design():
     found = solve(slider_crank(), "turn", 2.0 * np.pi * np.arange(-20, 21), bodies=["crank"])
-    assert np.abs(found.points["end"].position[:, 0] - (CRANK + ROD)).max() <= 1e-14  # the angle itself rounds at 126 rad
+    # the angle itself rounds at 126 rad
+    assert np.abs(found.points["end"].position[:, 0] - (CRANK + ROD)).max() <= 1e-14
     sign = found.bodies["crank"].p[:, 0]  # Euler parameters know odd from even turns
     assert sign == pytest.approx((-1.0) ** np.arange(-20, 21), abs=1e-14)
 
@@ -145,7 +174,10 @@ def test_a_relative_angle_between_moving_bodies():
             Revolute("elbow", "lower", "upper", (1.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
         ],
         [Point("hand", "lower", (2.0, 0.0, 0.0))],
-        [replace(slider_crank().driver("turn"), name=name, joint=name) for name in ("shoulder", "elbow")],
+        [
+            replace(slider_crank().driver("turn"), name=name, joint=name)
+            for name in ("shoulder", "elbow")
+        ],
     )
     angles = np.linspace(-5.0, 5.0, 21)
     for driver, expected in (
@@ -160,10 +192,19 @@ def test_an_open_chain():
     """Three links in line, without a loop: the middle hinge swept, the others held."""
     links = [Body(f"link {k}") for k in range(3)]
     hinges = [
-        Revolute(f"hinge {k}", "ground" if k == 0 else f"link {k - 1}", f"link {k}", (float(k), 0.0, 0.0), (0.0, 1.0, 0.0))
+        Revolute(
+            f"hinge {k}",
+            "ground" if k == 0 else f"link {k - 1}",
+            f"link {k}",
+            (float(k), 0.0, 0.0),
+            (0.0, 1.0, 0.0),
+        )
         for k in range(3)
     ]
-    held = [replace(slider_crank().driver("turn"), name=f"turn {k}", joint=f"hinge {k}") for k in range(3)]
+    held = [
+        replace(slider_crank().driver("turn"), name=f"turn {k}", joint=f"hinge {k}")
+        for k in range(3)
+    ]
     m = Mechanism("chain", links, hinges, [Point("tip", "link 2", (3.0, 0.0, 0.0))], held)
     angles = np.linspace(-3.0, 3.0, 13)
     tip = solve(m, "turn 1", angles).points["tip"]
@@ -173,7 +214,9 @@ def test_an_open_chain():
 
 
 def test_an_arm_on_a_ball_and_two_rods():
-    """No joint with an axis: the arm swings about the line through the ball and where the rods meet, driven at its tip."""
+    """No joint with an axis: the arm swings about the line through the ball and where the rods
+    meet, driven at its tip.
+    """
     m = Mechanism(
         "fork",
         [Body("arm")],
@@ -210,19 +253,26 @@ def test_a_step_of_many_turns_is_gone_part_by_part_or_refused_as_what_it_is(way,
     if way == "components":
         found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
     else:
-        found = solve_sparse(m, path, ("end",)) if way == "sparse" else follow(Route(compile_model(m, request), path), 1e-12)
+        found = (
+            solve_sparse(m, path, ("end",))
+            if way == "sparse"
+            else follow(Route(compile_model(m, request), path), 1e-12)
+        )
     assert found.solved.tolist() == [True, solved], found.message
     assert ("give samples in between" in found.message) is not solved
     assert "assembly" not in found.message
     if solved:
         x = slider_crank_motion(turn).x
-        assert np.abs(found.points["end"].position[1, 0] - x) <= 1e-12  # a thousand radians round at 1e-13
+        # a thousand radians round at 1e-13
+        assert np.abs(found.points["end"].position[1, 0] - x) <= 1e-12
 
 
 @pytest.mark.parametrize(("far", "limit"), [(0.4, 0.29337), (-0.4, -0.31674)])
 @pytest.mark.parametrize("steps", [401, 9])
 def test_lock_up(far, limit, steps):
-    """Formulation section 10: the first extrema of the wheel's height along the branch, to the digits given there."""
+    """Formulation section 10: the first extrema of the wheel's height along the branch, to the
+    digits given there.
+    """
     values = np.linspace(0.0, far, steps)
     found = solve(mcpherson(), "stroke", values)
     within = np.abs(values) < abs(limit)
@@ -232,7 +282,8 @@ def test_lock_up(far, limit, steps):
     beyond, wanted, pivot, last = (
         float(x)
         for x in re.match(
-            r"cannot be followed beyond stroke = (\S+) \(wanted stroke = (\S+)\): .*; smallest singular value there "
+            r"cannot be followed beyond stroke = (\S+) \(wanted stroke = (\S+)\): .*; smallest"
+            r" singular value there "
             r"about (\S+) .*lock-up.*"
             r"last reachable sample at stroke = (\S+); shorten the sweep",
             found.message,
@@ -258,7 +309,9 @@ def test_an_end_before_the_first_sample():
 
 
 def test_what_lies_beyond_an_end_is_not_reached_from_elsewhere():
-    """Past a dead centre the crank could be assembled again, but not without passing where it cannot."""
+    """Past a dead centre the crank could be assembled again, but not without passing where it
+    cannot.
+    """
     m = slider_crank(rod=0.1)  # shorter than the crank: the pin cannot pass overhead
     found = solve(m, "turn", np.linspace(0.0, np.pi, 61))
     limit = np.arcsin(0.1 / CRANK)

@@ -1,4 +1,6 @@
-"""kincheck sweep: its files, its exit status, a variant made again, and what it says of options that make no sense."""
+"""kincheck sweep: its files, its exit status, a variant made again, and what it says of options
+that make no sense.
+"""
 
 import csv
 import importlib
@@ -24,7 +26,10 @@ from kincheck.core.trajectory import QUANTITIES
 from ..case.test_vary import HEAD, vary
 from ..support.fakes import Fake, crank
 
-POINTS = {"ball": {"at": "ball", "sigma": 1.0}, "rod": {"at": "joints.tie_rod.points.0", "half_width": [1.0, 0, 2.0]}}
+POINTS = {
+    "ball": {"at": "ball", "sigma": 1.0},
+    "rod": {"at": "joints.tie_rod.points.0", "half_width": [1.0, 0, 2.0]},
+}
 
 
 @pytest.fixture
@@ -45,11 +50,17 @@ def test_a_hardpoint_that_is_named_like_an_output_has_a_column_of_its_own(tmp_pa
     for name in ("rocker_tip_y", "variant"):
         varied = {name: {"at": "joints.rod.length", "half_width": 1.0}}
         file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied}))
-        assert main(["sweep", "rssr", "--vary", str(file), "--samples", "20", "--store", str(stored)]) == 0
+        assert (
+            main(["sweep", "rssr", "--vary", str(file), "--samples", "20", "--store", str(stored)])
+            == 0
+        )
         table = parquet.read_table(stored)
         assert table.column_names[:2] == ["variant", f"{name}.offset"]
         assert table.column_names.count("rocker_tip_y") == 1
-        offsets, values = table[f"{name}.offset"].to_numpy(), np.array(table["rocker_tip_y"].to_pylist())
+        offsets, values = (
+            table[f"{name}.offset"].to_numpy(),
+            np.array(table["rocker_tip_y"].to_pylist()),
+        )
         assert 0.0 < np.abs(offsets).max() <= 1e-3
         assert values.shape == (20, 181)
         units = json.loads(table.schema.metadata[b"kincheck"])["units"]
@@ -58,13 +69,39 @@ def test_a_hardpoint_that_is_named_like_an_output_has_a_column_of_its_own(tmp_pa
 
 def test_a_sweep_writes_what_it_has_found(file, tmp_path, capsys):
     out, stored = tmp_path / "out", tmp_path / "all.parquet"
-    arguments = ["sweep", "mcpherson_strut", "--vary", str(file), "--samples", "600", "--seed", "3", "--jobs", "2"]
-    assert main([*arguments, "--out", str(out), "--store", str(stored), "--check", "native:0.01"]) == 0
+    arguments = [
+        "sweep",
+        "mcpherson_strut",
+        "--vary",
+        str(file),
+        "--samples",
+        "600",
+        "--seed",
+        "3",
+        "--jobs",
+        "2",
+    ]
+    assert (
+        main([*arguments, "--out", str(out), "--store", str(stored), "--check", "native:0.01"]) == 0
+    )
     told = capsys.readouterr().out
-    assert "600 variants of mcpherson_strut, all solved; 6 checked with native, none deviates" in told
+    assert (
+        "600 variants of mcpherson_strut, all solved; 6 checked with native, none deviates" in told
+    )
     found = json.loads((out / "sweep.json").read_text())
-    assert (found["schema"], found["samples"], found["seed"], found["unsolved"]) == ("kincheck-sweep/1", 600, 3, 0)
-    assert [each["name"] for each in found["coordinates"]] == ["ball.x", "ball.y", "ball.z", "rod.x", "rod.z"]
+    assert (found["schema"], found["samples"], found["seed"], found["unsolved"]) == (
+        "kincheck-sweep/1",
+        600,
+        3,
+        0,
+    )
+    assert [each["name"] for each in found["coordinates"]] == [
+        "ball.x",
+        "ball.y",
+        "ball.z",
+        "rod.x",
+        "rod.z",
+    ]
     assert len(found["checked"]) == 6
     assert found["run"]["command"].startswith("kincheck sweep mcpherson_strut --vary")
 
@@ -75,8 +112,12 @@ def test_a_sweep_writes_what_it_has_found(file, tmp_path, capsys):
         assert [float(each[column]) for each in rows] == envelope[column]
     assert [float(each["quantile_0.95"]) for each in rows] == envelope["quantiles"]["0.95"]
     slopes = read(out / "gradients.csv")
-    assert [each["coordinate"] for each in slopes[:5]] == [each["name"] for each in found["coordinates"]]
-    assert [float(each["largest"]) for each in slopes] == [each["largest"] for each in found["gradients"]]
+    assert [each["coordinate"] for each in slopes[:5]] == [
+        each["name"] for each in found["coordinates"]
+    ]
+    assert [float(each["largest"]) for each in slopes] == [
+        each["largest"] for each in found["gradients"]
+    ]
 
     parquet = pytest.importorskip("pyarrow.parquet")
     table = parquet.read_table(stored)
@@ -84,25 +125,52 @@ def test_a_sweep_writes_what_it_has_found(file, tmp_path, capsys):
     np.testing.assert_array_equal(table["variant"].to_numpy(), np.arange(600))
     np.testing.assert_allclose(values.min(axis=0), envelope["min"], rtol=0)
     np.testing.assert_allclose(values.mean(axis=0), envelope["mean"], rtol=0, atol=1e-16)
-    np.testing.assert_allclose(np.quantile(values, 0.05, axis=0), envelope["quantiles"]["0.05"], rtol=0, atol=1e-16)
+    np.testing.assert_allclose(
+        np.quantile(values, 0.05, axis=0), envelope["quantiles"]["0.05"], rtol=0, atol=1e-16
+    )
     assert np.abs(table["rod.x"].to_numpy()).max() <= 1e-3
     about = json.loads(table.schema.metadata[b"kincheck"])
-    assert (about["seed"], about["units"]["rod.x"], about["units"]["half_track_change"]) == (3, "m", "m")
+    assert (about["seed"], about["units"]["rod.x"], about["units"]["half_track_change"]) == (
+        3,
+        "m",
+        "m",
+    )
 
 
 def test_the_page_holds_all_and_escapes_it(file, tmp_path):
     case = load("mcpherson_strut")
-    found = sweep_designs(case, vary(tmp_path, case, **POINTS), samples=20, command="<script>alert(1)</script>")
+    found = sweep_designs(
+        case, vary(tmp_path, case, **POINTS), samples=20, command="<script>alert(1)</script>"
+    )
     text = page(found)
     assert "<h1>20 variants of mcpherson_strut, all solved</h1>" in text
     assert "<script>alert" not in text
     assert text.count('class="plot"') == 6
-    assert all(name in text for name in ("half-track change", "wheel-base change", "ball.z", "rod.x"))
-    assert re.findall(r"https?://", re.sub(r'<script type="application/octet-stream".*?</script>', "", text, flags=re.S)) == []
+    assert all(
+        name in text for name in ("half-track change", "wheel-base change", "ball.z", "rod.x")
+    )
+    assert (
+        re.findall(
+            r"https?://",
+            re.sub(r'<script type="application/octet-stream".*?</script>', "", text, flags=re.S),
+        )
+        == []
+    )
 
 
 def test_json_goes_to_standard_output_alone(file, capsys):
-    command = ["sweep", "mcpherson_strut", "--vary", str(file), "--samples", "5", "--output", "wheelbase_change", "--json", "-"]
+    command = [
+        "sweep",
+        "mcpherson_strut",
+        "--vary",
+        str(file),
+        "--samples",
+        "5",
+        "--output",
+        "wheelbase_change",
+        "--json",
+        "-",
+    ]
     assert main(command) == 0
     output = capsys.readouterr()
     assert list(json.loads(output.out)["outputs"]) == ["wheelbase_change"]
@@ -113,10 +181,26 @@ def test_variants_without_a_solution_make_status_1(tmp_path, capsys):
     path = tmp_path / "rod.json"
     rod = {"at": "joints.rod.length", "half_width": 3500.0}
     path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": {"rod": rod}}))
-    assert main(["sweep", "rssr", "--vary", str(path), "--samples", "30", "--out", str(tmp_path / "out")]) == 1
+    assert (
+        main(
+            [
+                "sweep",
+                "rssr",
+                "--vary",
+                str(path),
+                "--samples",
+                "30",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 1
+    )
     told = capsys.readouterr().out
     assert re.search(r"30 variants of rssr, \d+ without a solution somewhere", told)
-    assert re.search(r"unsolved: variant \d+, \d+ samples: cannot be followed beyond crank = ", told)
+    assert re.search(
+        r"unsolved: variant \d+, \d+ samples: cannot be followed beyond crank = ", told
+    )
     assert "Variants without a solution" in (tmp_path / "out" / "sweep.html").read_text()
 
 
@@ -130,19 +214,35 @@ def test_a_deviating_check_makes_status_1_and_its_variant_is_made_again(file, ca
         return found
 
     liar, known = Fake("native", answer=answer), adapters.engine
-    monkeypatch.setattr(adapters, "engine", lambda name, *mode: liar if name == "native" else known(name, *mode))
-    command = ["sweep", "mcpherson_strut", "--vary", str(file), "--seed", "8", "--check", "native:1.0"]
+    monkeypatch.setattr(
+        adapters, "engine", lambda name, *mode: liar if name == "native" else known(name, *mode)
+    )
+    command = [
+        "sweep",
+        "mcpherson_strut",
+        "--vary",
+        str(file),
+        "--seed",
+        "8",
+        "--check",
+        "native:1.0",
+    ]
     assert main([*command, "--samples", "6"]) == 1
     told = capsys.readouterr().out
     assert "6 checked with native, 1 deviate" in told
     assert (
-        "fail: variant 4 (--seed 8 --replay 4): half_track_change: position is off by 1e-06 m at sample 7 (stroke = -0.073)" in told
+        "fail: variant 4 (--seed 8 --replay 4): half_track_change: position is off by 1e-06 m at"
+        " sample 7 (stroke = -0.073)" in told
     )
     monkeypatch.undo()
     out = file.parent / "again"
     assert main([*command[:-2], "--replay", "4", "--out", str(out)]) == 0
     (record,) = json.loads((out / "results.json").read_text())["records"]
-    assert (record["case"], record["engine"], record["outcome"]) == ("mcpherson_strut variant 4 of seed 8", "native", "unjudged")
+    assert (record["case"], record["engine"], record["outcome"]) == (
+        "mcpherson_strut variant 4 of seed 8",
+        "native",
+        "unjudged",
+    )
     assert (out / "report.html").exists()
 
 
@@ -155,34 +255,63 @@ def test_a_check_contradicts_variants_that_the_sweep_cannot_solve(tmp_path, caps
     command = ["sweep", "rssr", "--vary", str(path), "--samples", "30", "--check", "mujoco:1.0"]
 
     def checked(change):
-        liar = Fake("mujoco", answer=lambda case: change(native.solve(native.build(case), case, 1e-12)))
-        monkeypatch.setattr(adapters, "engine", lambda name, *mode: liar if name == "mujoco" else known(name, *mode))
+        liar = Fake(
+            "mujoco", answer=lambda case: change(native.solve(native.build(case), case, 1e-12))
+        )
+        monkeypatch.setattr(
+            adapters, "engine", lambda name, *mode: liar if name == "mujoco" else known(name, *mode)
+        )
         monkeypatch.setattr("kincheck.core.cli.sweep._solver", lambda options, engine: here)
         assert main(command) == 1
         return capsys.readouterr().out
 
     def everywhere(found):
-        kept = {name: {each: np.nan_to_num(getattr(m, each)) for each in QUANTITIES} for name, m in found.points.items()}
+        kept = {
+            name: {each: np.nan_to_num(getattr(m, each)) for each in QUANTITIES}
+            for name, m in found.points.items()
+        }
         points = {name: replace(m, **kept[name]) for name, m in found.points.items()}
-        return replace(found, points=points, solved=np.ones_like(found.solved), residual=np.nan_to_num(found.residual))
+        return replace(
+            found,
+            points=points,
+            solved=np.ones_like(found.solved),
+            residual=np.nan_to_num(found.residual),
+        )
 
     assert "fail: variant" not in (told := checked(lambda found: found)), told
     told = checked(everywhere)
-    ends = r"values at 132 of 181 samples that native cannot reach; native: cannot be followed beyond crank = 1\.6998182"
+    ends = (
+        r"values at 132 of 181 samples that native cannot reach; native: cannot be followed beyond"
+        r" crank = 1\.6998182"
+    )
     assert re.search(r"fail: variant 11 \(.*\): " + ends, told), told
     told = checked(lambda found: replace(found, residual=1e-3))
     assert "the residual of samples that the engine calls solved is 0.001" in told
 
 
 def test_a_variant_that_native_passes_by_itself_is_no_contradiction(tmp_path):
-    """Many variants at once do not pass a singular pose that one alone does: the engine has values there, and native too."""
+    """Many variants at once do not pass a singular pose that one alone does: the engine has values
+    there, and native too.
+    """
     case = load("iftomm_n_four_bar")
-    case = replace(case, sweep=replace(case.sweep, values=np.deg2rad(np.array([0.0, 60.0, 90.0, 110.0]))), reference={})
+    case = replace(
+        case,
+        sweep=replace(case.sweep, values=np.deg2rad(np.array([0.0, 60.0, 90.0, 110.0]))),
+        reference={},
+    )
     end = {"at": case.mechanism.points[0].name, "values": [1.0]}
-    study = Study(case, vary(tmp_path, case, "one_at_a_time", end=end), 2, 0, 2, 1e-12)  # the first is the nominal design
-    (_, found), *_ = here([Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)])
+    # the first is the nominal design
+    study = Study(case, vary(tmp_path, case, "one_at_a_time", end=end), 2, 0, 2, 1e-12)
+    (_, found), *_ = here(
+        [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
+    )
     assert found.result.solved == 4
-    rows = np.array([getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative]) for row in study.rows])
+    rows = np.array(
+        [
+            getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative])
+            for row in study.rows
+        ]
+    )
     rows[:, 2:] = np.nan  # as many at once leave them
     record = judged(study, 0, found, rows)
     assert (record.outcome, record.message) == ("pass", "")
@@ -191,16 +320,31 @@ def test_a_variant_that_native_passes_by_itself_is_no_contradiction(tmp_path):
 WRONG = [
     (["--samples", "0"], "'0' is not a whole number of 1 or more"),
     ([], "monte_carlo draws as many variants as it is told; give --samples"),
-    (["--samples", "5", "--check", "mujocco"], "there is no engine 'mujocco'; did you mean 'mujoco'?"),
-    (["--samples", "5", "--check", "native:2"], "--check native:2: found the share '2', expected a part of one"),
-    (["--samples", "5", "--output", "toe"], "there is no output 'toe'; known: half_track_change, wheelbase_change"),
-    (["--samples", "5", "--replay", "3"], "--replay: a variant is known by seed and index; leave out --samples"),
+    (
+        ["--samples", "5", "--check", "mujocco"],
+        "there is no engine 'mujocco'; did you mean 'mujoco'?",
+    ),
+    (
+        ["--samples", "5", "--check", "native:2"],
+        "--check native:2: found the share '2', expected a part of one",
+    ),
+    (
+        ["--samples", "5", "--output", "toe"],
+        "there is no output 'toe'; known: half_track_change, wheelbase_change",
+    ),
+    (
+        ["--samples", "5", "--replay", "3"],
+        "--replay: a variant is known by seed and index; leave out --samples",
+    ),
     (["--replay", "3", "--store", "x.parquet"], "--replay solves here, and stores nothing"),
     (
         ["--samples", "5", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:1"],
         "how many threads is the cluster's matter",
     ),
-    (["--samples", "5", "--store", "no/such/folder.parquet"], "cannot be written; give a file in a folder that exists"),
+    (
+        ["--samples", "5", "--store", "no/such/folder.parquet"],
+        "cannot be written; give a file in a folder that exists",
+    ),
 ]
 
 
@@ -220,7 +364,21 @@ def test_without_pyarrow_there_is_a_message(file, tmp_path, capsys, monkeypatch)
 
     monkeypatch.setattr(importlib, "import_module", without)
     stored = tmp_path / "x.parquet"
-    assert main(["sweep", "mcpherson_strut", "--vary", str(file), "--samples", "5", "--store", str(stored)]) == 2
+    assert (
+        main(
+            [
+                "sweep",
+                "mcpherson_strut",
+                "--vary",
+                str(file),
+                "--samples",
+                "5",
+                "--store",
+                str(stored),
+            ]
+        )
+        == 2
+    )
     assert "pip install 'kincheck[parquet]'" in capsys.readouterr().err
     assert not os.path.exists(stored)
 
@@ -234,7 +392,10 @@ def test_remarks_are_told(tmp_path, capsys, monkeypatch):
     import sys
 
     print_sweep(found, sys.stdout)
-    assert re.search(r"quantiles are of a random subset of \d+ variants, with their standard errors", capsys.readouterr().out)
+    assert re.search(
+        r"quantiles are of a random subset of \d+ variants, with their standard errors",
+        capsys.readouterr().out,
+    )
 
 
 def test_what_was_found_is_there_when_nobody_reads_the_table(file, tmp_path, monkeypatch):
@@ -243,7 +404,18 @@ def test_what_was_found_is_there_when_nobody_reads_the_table(file, tmp_path, mon
 
     monkeypatch.setattr("kincheck.core.studies.tolerance.tables.print_sweep", gone)
     out, wanted = tmp_path / "out", tmp_path / "found.json"
-    arguments = ["sweep", "mcpherson_strut", "--vary", str(file), "--samples", "20", "--out", str(out), "--json", str(wanted)]
+    arguments = [
+        "sweep",
+        "mcpherson_strut",
+        "--vary",
+        str(file),
+        "--samples",
+        "20",
+        "--out",
+        str(out),
+        "--json",
+        str(wanted),
+    ]
     kept = os.dup(1)
     try:
         main(arguments)

@@ -1,4 +1,6 @@
-"""What is made of many variants: extremes, moments, quantiles and gradients, held against closed forms."""
+"""What is made of many variants: extremes, moments, quantiles and gradients, held against closed
+forms.
+"""
 
 import warnings
 from dataclasses import replace
@@ -24,7 +26,9 @@ AXIS = {"at": "joints.lca_pivot.axis", "sigma": 0.1}
 
 
 def test_summaries_of_parts_are_the_summary_of_all():
-    """Ten thousand times as far from zero as they are apart: the sum of squares must not be a difference of large numbers."""
+    """Ten thousand times as far from zero as they are apart: the sum of squares must not be a
+    difference of large numbers.
+    """
     random = np.random.default_rng(1)
     values = 1e4 + random.normal(size=(2, 3, 100))
     values[0, 1, random.random(100) < 0.3] = np.nan
@@ -41,9 +45,15 @@ def test_summaries_of_parts_are_the_summary_of_all():
         with np.errstate(all="ignore"):
             np.testing.assert_array_equal(whole.least[some], np.nanmin(values[some], axis=1))
             np.testing.assert_array_equal(whole.most[some], np.nanmax(values[some], axis=1))
-            np.testing.assert_allclose(whole.mean[some], np.nanmean(values[some], axis=1), rtol=1e-14)
-            np.testing.assert_allclose(whole.deviation[some], np.nanstd(values[some], axis=1, ddof=1), rtol=1e-9)
-        assert np.isnan([each[1, 2] for each in (whole.least, whole.most, whole.mean, whole.deviation)]).all()
+            np.testing.assert_allclose(
+                whole.mean[some], np.nanmean(values[some], axis=1), rtol=1e-14
+            )
+            np.testing.assert_allclose(
+                whole.deviation[some], np.nanstd(values[some], axis=1, ddof=1), rtol=1e-9
+            )
+        assert np.isnan(
+            [each[1, 2] for each in (whole.least, whole.most, whole.mean, whole.deviation)]
+        ).all()
         for q in range(2):
             low, high = whole.extremes[q]
             assert np.nanmin(values[q]) in values[q, :, low]
@@ -53,12 +63,19 @@ def test_summaries_of_parts_are_the_summary_of_all():
 
 @pytest.mark.parametrize("compiled", [True, False])
 def test_totals_leave_out_what_is_no_number(compiled, monkeypatch):
-    """Missing at first in a lane, everywhere, or infinite; a number of variants that no vector holds; as numpy finds them."""
+    """Missing at first in a lane, everywhere, or infinite; a number of variants that no vector
+    holds; as numpy finds them.
+    """
     monkeypatch.setattr(room, "available", lambda: compiled)
     monkeypatch.setattr(room, "_bound", ThreadCache())
     random = np.random.default_rng(3)
     values = -3e3 + random.normal(size=(2, 5, 3000))
-    values[0, 0, :700], values[0, 1], values[1, 2, ::3], values[1, 3, 5] = np.nan, np.nan, np.inf, -np.inf
+    values[0, 0, :700], values[0, 1], values[1, 2, ::3], values[1, 3, 5] = (
+        np.nan,
+        np.nan,
+        np.inf,
+        -np.inf,
+    )
     totals = Totals(2, 5)
     for a, b in pairwise([0, 1, 8, 71, 1500, 3000]):
         totals.take(values[:, :, a:b], 1000 + a)
@@ -71,12 +88,20 @@ def test_totals_leave_out_what_is_no_number(compiled, monkeypatch):
         np.testing.assert_allclose(found.mean, np.nanmean(known, axis=2), rtol=1e-14)
         np.testing.assert_allclose(found.deviation, np.nanstd(known, axis=2, ddof=1), rtol=1e-11)
     for q in range(2):
-        assert found.extremes[q, 0] == 1000 + np.unravel_index(np.nanargmin(known[q]), known[q].shape)[1]
-        assert found.extremes[q, 1] == 1000 + np.unravel_index(np.nanargmax(known[q]), known[q].shape)[1]
+        assert (
+            found.extremes[q, 0]
+            == 1000 + np.unravel_index(np.nanargmin(known[q]), known[q].shape)[1]
+        )
+        assert (
+            found.extremes[q, 1]
+            == 1000 + np.unravel_index(np.nanargmax(known[q]), known[q].shape)[1]
+        )
 
 
 def test_quantiles_and_their_standard_errors():
-    """The spread of quantiles over many samples is the standard error that each of them is given, to the fifth of it."""
+    """The spread of quantiles over many samples is the standard error that each of them is given,
+    to the fifth of it.
+    """
     random = np.random.default_rng(2)
     kept = random.normal(size=(300, 1000))
     found = quantiles([kept[:, :600], kept[:, 600:]], exact=False)
@@ -91,17 +116,25 @@ def test_quantiles_and_their_standard_errors():
 
 
 def rotated(axis, angle, arm):
-    """Rodrigues' formula for complex numbers: an imaginary step in them gives derivatives to round-off."""
+    """Rodrigues' formula for complex numbers: an imaginary step in them gives derivatives to
+    round-off.
+    """
     h = axis / np.sqrt(axis @ axis)
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     return arm * c + np.cross(h, arm) * s + h * (h @ arm) * (1 - c)
 
 
 def test_gradients_are_the_closed_form(tmp_path):
-    """Of a crank by its tip, its pivot, and the components of its axis, at the samples and at design."""
+    """Of a crank by its tip, its pivot, and the components of its axis, at the samples and at
+    design.
+    """
     case = crank()
-    case = replace(case, outputs=(*case.outputs, Output("z", "tip", (0.0, 0.0, 1.0), False, 1e-9, 0.0, "test")))
-    variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1}, axis={"at": "joints.pivot.axis", "sigma": 1})
+    case = replace(
+        case, outputs=(*case.outputs, Output("z", "tip", (0.0, 0.0, 1.0), False, 1e-9, 0.0, "test"))
+    )
+    variation = vary(
+        tmp_path, case, tip={"at": "tip", "sigma": 1}, axis={"at": "joints.pivot.axis", "sigma": 1}
+    )
     ready = Ready(Study(case, variation, 1, 0))
     found = gradients(ready)
     angle = np.append(case.sweep.change, 0.0)
@@ -136,9 +169,16 @@ def test_gradients_agree_with_differences_of_whole_sweeps(tmp_path):
         for sign in (1, -1):
             offset = np.zeros(3)
             offset[k] = sign * h
-            joint = replace(case.mechanism.joint("ball"), point=tuple(np.array(case.mechanism.joint("ball").point) + offset))
+            joint = replace(
+                case.mechanism.joint("ball"),
+                point=tuple(np.array(case.mechanism.joint("ball").point) + offset),
+            )
             joints = [joint if each.name == "ball" else each for each in case.mechanism.joints]
-            sides.append(solve(replace(case.mechanism, joints=joints), "stroke", values).points["wheel_center"].position)
+            sides.append(
+                solve(replace(case.mechanism, joints=joints), "stroke", values)
+                .points["wheel_center"]
+                .position
+            )
         rough = (sides[0] - sides[1]) / (2 * h)
         np.testing.assert_allclose(found.along[k, 0], rough[:, 1], rtol=0, atol=1e-7)
         np.testing.assert_allclose(found.along[k, 1], rough[:, 0], rtol=0, atol=1e-7)

@@ -1,4 +1,6 @@
-"""A sweep that is stopped writes its finished part and says so; taken up, it has the same bits as one that was never stopped."""
+"""A sweep that is stopped writes its finished part and says so; taken up, it has the same bits as
+one that was never stopped.
+"""
 
 import csv
 import json
@@ -20,12 +22,25 @@ VARIANTS, CHUNK = 640, 64
 def arguments(tmp_path):
     file = tmp_path / "hardpoints.json"
     file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
-    return ["sweep", "mcpherson_strut", "--vary", str(file), "--samples", str(VARIANTS), "--seed", "3", "--jobs", "1"]
+    return [
+        "sweep",
+        "mcpherson_strut",
+        "--vary",
+        str(file),
+        "--samples",
+        str(VARIANTS),
+        "--seed",
+        "3",
+        "--jobs",
+        "1",
+    ]
 
 
 @pytest.fixture
 def stop(monkeypatch):
-    """Has a sweep stopped, by Ctrl-C or something else, when a chunk is to be solved; None: no more."""
+    """Has a sweep stopped, by Ctrl-C or something else, when a chunk is to be solved; None: no
+    more.
+    """
     solve = Ready.chunk
 
     def at(index, reason=KeyboardInterrupt):
@@ -56,7 +71,10 @@ def test_a_sweep_that_is_taken_up_has_the_same_bits(arguments, tmp_path, capsys,
     told, said = capsys.readouterr()
     part = f"{chunks * CHUNK} of {VARIANTS}"
     assert f"{part} variants of mcpherson_strut, partial: the sweep was stopped" in told
-    assert said.splitlines()[-1] == f"kincheck: interrupted: {part} variants are solved; --resume goes on from there"
+    assert (
+        said.splitlines()[-1]
+        == f"kincheck: interrupted: {part} variants are solved; --resume goes on from there"
+    )
     assert (numbers(out)["samples"], numbers(out)["asked"]) == (chunks * CHUNK, VARIANTS)
     with (out / "envelope.csv").open() as lines:
         assert {row["partial"] for row in csv.DictReader(lines)} == {f"{part} variants"}
@@ -73,7 +91,9 @@ def test_a_sweep_that_is_taken_up_has_the_same_bits(arguments, tmp_path, capsys,
 
 
 def test_the_part_is_that_of_the_first_variants(tmp_path, stop):
-    """What is known of a part is equal to what a sweep of as many variants in as many chunks has reduced."""
+    """What is known of a part is equal to what a sweep of as many variants in as many chunks has
+    reduced.
+    """
     case, stops = crank(), []
     variation = vary(tmp_path, case, tip=TIP)
     stop(3)
@@ -83,7 +103,11 @@ def test_the_part_is_that_of_the_first_variants(tmp_path, stop):
     whole = sweep_designs(case, variation, samples=3 * CHUNK, seed=1)
     for name, each in found.outputs.items():
         assert each.count == whole.outputs[name].count
-        assert (each.min, each.max, each.mean) == (whole.outputs[name].min, whole.outputs[name].max, whole.outputs[name].mean)
+        assert (each.min, each.max, each.mean) == (
+            whole.outputs[name].min,
+            whole.outputs[name].max,
+            whole.outputs[name].mean,
+        )
     assert found.gradients == whole.gradients
 
 
@@ -93,7 +117,10 @@ def test_stored_values_of_a_part_say_so_and_are_whole_after(arguments, tmp_path,
     assert main([*arguments, "--store", str(whole)]) == 0
     stop(4)
     assert main([*arguments, "--out", str(out), "--store", str(stored)]) == 130
-    assert parquet.read_metadata(stored).metadata[b"kincheck.partial"] == f"{4 * CHUNK} of {VARIANTS} variants".encode()
+    assert (
+        parquet.read_metadata(stored).metadata[b"kincheck.partial"]
+        == f"{4 * CHUNK} of {VARIANTS} variants".encode()
+    )
     assert parquet.read_table(stored).num_rows == 4 * CHUNK
     stop(None)
     assert main([*arguments, "--out", str(out), "--store", str(stored), "--resume"]) == 0
@@ -101,8 +128,12 @@ def test_stored_values_of_a_part_say_so_and_are_whole_after(arguments, tmp_path,
     assert parquet.read_table(stored).equals(parquet.read_table(whole))
 
 
-@pytest.mark.parametrize("change", [["--seed", "4"], ["--samples", "700"], ["--order", "1"], ["--tol", "1e-11"]])
-def test_the_part_of_another_sweep_is_not_gone_on_with_and_stays(arguments, tmp_path, capsys, stop, change):
+@pytest.mark.parametrize(
+    "change", [["--seed", "4"], ["--samples", "700"], ["--order", "1"], ["--tol", "1e-11"]]
+)
+def test_the_part_of_another_sweep_is_not_gone_on_with_and_stays(
+    arguments, tmp_path, capsys, stop, change
+):
     out = tmp_path / "out"
     stop(2)
     assert main([*arguments, "--out", str(out)]) == 130
@@ -115,7 +146,9 @@ def test_the_part_of_another_sweep_is_not_gone_on_with_and_stays(arguments, tmp_
 
 
 @pytest.mark.parametrize("lost", [1, 40, 20_000])
-def test_a_part_that_was_cut_off_or_damaged_is_used_as_far_as_it_is_whole(arguments, tmp_path, stop, lost):
+def test_a_part_that_was_cut_off_or_damaged_is_used_as_far_as_it_is_whole(
+    arguments, tmp_path, stop, lost
+):
     whole, out = tmp_path / "whole", tmp_path / "out"
     assert main([*arguments, "--out", str(whole)]) == 0
     stop(4)

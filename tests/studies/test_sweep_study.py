@@ -1,4 +1,6 @@
-"""Sweeps over designs: held against closed forms, against runs of single variants, and against themselves in any number of jobs."""
+"""Sweeps over designs: held against closed forms, against runs of single variants, and against
+themselves in any number of jobs.
+"""
 
 import json
 from types import SimpleNamespace
@@ -37,7 +39,9 @@ STRUT = {
 
 
 def cranks(case, variation, seed, count):
-    """x, from design, and y of the tip of every variant by the closed form p + R(angle) (tip - p), shape (2, n, count)."""
+    """x, from design, and y of the tip of every variant by the closed form p + R(angle) (tip - p),
+    shape (2, n, count).
+    """
     angle = case.sweep.change[:, None]
     dx, dy, py = np.array([variation.of_variant(seed, k) for k in range(count)]).T
     ax, ay = 0.5 + dx, dy - py
@@ -83,8 +87,14 @@ def test_the_results_are_the_same_in_any_number_of_jobs(tmp_path):
 def test_fewer_variants_are_the_first_of_more(tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip=TIP)
-    assert Study(case, variation, 300, 9).of_variant(299).mechanism == Study(case, variation, 5000, 9).of_variant(299).mechanism
-    assert Study(case, variation, 300, 9).of_variant(299).mechanism != Study(case, variation, 300, 8).of_variant(299).mechanism
+    assert (
+        Study(case, variation, 300, 9).of_variant(299).mechanism
+        == Study(case, variation, 5000, 9).of_variant(299).mechanism
+    )
+    assert (
+        Study(case, variation, 300, 9).of_variant(299).mechanism
+        != Study(case, variation, 300, 8).of_variant(299).mechanism
+    )
 
 
 def test_many_quantiles_are_of_a_random_subset(tmp_path, monkeypatch):
@@ -103,7 +113,9 @@ def test_many_quantiles_are_of_a_random_subset(tmp_path, monkeypatch):
 
 
 def test_outputs_of_variants_are_those_of_their_own_cases(tmp_path):
-    """All outputs of a suspension and their derivatives by travel: markers, vectors and quotients of velocities."""
+    """All outputs of a suspension and their derivatives by travel: markers, vectors and quotients
+    of velocities.
+    """
     case = load("mcpherson_suspension")
     study = Study(case, vary(tmp_path, case, **STRUT), 40, 2, picked=frozenset({0, 17, 39}))
     chunk = Ready(study).chunk(0)
@@ -120,7 +132,9 @@ def test_outputs_of_variants_are_those_of_their_own_cases(tmp_path):
 
 
 def test_variants_are_not_judged_still_by_one_that_moves_fast():
-    """A quotient by the speed of travel is left out where that is small beside the fastest point: of the same variant."""
+    """A quotient by the speed of travel is left out where that is small beside the fastest point:
+    of the same variant.
+    """
     one = np.ones((5, 2))
     fast = one * [1.0, 1e6]
     corner: Any = SimpleNamespace(center=SimpleNamespace(z=Jet(one, one, one)))
@@ -133,7 +147,14 @@ def test_derivatives_are_reduced_where_they_are_asked_for(tmp_path):
     variation = vary(tmp_path, case, tip=TIP)
     assert list(sweep_designs(case, variation, samples=3, order=0).outputs) == ["x", "y"]
     found = sweep_designs(case, variation, samples=200, order=2)
-    assert list(found.outputs) == ["x", "x.velocity", "x.acceleration", "y", "y.velocity", "y.acceleration"]
+    assert list(found.outputs) == [
+        "x",
+        "x.velocity",
+        "x.acceleration",
+        "y",
+        "y.velocity",
+        "y.acceleration",
+    ]
     _, v, a = exact(case)
     np.testing.assert_allclose(found.outputs["y.velocity"].nominal, v[:, 1], atol=1e-14)
     np.testing.assert_allclose(found.outputs["x.acceleration"].nominal, a[:, 0], atol=1e-14)
@@ -158,7 +179,9 @@ def test_large_motions_are_solved_in_parts_of_a_chunk(tmp_path, monkeypatch):
 
 def test_one_at_a_time_tells_what_each_coordinate_does(tmp_path):
     case = crank()
-    variation = vary(tmp_path, case, "one_at_a_time", tip={"at": "tip", "values": [[-2, 2], [1], [0]]})
+    variation = vary(
+        tmp_path, case, "one_at_a_time", tip={"at": "tip", "values": [[-2, 2], [1], [0]]}
+    )
     found = sweep_designs(case, variation)
     assert [(each.coordinate, round(each.offset, 6)) for each in found.effects] == [
         ("tip.x", -0.002),
@@ -173,26 +196,37 @@ def test_one_at_a_time_tells_what_each_coordinate_does(tmp_path):
     long = sweep_designs(case, vary(tmp_path, case, "one_at_a_time", tip=many)).effects
     assert [each.variant for each in long] == [*range(1, 401)]
     np.testing.assert_allclose([each.offset for each in long], np.linspace(-1e-3, 1e-3, 400))
-    with pytest.raises(KincheckError, match="one_at_a_time has 4 variants as listed, none is drawn; leave it out"):
+    with pytest.raises(
+        KincheckError, match="one_at_a_time has 4 variants as listed, none is drawn; leave it out"
+    ):
         sweep_designs(case, variation, samples=3)
 
 
 def test_a_grid_is_swept_as_a_whole(tmp_path):
     case = crank()
-    variation = vary(tmp_path, case, "grid", tip={"at": "tip", "values": [[-2, 2], [-1, 0, 3], [0]]})
+    variation = vary(
+        tmp_path, case, "grid", tip={"at": "tip", "values": [[-2, 2], [-1, 0, 3], [0]]}
+    )
     found = sweep_designs(case, variation)
     assert found.samples == 6
     angle = case.sweep.change
-    np.testing.assert_allclose(found.outputs["y"].max, np.sin(angle) * np.where(angle > 0, 0.502, 0.498) + np.cos(angle) * 0.003)
+    np.testing.assert_allclose(
+        found.outputs["y"].max,
+        np.sin(angle) * np.where(angle > 0, 0.502, 0.498) + np.cos(angle) * 0.003,
+    )
     tip = {"at": "tip", "half_width": 1, "steps": 9999}
-    with pytest.raises(KincheckError, match="999700029999 variants, expected 1 to 10000000000; vary less"):
+    with pytest.raises(
+        KincheckError, match="999700029999 variants, expected 1 to 10000000000; vary less"
+    ):
         sweep_designs(case, vary(tmp_path, case, "grid", tip=tip))
     with pytest.raises(KincheckError, match="draws as many variants as it is told; give --samples"):
         sweep_designs(case, vary(tmp_path, case, tip=TIP))
 
 
 def test_variants_without_a_solution_are_counted_and_named(tmp_path):
-    """A rod too short or too long for the crank to go round; each is what `solve` makes of it, NaN for what is not there."""
+    """A rod too short or too long for the crank to go round; each is what `solve` makes of it, NaN
+    for what is not there.
+    """
     case = load("rssr")
     variation = vary(tmp_path, case, rod={"at": "joints.rod.length", "half_width": 3500.0})
     study = Study(case, variation, 60, 1)
@@ -204,10 +238,15 @@ def test_variants_without_a_solution_are_counted_and_named(tmp_path):
             missing[variant] = n - int(own.solved.sum())
         except SolveError:
             missing[variant] = n
-    assert {each.variant: each.samples for each in found.failed} == {k: count for k, count in missing.items() if count}
+    assert {each.variant: each.samples for each in found.failed} == {
+        k: count for k, count in missing.items() if count
+    }
     assert 5 < found.unsolved == len(found.failed) < 55
     assert {n} < {each.samples for each in found.failed}
-    assert all("cannot be followed beyond" in each.message or "does not close" in each.message for each in found.failed)
+    assert all(
+        "cannot be followed beyond" in each.message or "does not close" in each.message
+        for each in found.failed
+    )
     assert sum(60 - count for count in found.outputs["rocker_pin_y"].count) == sum(missing.values())
     assert None not in found.outputs["rocker_pin_y"].mean
     later = Ready(Study(case, variation, 300, 1)).chunk(1).unsolved
@@ -216,7 +255,9 @@ def test_variants_without_a_solution_are_counted_and_named(tmp_path):
 
 
 def deviating(at):
-    """The native engine but for one variant, whose tip is a micrometre off, and for another, which it refuses."""
+    """The native engine but for one variant, whose tip is a micrometre off, and for another, which
+    it refuses.
+    """
     native = adapters.engine("native")
 
     def answer(case):
@@ -236,7 +277,9 @@ def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
     assert len(picked) == 30
     assert chosen(600, 1e-9, 4) == {some}
     at = sorted(picked)[7]
-    found = sweep_designs(case, variation, samples=600, seed=4, check=Check(deviating(at), 0.05, here, 1e-12))
+    found = sweep_designs(
+        case, variation, samples=600, seed=4, check=Check(deviating(at), 0.05, here, 1e-12)
+    )
     assert [each.variant for each in found.checked] == sorted(picked)
     (bad,) = found.deviating
     assert (bad.variant, bad.outcome, bad.row) == (at, Outcome.FAIL, "y")
@@ -261,7 +304,13 @@ def test_a_check_with_a_simulator_agrees(tmp_path):
     if mujoco.version() is None:
         pytest.skip("mujoco is not installed")
     case = load("mcpherson_suspension")
-    found = sweep_designs(case, vary(tmp_path, case, **STRUT), samples=200, seed=6, check=Check(mujoco, 0.02, here, 1e-12))
+    found = sweep_designs(
+        case,
+        vary(tmp_path, case, **STRUT),
+        samples=200,
+        seed=6,
+        check=Check(mujoco, 0.02, here, 1e-12),
+    )
     assert len(found.checked) == 4
     assert found.deviating == []
     assert read_variation(tmp_path / "vary.json", case).mode == "monte_carlo"

@@ -1,4 +1,6 @@
-"""A command line with made-up cases and engines, for runs that are killed, in processes of their own."""
+"""A command line with made-up cases and engines, for runs that are killed, in processes of their
+own.
+"""
 
 import sys
 import time
@@ -23,7 +25,9 @@ class Slow(Fake):
         return solution(case)
 
 
-CASES = {name: crank(name, reference=name != "free") for name in ("first", "segfault", "free", "last")}
+CASES = {
+    name: crank(name, reference=name != "free") for name in ("first", "segfault", "free", "last")
+}
 ENGINES = {"native": Slow("native"), "slow": Slow("slow", seconds=0.01), "bad": Bad()}
 
 

@@ -30,7 +30,9 @@ class Reading:
 
 
 def _rank(J, part):
-    """Singular values of an exact Jacobian end at round-off, of a difference quotient at its error: parts of the largest."""
+    """Singular values of an exact Jacobian end at round-off, of a difference quotient at its error:
+    parts of the largest.
+    """
     return int(np.linalg.matrix_rank(J, tol=part * np.linalg.norm(J, 2))) if J.size else 0
 
 
@@ -45,7 +47,10 @@ def _mjcf(texts, mechanism, folder):
     return Reading(
         data.efc_pos[: data.ne].copy(),
         model.nv - _rank(J, 1e-10),
-        {body.name: (data.body(body.name).xpos, data.body(body.name).xmat.reshape(3, 3)) for body in mechanism.bodies},
+        {
+            body.name: (data.body(body.name).xpos, data.body(body.name).xmat.reshape(3, 3))
+            for body in mechanism.bodies
+        },
         {point.name: data.site(point.name).xpos for point in mechanism.points},
     )
 
@@ -70,10 +75,20 @@ def _exudyn(texts, mechanism, folder):
             mbs.GetNodeOutput(node, kinds.Position),
             mbs.GetNodeOutput(node, kinds.RotationMatrix).reshape(3, 3) @ naive.A(frame),
         )
-        for (name, node), frame in zip(model["nodes"].items(), model["frames"].values(), strict=True)
+        for (name, node), frame in zip(
+            model["nodes"].items(), model["frames"].values(), strict=True
+        )
     }
-    points = {name: mbs.GetObjectOutputBody(body, kinds.Position, local) for name, (body, local) in model["points"].items()}
-    return Reading(solver.GetSystemResidual()[n:].copy(), n - _rank(solver.GetSystemJacobian()[n:, :n], 1e-10), bodies, points)
+    points = {
+        name: mbs.GetObjectOutputBody(body, kinds.Position, local)
+        for name, (body, local) in model["points"].items()
+    }
+    return Reading(
+        solver.GetSystemResidual()[n:].copy(),
+        n - _rank(solver.GetSystemJacobian()[n:, :n], 1e-10),
+        bodies,
+        points,
+    )
 
 
 def _urdf(texts, mechanism, folder):
@@ -106,7 +121,12 @@ def _urdf(texts, mechanism, folder):
             case "offset":
                 return [axis(each["x"]) @ (point(each["j"]) - point(each["i"])) - each["value"]]
             case "linear":
-                return [sum(weight * q[model.idx_qs[model.getJointId(name)]] for name, weight in each["weights"].items())]
+                return [
+                    sum(
+                        weight * q[model.idx_qs[model.getJointId(name)]]
+                        for name, weight in each["weights"].items()
+                    )
+                ]
 
     def residuals(q):
         pin.framesForwardKinematics(model, data, q)
@@ -115,7 +135,8 @@ def _urdf(texts, mechanism, folder):
     h = 1e-6
     J = np.array(
         [
-            (residuals(pin.integrate(model, q, h * e)) - residuals(pin.integrate(model, q, -h * e))) / (2.0 * h)
+            (residuals(pin.integrate(model, q, h * e)) - residuals(pin.integrate(model, q, -h * e)))
+            / (2.0 * h)
             for e in np.eye(model.nv)
         ]
     )

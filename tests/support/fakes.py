@@ -40,15 +40,26 @@ def crank(name="crank", *, truth=Truth.CLOSED_FORM, reference=True, rate=2.0, at
     if not reference:
         return case
     p, v, a = exact(case)
-    return replace(case, reference={"x": Series(p[:, 0] - RADIUS, v[:, 0], a[:, 0]), "y": Series(p[:, 1].copy(), v[:, 1], a[:, 1])})
+    return replace(
+        case,
+        reference={
+            "x": Series(p[:, 0] - RADIUS, v[:, 0], a[:, 0]),
+            "y": Series(p[:, 1].copy(), v[:, 1], a[:, 1]),
+        },
+    )
 
 
 def solution(case, *, solved=None, message="", **changed):
     """The exact trajectory; changed: position, velocity or acceleration to be used instead."""
-    p, v, a = (changed.get(name, right) for name, right in zip(("position", "velocity", "acceleration"), exact(case), strict=True))
+    p, v, a = (
+        changed.get(name, right)
+        for name, right in zip(("position", "velocity", "acceleration"), exact(case), strict=True)
+    )
     solved = np.ones(len(case.sweep.values), dtype=bool) if solved is None else solved
     details = {"rank": np.int64(6), "dof": 1, "condition": np.float64(0.1), "pivots": np.arange(3)}
-    return Trajectory({"tip": PointMotion(p, v, a)}, solved, np.full(len(solved), 3), 1e-15, message, details)
+    return Trajectory(
+        {"tip": PointMotion(p, v, a)}, solved, np.full(len(solved), 3), 1e-15, message, details
+    )
 
 
 @dataclass
@@ -92,7 +103,9 @@ def off(quantity, change):
     """An answer that is right but for one quantity, changed by a function of its (n, 3) values."""
 
     def answer(case):
-        right = dict(zip(("position", "velocity", "acceleration"), exact(case), strict=True))[quantity]
+        right = dict(zip(("position", "velocity", "acceleration"), exact(case), strict=True))[
+            quantity
+        ]
         return solution(case, **{quantity: change(right.copy())})
 
     return answer
@@ -112,4 +125,11 @@ def partial(case):
     """The last two samples are out of reach."""
     solved = np.arange(SAMPLES) < SAMPLES - 2
     p, v, a = (np.where(solved[:, None], each, np.nan) for each in exact(case))
-    return solution(case, solved=solved, message="cannot be followed beyond 0.5", position=p, velocity=v, acceleration=a)
+    return solution(
+        case,
+        solved=solved,
+        message="cannot be followed beyond 0.5",
+        position=p,
+        velocity=v,
+        acceleration=a,
+    )

@@ -1,7 +1,9 @@
-"""Reads hostile files in a process with limits, and prints what came of each; started by test_hostile_files.py.
+"""Reads hostile files in a process with limits, and prints what came of each; started by
+test_hostile_files.py.
 
-Arguments: seconds of processor time, bytes of memory, a folder that must not be read. Standard input: one list of arguments of
-kincheck a line, as JSON. Standard output: for each, exit status and standard error, as JSON.
+Arguments: seconds of processor time, bytes of memory, a folder that must not be read. Standard
+input: one list of arguments of kincheck a line, as JSON. Standard output: for each, exit status and
+standard error, as JSON.
 """
 
 import contextlib
@@ -29,7 +31,8 @@ resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
 for line in sys.stdin:
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = int(used.ru_utime + used.ru_stime) + 1 + seconds
-    resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.getrlimit(resource.RLIMIT_CPU)[1]))  # beyond it: SIGXCPU ends us
+    # beyond it: SIGXCPU ends us
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.getrlimit(resource.RLIMIT_CPU)[1]))
     out, err = io.StringIO(), io.StringIO()
     opened.clear()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

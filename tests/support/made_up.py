@@ -1,4 +1,6 @@
-"""Results made up for the report: two outputs of a strut, two engines that ran and one that is not installed."""
+"""Results made up for the report: two outputs of a strut, two engines that ran and one that is not
+installed.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +9,35 @@ from typing import Any
 
 import msgspec
 from kincheck.core.harness.evidence import Evidence
-from kincheck.core.harness.record import Deviation, Deviations, Outcome, OutputSeries, Record, Results, Seconds
+from kincheck.core.harness.record import (
+    Deviation,
+    Deviations,
+    Outcome,
+    OutputSeries,
+    Record,
+    Results,
+    Seconds,
+)
 
-STROKE = {"name": "stroke", "type": "point_coordinate", "point": "wheel_center", "direction": [0.0, 0.0, 1.0]}
+STROKE = {
+    "name": "stroke",
+    "type": "point_coordinate",
+    "point": "wheel_center",
+    "direction": [0.0, 0.0, 1.0],
+}
 CRANK = {"name": "crank", "type": "joint_angle", "joint": "pivot"}
 
 
 def series(driver: list[float], error: float = 0.0) -> OutputSeries:
     position = [1e-3 * math.sin(20 * d) + error * (k % 3) for k, d in enumerate(driver)]
     velocity = [0.02 * math.cos(20 * d) - error * (k % 3) for k, d in enumerate(driver)]
-    return OutputSeries(position=position, velocity=velocity, acceleration=None, unit="m", reason="there is no acceleration")
+    return OutputSeries(
+        position=position,
+        velocity=velocity,
+        acceleration=None,
+        unit="m",
+        reason="there is no acceleration",
+    )
 
 
 def distances(a: list[float], b: list[float]) -> list[float]:
@@ -44,9 +65,13 @@ def judged(found: OutputSeries, truth: OutputSeries, tolerance: float, against: 
     )
 
 
-def record(case: str, truth: str, engine: str, error: float, grid: list[float], **changes: Any) -> Record:
+def record(
+    case: str, truth: str, engine: str, error: float, grid: list[float], **changes: Any
+) -> Record:
     found, true = series(grid, error), series(grid)
-    errors = {name: judged(found, true, 1e-9, truth) for name in ("half_track_change", "wheelbase_change")}
+    errors = {
+        name: judged(found, true, 1e-9, truth) for name in ("half_track_change", "wheelbase_change")
+    }
     outcome = Outcome.PASS if error < 1e-10 else Outcome.FAIL
     made = Record(
         case=case,
@@ -69,7 +94,9 @@ def record(case: str, truth: str, engine: str, error: float, grid: list[float], 
         samples=len(grid),
         seconds=Seconds(build=0.125, first=0.25, warm=0.0625),
         us_per_step=12.5,
-        evidence=None if truth == "consensus_only" else Evidence(citation="A. Uthor: Struts", sha256=64 * "a", of="strut.csv"),
+        evidence=None
+        if truth == "consensus_only"
+        else Evidence(citation="A. Uthor: Struts", sha256=64 * "a", of="strut.csv"),
     )
     return msgspec.structs.replace(made, **changes)
 
@@ -88,9 +115,19 @@ ACCOUNT = {
 }
 
 
-def results(truth: str = "in_house_oracle", case: str = "strut", driver: dict[str, Any] = STROKE) -> Results:
+def results(
+    truth: str = "in_house_oracle", case: str = "strut", driver: dict[str, Any] = STROKE
+) -> Results:
     native = {"dof_account": ACCOUNT, "program": {"newton": {"operations": 7231, "flops": 6702}}}
-    absent = {"outputs": {}, "errors": {}, "driver": {}, "solved": None, "samples": None, "us_per_step": None, "version": None}
+    absent = {
+        "outputs": {},
+        "errors": {},
+        "driver": {},
+        "solved": None,
+        "samples": None,
+        "us_per_step": None,
+        "version": None,
+    }
     return Results(
         run={
             "kincheck": "0.1.0",
@@ -101,7 +138,16 @@ def results(truth: str = "in_house_oracle", case: str = "strut", driver: dict[st
         records=[
             record(case, truth, "native", 1e-17, GRID, details=native),
             record(case, truth, "one", 3e-9, GRID),
-            record(case, truth, "two", 0, GRID, outcome=Outcome.UNAVAILABLE, message="two is not installed", **absent),
+            record(
+                case,
+                truth,
+                "two",
+                0,
+                GRID,
+                outcome=Outcome.UNAVAILABLE,
+                message="two is not installed",
+                **absent,
+            ),
         ],
         references={case: {"half_track_change": series(GRID), "wheelbase_change": series(GRID)}},
     )

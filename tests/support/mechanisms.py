@@ -18,7 +18,9 @@ from kincheck.core import (
 
 
 def mcpherson():
-    """The suspension of SAE 943745: body frames of its Table 4, joint points reconstructed to fit (formulation notes)."""
+    """The suspension of SAE 943745: body frames of its Table 4, joint points reconstructed to fit
+    (formulation notes).
+    """
     tilt = (np.sqrt(1.0 - 0.0265**2), 0.0, -0.0265, 0.0)
     top, lower, wheel = (1.0, 0.55, 0.6), (0.97772, 0.605, 0.180), (0.975, 0.715, 0.101)
     return Mechanism(
@@ -46,7 +48,9 @@ CRANK, ROD = 0.25, 1.0
 
 
 def slider_crank(rod=None):
-    """A crank of 0.25 m about +y, a massless rod of 1 m (or the length given), a slider along x; design: stretched out."""
+    """A crank of 0.25 m about +y, a massless rod of 1 m (or the length given), a slider along x;
+    design: stretched out.
+    """
     pin, slider = (CRANK, 0.0, 0.0), (CRANK + ROD, 0.0, 0.0)
     return Mechanism(
         "slider_crank",
@@ -72,7 +76,9 @@ A0, B0, C0, D0 = (0.0, 0.0, 0.0), (0.3, 0.0, 0.4), (1.6, 0.0, 1.2), (1.4, 0.0, 0
 
 
 def four_bar():
-    """A planar crank-rocker of four spatial revolutes about y: three rows say what others say already."""
+    """A planar crank-rocker of four spatial revolutes about y: three rows say what others say
+    already.
+    """
     y = (0.0, 1.0, 0.0)
     return Mechanism(
         "four_bar",
@@ -89,11 +95,16 @@ def four_bar():
 
 
 def four_bar_motion(angle, rate=1.0):
-    """Closed form: x and z of C, as jets: C is where the circles about B and D meet, on the side it has at design."""
+    """Closed form: x and z of C, as jets: C is where the circles about B and D meet, on the side it
+    has at design.
+    """
     theta = steady(np.asarray(angle), rate)
     c, s = cos(theta), sin(theta)
     bx, bz = c * B0[0] + s * B0[2], c * B0[2] - s * B0[0]  # a turn about +y takes z to x
-    coupler, rocker = np.subtract(C0, B0) @ np.subtract(C0, B0), np.subtract(C0, D0) @ np.subtract(C0, D0)
+    coupler, rocker = (
+        np.subtract(C0, B0) @ np.subtract(C0, B0),
+        np.subtract(C0, D0) @ np.subtract(C0, D0),
+    )
     dx, dz = D0[0] - bx, D0[2] - bz
     square = dx * dx + dz * dz
     along = (square + (coupler - rocker)) / (2.0 * square)
@@ -102,7 +113,8 @@ def four_bar_motion(angle, rate=1.0):
 
 
 def placed(mechanism, where, turn=tuple, factor=1.0):
-    """The mechanism with its points and axes sent through `where` and `turn` and its lengths multiplied by the factor.
+    """The mechanism with its points and axes sent through `where` and `turn` and its lengths
+    multiplied by the factor.
 
     Drivers along global directions stay as they are.
     """
@@ -114,7 +126,9 @@ def placed(mechanism, where, turn=tuple, factor=1.0):
     }
     joints = []
     for joint in mechanism.joints:
-        given = {each.name: getattr(joint, each.name) for each in fields(joint) if each.name in ways}
+        given = {
+            each.name: getattr(joint, each.name) for each in fields(joint) if each.name in ways
+        }
         changes = {name: ways[name](value) for name, value in given.items() if value is not None}
         joints.append(replace(joint, **changes))
     return replace(

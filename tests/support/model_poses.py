@@ -1,4 +1,6 @@
-"""Put a solution of kincheck into MuJoCo, which has loaded the model itself: coordinates, equality residuals, places of bodies."""
+"""Put a solution of kincheck into MuJoCo, which has loaded the model itself: coordinates, equality
+residuals, places of bodies.
+"""
 
 import numpy as np
 from kincheck.core.algebra import Quat, vec
@@ -29,11 +31,20 @@ def _shift(mechanism, found, name, point, k):
 
 
 def coordinate(mechanism, found, joint, k):
-    """A joint's coordinate since its design, from the poses of its bodies: angle, displacement, or the quaternion of a ball."""
+    """A joint's coordinate since its design, from the poses of its bodies: angle, displacement, or
+    the quaternion of a ball.
+    """
     outer, inner = (_turn(mechanism, found, name, k) for name in joint.bodies)
-    if joint.type == "distance":  # a rod for a body on a ball: the shortest turn that points it where it has to
-        ends = [_shift(mechanism, found, name, point, k) for name, point in zip(joint.bodies, joint.points, strict=True)]
-        then, now = (np.array(a) / np.linalg.norm(a) for a in (np.subtract(*joint.points[::-1]), ends[1] - ends[0]))
+    # a rod for a body on a ball: the shortest turn that points it where it has to
+    if joint.type == "distance":
+        ends = [
+            _shift(mechanism, found, name, point, k)
+            for name, point in zip(joint.bodies, joint.points, strict=True)
+        ]
+        then, now = (
+            np.array(a) / np.linalg.norm(a)
+            for a in (np.subtract(*joint.points[::-1]), ends[1] - ends[0])
+        )
         now = np.array([*(outer.conjugate() * Quat(0.0, vec(now)) * outer).e])
         q = np.array([1.0 + then @ now, *np.cross(then, now)])
         q /= np.linalg.norm(q)
@@ -44,13 +55,16 @@ def coordinate(mechanism, found, joint, k):
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     if joint.type == "revolute":
         return 2.0 * np.arctan2(axis @ [*between.e], between.e0)
-    apart = _shift(mechanism, found, joint.bodies[1], joint.point, k) - _shift(mechanism, found, joint.bodies[0], joint.point, k)
+    apart = _shift(mechanism, found, joint.bodies[1], joint.point, k) - _shift(
+        mechanism, found, joint.bodies[0], joint.point, k
+    )
     along = outer * Quat(0.0, vec(axis)) * outer.conjugate()
     return apart @ [*along.e]
 
 
 def mujoco_errors(mujoco, xml, case, samples):
-    """Largest equality residual in MuJoCo [m, rad], and largest distance of a body's origin from kincheck's [m].
+    """Largest equality residual in MuJoCo [m, rad], and largest distance of a body's origin from
+    kincheck's [m].
 
     A body's origin is compared where the mechanism has it.
     """
@@ -62,19 +76,31 @@ def mujoco_errors(mujoco, xml, case, samples):
     for k in samples:
         data.qpos[:] = model.qpos0
         for j in range(model.njnt):
-            name, at = model.joint(j).name or model.body(model.jnt_bodyid[j]).name, model.jnt_qposadr[j]
-            if name not in names or mechanism.joint(name).type not in ("revolute", "translational", "spherical", "distance"):
+            name, at = (
+                model.joint(j).name or model.body(model.jnt_bodyid[j]).name,
+                model.jnt_qposadr[j],
+            )
+            if name not in names or mechanism.joint(name).type not in (
+                "revolute",
+                "translational",
+                "spherical",
+                "distance",
+            ):
                 continue
             value = coordinate(mechanism, found, mechanism.joint(name), k)
             if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
                 # MuJoCo has the turn in the axes of the body, as the pose of the file has them
                 mujoco.mj_kinematics(model, home := mujoco.MjData(model))
-                frame = Quat(home.xquat[model.jnt_bodyid[j]][0], vec(home.xquat[model.jnt_bodyid[j]][1:]))
+                frame = Quat(
+                    home.xquat[model.jnt_bodyid[j]][0], vec(home.xquat[model.jnt_bodyid[j]][1:])
+                )
                 data.qpos[at : at + 4] = [*(frame.conjugate() * value * frame)]
             else:
                 data.qpos[at] += value
         driven = data.qpos[model.joint(case.sweep.driver).qposadr[0]]
-        assert abs(driven - case.sweep.values[k]) < 1e-12, "the swept coordinate is not the model's own"
+        assert abs(driven - case.sweep.values[k]) < 1e-12, (
+            "the swept coordinate is not the model's own"
+        )
         mujoco.mj_forward(model, data)
         rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         residual = max(residual, np.abs(data.efc_pos[rows]).max(initial=0.0))

@@ -1,4 +1,6 @@
-"""Histories made up night by night: the same two cases in two engines, with what a test plants in them."""
+"""Histories made up night by night: the same two cases in two engines, with what a test plants in
+them.
+"""
 
 import math
 import random
@@ -12,18 +14,32 @@ from kincheck.core.report.regression_report import regressions
 
 from .fakes import Fake, crank, off
 
-ENGINES = [Fake("native"), Fake("mujoco", answer=off("position", lambda p: p + 5e-13), installed="4.0.0")]
+ENGINES = [
+    Fake("native"),
+    Fake("mujoco", answer=off("position", lambda p: p + 5e-13), installed="4.0.0"),
+]
 RESULTS = run([crank("first"), crank("second")], ENGINES, tol=1e-12)
-FACTS = {"kincheck": "0.1.0", "python": "3.12.3", "numpy": "2.0.0", "host": "a-host", "processor": "a processor", "tol": 1e-12}
+FACTS = {
+    "kincheck": "0.1.0",
+    "python": "3.12.3",
+    "numpy": "2.0.0",
+    "host": "a-host",
+    "processor": "a processor",
+    "tol": 1e-12,
+}
 
 
 def records(*, noise=None):
-    """Records as every night has them, each with 10 ms a solve; noise: a generator of random numbers, for up to 10 % about that."""
+    """Records as every night has them, each with 10 ms a solve; noise: a generator of random
+    numbers, for up to 10 % about that.
+    """
 
     def timed(record):
         warm = 0.010 * (math.exp(noise.uniform(-0.1, 0.1)) if noise else 1.0)
         seconds = Seconds(build=0.1, first=0.05, warm=warm, waited=0.0, compare=0.001)
-        return msgspec.structs.replace(record, seconds=seconds, us_per_step=1e6 * warm / record.samples)
+        return msgspec.structs.replace(
+            record, seconds=seconds, us_per_step=1e6 * warm / record.samples
+        )
 
     return [timed(record) for record in RESULTS.records]
 
@@ -34,7 +50,10 @@ def changed(all_records, *, case="first", engine="mujoco", **changes):
     def one(record):
         if (record.case, record.engine) != (case, engine):
             return record
-        values = {name: change(getattr(record, name)) if callable(change) else change for name, change in changes.items()}
+        values = {
+            name: change(getattr(record, name)) if callable(change) else change
+            for name, change in changes.items()
+        }
         return msgspec.structs.replace(record, **values)
 
     return [one(record) for record in all_records]
@@ -61,13 +80,22 @@ def keep(path, all_records, *, status="finished", **facts):
     with Store(path) as store:
         day = len(store.runs()) + 1
         git = {"commit": f"{day:02x}" * 20, "branch": "main", "changed": False}
-        known = {**FACTS, "started": f"2026-11-{day:02d}T03:00:00+00:00", "command": "kincheck run", "git": git}
+        known = {
+            **FACTS,
+            "started": f"2026-11-{day:02d}T03:00:00+00:00",
+            "command": "kincheck run",
+            "git": git,
+        }
         known |= {"calibration_seconds": 0.02, "cases": RESULTS.run["cases"], **facts}
-        run_number = store.begin_run("same", [(each.case, each.engine, each.mode) for each in all_records], known)
+        run_number = store.begin_run(
+            "same", [(each.case, each.engine, each.mode) for each in all_records], known
+        )
         for record in all_records:
             store.add_record(run_number, record)
         if status != "running":
-            store.finish(run_number, msgspec.structs.replace(RESULTS, run=known, records=all_records), status)
+            store.finish(
+                run_number, msgspec.structs.replace(RESULTS, run=known, records=all_records), status
+            )
     return run_number
 
 

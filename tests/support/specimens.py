@@ -1,4 +1,6 @@
-"""Random primitives between random moving bodies, a thousand lanes each; one maker for each type of primitive."""
+"""Random primitives between random moving bodies, a thousand lanes each; one maker for each type of
+primitive.
+"""
 
 import importlib
 import pkgutil
@@ -21,7 +23,11 @@ def discovered():
         importlib.import_module(f"{p.__name__}.{module.name}")
     waiting, found = [Primitive], []
     while waiting:
-        subtypes = [each for each in waiting.pop().__subclasses__() if each.__module__.startswith("kincheck.")]
+        subtypes = [
+            each
+            for each in waiting.pop().__subclasses__()
+            if each.__module__.startswith("kincheck.")
+        ]
         waiting += subtypes
         found += subtypes
     return sorted(found, key=lambda each: each.__name__)
@@ -107,7 +113,9 @@ def body(rng):
 
 @dataclass(frozen=True)
 class DriverMotion:
-    """A driver's value and derivatives, as numbers for rows and right-hand sides and as jets for phi."""
+    """A driver's value and derivatives, as numbers for rows and right-hand sides and as jets for
+    phi.
+    """
 
     numbers: Drive
     jets: Drive
@@ -116,7 +124,9 @@ class DriverMotion:
 def driver_motion(rng):
     c, c_t, c_tt = 3.0 * rng.normal(size=(3, LANES))
     cosine, sine = cos_sin(Jet(0.5 * c, 0.5 * c_t, 0.5 * c_tt))
-    return DriverMotion(Drive(c, c_t, c_tt, cosine.x, sine.x), Drive(Jet(c, c_t, c_tt), 0.0, 0.0, cosine, sine))
+    return DriverMotion(
+        Drive(c, c_t, c_tt, cosine.x, sine.x), Drive(Jet(c, c_t, c_tt), 0.0, 0.0, cosine, sine)
+    )
 
 
 # One maker for each primitive
@@ -124,12 +134,16 @@ def driver_motion(rng):
 
 @dataclass(frozen=True)
 class Specimen:
-    """A primitive with geometry in lanes, and how to get body j admissible where its rows are simplified."""
+    """A primitive with geometry in lanes, and how to get body j admissible where its rows are
+    simplified.
+    """
 
     primitive: Primitive
     drive: DriverMotion | None = None
     on_manifold: Callable[[Body, Body], tuple[Body, Body]] | None = None
-    """(i, j) -> (i, j) with phi = 0 and rows . velocity = nu; None: rows and gamma are exact anywhere."""
+    """(i, j) -> (i, j) with phi = 0 and rows . velocity = nu; None: rows and gamma are exact
+    anywhere.
+    """
 
 
 def dot10(rng):
@@ -156,7 +170,9 @@ def dot12(rng):
 
 def dot20(rng):
     drive = driver_motion(rng)
-    return Specimen(p.Dot20(direction(rng), vector(rng), vector(rng), vector(rng), drive.numbers), drive)
+    return Specimen(
+        p.Dot20(direction(rng), vector(rng), vector(rng), vector(rng), drive.numbers), drive
+    )
 
 
 def dot21(rng):
@@ -171,7 +187,9 @@ def locked_displacement(rng):
 
 def distance(rng):
     d0 = vector(rng)
-    return Specimen(p.Distance(vector(rng), vector(rng), d0, rng.uniform(0.5, 2.0, LANES), np.sqrt(d0 @ d0)))
+    return Specimen(
+        p.Distance(vector(rng), vector(rng), d0, rng.uniform(0.5, 2.0, LANES), np.sqrt(d0 @ d0))
+    )
 
 
 def spherical(rng):
@@ -234,17 +252,25 @@ MAKERS = {
 
 
 def entry(table, kind):
-    """What a table says of a type or of the nearest type it derives from: another row style has the same fields."""
+    """What a table says of a type or of the nearest type it derives from: another row style has the
+    same fields.
+    """
     return next((table[each] for each in kind.__mro__ if each in table), None)
 
 
 def make(kind, rng):
-    """A specimen of a type, by its own maker or by that of the type it restyles without further fields."""
+    """A specimen of a type, by its own maker or by that of the type it restyles without further
+    fields.
+    """
     maker = entry(MAKERS, kind)
     untested = f"{kind.__name__} is not tested: add a maker for it to MAKERS in tests/specimens.py"
     assert maker, untested
     specimen = maker(rng)
-    required = {each.name for each in fields(kind) if each.default is MISSING and each.default_factory is MISSING}
+    required = {
+        each.name
+        for each in fields(kind)
+        if each.default is MISSING and each.default_factory is MISSING
+    }
     assert required <= {each.name for each in fields(specimen.primitive)}, untested
     return replace(specimen, primitive=retyped(specimen.primitive, kind))
 
@@ -255,6 +281,8 @@ def retyped(primitive, kind):
 
 
 def admissible(specimen, rng):
-    """Two moving bodies: any where the primitive is exact, else on its manifold with admissible velocities."""
+    """Two moving bodies: any where the primitive is exact, else on its manifold with admissible
+    velocities.
+    """
     i, j = body(rng), body(rng)
     return specimen.on_manifold(i, j) if specimen.on_manifold else (i, j)

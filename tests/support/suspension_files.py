@@ -33,7 +33,9 @@ def loaded(data, csv=TABLE):
 
 
 def mirrored(data, turn=MIRROR):
-    """The same data in other axes, without a reference; a mirror image is a wheel of the other side."""
+    """The same data in other axes, without a reference; a mirror image is a wheel of the other
+    side.
+    """
     data = deepcopy(unreferenced(data))
 
     def moved(table, *names):

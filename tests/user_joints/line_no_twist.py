@@ -20,4 +20,8 @@ class LineNoTwist(Joint):
 
     def primitives(self, i, j):
         P, (x, y, _) = vec(self.point), triad(self.axis)
-        return p.Dot20(x, i.arm(P), j.arm(P), ZERO), p.Dot20(y, i.arm(P), j.arm(P), ZERO), p.Dot10(x, y)
+        return (
+            p.Dot20(x, i.arm(P), j.arm(P), ZERO),
+            p.Dot20(y, i.arm(P), j.arm(P), ZERO),
+            p.Dot10(x, y),
+        )

@@ -28,7 +28,10 @@ class Parabola(Primitive):
         return (y - x * x * (0.5 / self.R),)
 
     def rows(self, i, j):
-        (x, _), (along, up) = self.xy(lambda dot: dot.phi(i, j)), self.xy(lambda dot: dot.rows(i, j))
+        (x, _), (along, up) = (
+            self.xy(lambda dot: dot.phi(i, j)),
+            self.xy(lambda dot: dot.rows(i, j)),
+        )
         return (Row(*(u - (x / self.R) * a for u, a in zip(up, along, strict=True))),)
 
     def gamma(self, i, j, vi, vj):

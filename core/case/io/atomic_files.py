@@ -1,4 +1,6 @@
-"""Files written whole or not at all; what cannot be written is told, before the work where that can be seen."""
+"""Files written whole or not at all; what cannot be written is told, before the work where that can
+be seen.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,10 @@ def written(path: Path, content: Content) -> list[str]:
     try:
         _put(path, content)
     except OSError as error:
-        return [f"{path}: cannot be written ({error.strerror or error}); what else was asked for is tried"]
+        return [
+            f"{path}: cannot be written ({error.strerror or error}); what else was asked for is"
+            " tried"
+        ]
     return []
 
 
@@ -45,7 +50,8 @@ def write(option: str, path: Path, content: Content) -> Any:
     except OSError as error:
         why = error.strerror or error
         raise KincheckError(
-            f"{option} {path}: cannot be written ({why}); give a file in a folder that exists and is writable"
+            f"{option} {path}: cannot be written ({why}); give a file in a folder that exists and"
+            " is writable"
         ) from None
 
 
@@ -56,9 +62,13 @@ def _put(path: Path, content: Content) -> Any:
 
 @contextmanager
 def _whole(path: Path) -> Generator[Path]:
-    """A path to write to, which becomes the file when all is written; until then, and if it fails, what stood there stays."""
-    there, file = path.exists(), path.resolve()  # what a link leads to; a pipe without a name is nowhere
-    if there and not (path.is_file() and os.access(file.parent, os.W_OK)):  # a pipe, a device, or in a folder of others
+    """A path to write to, which becomes the file when all is written; until then, and if it fails,
+    what stood there stays.
+    """
+    # what a link leads to; a pipe without a name is nowhere
+    there, file = path.exists(), path.resolve()
+    # a pipe, a device, or in a folder of others
+    if there and not (path.is_file() and os.access(file.parent, os.W_OK)):
         yield path
         return
     part = file.with_name(f".{uuid4().hex}.part")  # another run may be writing the same file
@@ -84,20 +94,36 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
             continue
         path = Path(name)
         if path == Path("-"):
-            found.append(f"{option} -: standard output takes the document of --json alone; give a file")
-        elif path.is_dir() or not path.parent.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-            found.append(f"{option} {path}: cannot be written; give a file in a folder that exists and is writable")
+            found.append(
+                f"{option} -: standard output takes the document of --json alone; give a file"
+            )
+        elif (
+            path.is_dir()
+            or not path.parent.is_dir()
+            or not os.access(path if path.exists() else path.parent, os.W_OK)
+        ):
+            found.append(
+                f"{option} {path}: cannot be written; give a file in a folder that exists and is"
+                " writable"
+            )
         elif _is_standard_output(path):
-            found.append(f"{option} {path}: found the file that standard output goes to, expected one of its own; give another")
+            found.append(
+                f"{option} {path}: found the file that standard output goes to, expected one of its"
+                " own; give another"
+            )
         elif path.exists() and not path.is_file():
             continue  # a pipe or a device takes what several have to say
         elif (other := seen.setdefault(path.resolve(), option)) != option:
-            found.append(f"{option} {path}: found the file of {other}, expected one of its own; give another")
+            found.append(
+                f"{option} {path}: found the file of {other}, expected one of its own; give another"
+            )
     return found
 
 
 def _is_standard_output(path: Path) -> bool:
-    """Whether it is the file that standard output is sent to, under any name: one would take the other's place."""
+    """Whether it is the file that standard output is sent to, under any name: one would take the
+    other's place.
+    """
     try:
         return path.is_file() and os.path.samestat(path.stat(), os.fstat(1))
     except OSError:  # closed
@@ -105,7 +131,9 @@ def _is_standard_output(path: Path) -> bool:
 
 
 def to_standard_output(encoded: bytes) -> None:
-    """Write a JSON document to standard output: in UTF-8, as it has to be, whatever the encoding of texts is there."""
+    """Write a JSON document to standard output: in UTF-8, as it has to be, whatever the encoding of
+    texts is there.
+    """
     sys.stdout.flush()
     binary: BinaryIO | None = getattr(sys.stdout, "buffer", None)
     if binary is None:  # a caller has put something in its place that takes texts alone

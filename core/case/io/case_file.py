@@ -35,47 +35,77 @@ if TYPE_CHECKING:
     from .suspension import SuspensionTable
 
 LARGEST_FILE = 4_000_000
-# Twice as many bodies as the largest mechanism that was measured, and joints and points beside them.
+# Twice as many bodies as the largest mechanism that was measured, and joints and points beside
+# them.
 MOST_PARTS = 60_000
 _PARTS = ("bodies", "joints", "points", "drivers", "outputs")
 
 
 def load_case(path: str | Path) -> Case:
-    """The case in a file, in SI units. Without a [reference] it is consensus_only, whatever it claims.
+    """The case in a file, in SI units. Without a [reference] it is consensus_only, whatever it
+    claims.
 
     Raises:
-        CaseError: the file, or its reference, cannot be read or does not make sense; the message names file, key and remedy.
+        CaseError: the file, or its reference, cannot be read or does not make sense; the message
+            names file, key and remedy.
     """
     file = Path(path)
-    tables = parse(file, read_text(file, LARGEST_FILE, "a case holds hardpoints; samples belong into a reference file"))
+    tables = parse(
+        file,
+        read_text(
+            file, LARGEST_FILE, "a case holds hardpoints; samples belong into a reference file"
+        ),
+    )
     if tables.get("schema") != SCHEMA:
         found = shown(tables["schema"]) if "schema" in tables else "none"
-        raise fault(file, "schema", f'found {found}, expected "{SCHEMA}"; write schema = "{SCHEMA}"')
+        raise fault(
+            file, "schema", f'found {found}, expected "{SCHEMA}"; write schema = "{SCHEMA}"'
+        )
     keys = typed(file, "", tables, CaseKeys)
     for what in _PARTS:
         if (count := len(getattr(keys, what))) > MOST_PARTS:
-            raise fault(file, what, f"found {count}, expected {MOST_PARTS} at most; divide the mechanism into several cases")
+            raise fault(
+                file,
+                what,
+                f"found {count}, expected {MOST_PARTS} at most; divide the mechanism into several"
+                " cases",
+            )
     units = typed(file, "units", keys.units, UnitsKeys)
     length, angle = LENGTHS[units.length], ANGLES[units.angle]
     mechanism = _mechanism(file, keys, length)
     sweep, driver_unit = read_sweep(file, keys, mechanism, length, angle)
     by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float}
     case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    case = _with_outputs(file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit)
+    case = _with_outputs(
+        file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
+    )
     if keys.reference is None:
         return case
     if keys.truth in (None, Truth.CONSENSUS_ONLY):
         found = "nothing" if keys.truth is None else shown(str(keys.truth))
         kinds = ", ".join(kind for kind in Truth if kind is not Truth.CONSENSUS_ONLY)
-        raise fault(file, "truth", f"found {found} beside a [reference], expected where that comes from; give one of {kinds}")
+        raise fault(
+            file,
+            "truth",
+            f"found {found} beside a [reference], expected where that comes from; give one of"
+            f" {kinds}",
+        )
     columns = typed(file, "reference", keys.reference, ReferenceKeys)
-    convention = "" if keys.suspension is None else str(as_table(file, "suspension", keys.suspension)["convention"])
-    series = read_reference(file, columns, driver_unit, by_unit, sweep.values, case.outputs, convention)
+    convention = (
+        ""
+        if keys.suspension is None
+        else str(as_table(file, "suspension", keys.suspension)["convention"])
+    )
+    series = read_reference(
+        file, columns, driver_unit, by_unit, sweep.values, case.outputs, convention
+    )
     return replace(case, truth=keys.truth, reference=series, origin=read_origin(file, columns))
 
 
 def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:
-    """A field of a joint in SI; directions and plain numbers have no unit, and what may be left out is None then."""
+    """A field of a joint in SI; directions and plain numbers have no unit, and what may be left out
+    is None then.
+    """
     if value is None:
         return None
     match kind:
@@ -94,12 +124,22 @@ def _mechanism(file: Path, keys: CaseKeys, length: Unit) -> Mechanism:
     for name, value in keys.bodies.items():
         body = typed(file, key := join("bodies", name), value, BodyKeys)
         with explained(file, key):
-            bodies.append(Body(name, _scaled(Kind.POSITION, body.origin, length), body.euler_parameters, body.fixed))
+            bodies.append(
+                Body(
+                    name,
+                    _scaled(Kind.POSITION, body.origin, length),
+                    body.euler_parameters,
+                    body.fixed,
+                )
+            )
     points: list[Point] = []
     for name, value in keys.points.items():
         point = typed(file, join("points", name), value, PointKeys)
         points.append(Point(name, point.body, _scaled(Kind.POSITION, point.position, length)))
-    joined = [_joint(file, join("joints", name), name, value, length) for name, value in keys.joints.items()]
+    joined = [
+        _joint(file, join("joints", name), name, value, length)
+        for name, value in keys.joints.items()
+    ]
     joints = [each for each in joined if isinstance(each, Joint)]
     couplers = [each for each in joined if isinstance(each, Coupler)]
     drivers = read_drivers(file, keys.drivers)
@@ -110,9 +150,16 @@ def _mechanism(file: Path, keys: CaseKeys, length: Unit) -> Mechanism:
 def _joint(file: Path, key: str, name: str, value: object, length: Unit) -> Joint | Coupler:
     cls = class_of(file, key, "joint", value, Joint.registry | Coupler.registry)
     keys: Any = typed(file, key, value, joint_keys(cls))
-    given = {each.name: _scaled(kind_of(each), getattr(keys, each.name), length) for each in own_fields(cls)}
+    given = {
+        each.name: _scaled(kind_of(each), getattr(keys, each.name), length)
+        for each in own_fields(cls)
+    }
     with explained(file, key, length, value):
-        return cls(name, keys.joints, **given) if issubclass(cls, Coupler) else cls(name, *keys.bodies, **given)
+        return (
+            cls(name, keys.joints, **given)
+            if issubclass(cls, Coupler)
+            else cls(name, *keys.bodies, **given)
+        )
 
 
 def _unit(direction: Vector) -> Vector:
@@ -121,11 +168,17 @@ def _unit(direction: Vector) -> Vector:
     return x / length, y / length, z / length
 
 
-def _with_outputs(file: Path, keys: CaseKeys, case: Case, length: Unit, units: Mapping[str, Convert]) -> Case:
+def _with_outputs(
+    file: Path, keys: CaseKeys, case: Case, length: Unit, units: Mapping[str, Convert]
+) -> Case:
     """The case with its outputs, and with the points that they need beyond those of the file."""
     mechanism = case.mechanism
     if not keys.points:
-        raise fault(file, "points", "found no point, expected one whose motion is compared; add [points.NAME]")
+        raise fault(
+            file,
+            "points",
+            "found no point, expected one whose motion is compared; add [points.NAME]",
+        )
     if keys.suspension is None:
         outputs = _outputs(file, keys, None, case, units)
         return replace(case, outputs=outputs) if outputs else with_all_coordinates(case)
@@ -134,43 +187,91 @@ def _with_outputs(file: Path, keys: CaseKeys, case: Case, length: Unit, units: M
     table = suspension.read_suspension(file, keys.suspension, mechanism, length, units["rad"])
     outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=suspension.with_markers(mechanism, outputs), outputs=outputs)
-    return replace(case, outputs=suspension.with_slopes(outputs, size(case))) if table.per_travel else case
+    return (
+        replace(case, outputs=suspension.with_slopes(outputs, size(case)))
+        if table.per_travel
+        else case
+    )
 
 
 def _outputs(
-    file: Path, keys: CaseKeys, table: SuspensionTable | None, case: Case, units: Mapping[str, Convert]
+    file: Path,
+    keys: CaseKeys,
+    table: SuspensionTable | None,
+    case: Case,
+    units: Mapping[str, Convert],
 ) -> tuple[Quantity, ...]:
     """Those that the file names."""
-    return tuple(_output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items())
+    return tuple(
+        _output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items()
+    )
 
 
 def _output(
-    file: Path, name: str, value: object, keys: CaseKeys, table: SuspensionTable | None, case: Case, units: Mapping[str, Convert]
+    file: Path,
+    name: str,
+    value: object,
+    keys: CaseKeys,
+    table: SuspensionTable | None,
+    case: Case,
+    units: Mapping[str, Convert],
 ) -> Quantity:
     key = join("outputs", name)
     if is_derivative(name) or name.endswith(PER_TRAVEL):
-        raise fault(file, key, "a name with this ending is a derivative in reference tables; give the output another name")
+        raise fault(
+            file,
+            key,
+            "a name with this ending is a derivative in reference tables; give the output another"
+            " name",
+        )
     if as_table(file, key, value).get("type", COORDINATE) != COORDINATE:
         from .suspension import SuspensionOutput, read_output
 
-        cls = class_of(file, key, "output", value, {COORDINATE: Output, **SuspensionOutput.registry})
+        cls = class_of(
+            file, key, "output", value, {COORDINATE: Output, **SuspensionOutput.registry}
+        )
         if issubclass(cls, SuspensionOutput):
             return read_output(file, key, cls, name, value, table, case, units)
     return _coordinate(file, key, name, value, keys, case, units["m"])
 
 
-def _coordinate(file: Path, key: str, name: str, value: object, keys: CaseKeys, case: Case, length: Convert) -> Output:
+def _coordinate(
+    file: Path, key: str, name: str, value: object, keys: CaseKeys, case: Case, length: Convert
+) -> Output:
     output = typed(file, key, value, OutputKeys)
     if output.point not in keys.points:
-        raise fault(file, join(key, "point"), f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}")
+        raise fault(
+            file,
+            join(key, "point"),
+            f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}",
+        )
     match output.component, output.direction:
         case str(axis), None:
             direction = AXES[axis]
         case None, (_, _, _) as found:
             if not any(found):
-                raise fault(file, join(key, "direction"), "found zero, expected a direction; give one of any other length")
+                raise fault(
+                    file,
+                    join(key, "direction"),
+                    "found zero, expected a direction; give one of any other length",
+                )
             direction = _unit(found)
         case component, _:
-            what = "neither component nor direction" if component is None else "both component and direction"
-            raise fault(file, key, f'found {what}, expected one of them; give component = "x" or direction = [x, y, z]')
-    return Output(name, output.point, direction, output.relative, *tolerance(file, key, output, length, size(case)))
+            what = (
+                "neither component nor direction"
+                if component is None
+                else "both component and direction"
+            )
+            raise fault(
+                file,
+                key,
+                f'found {what}, expected one of them; give component = "x" or direction = [x,'
+                " y, z]",
+            )
+    return Output(
+        name,
+        output.point,
+        direction,
+        output.relative,
+        *tolerance(file, key, output, length, size(case)),
+    )

@@ -1,4 +1,6 @@
-"""Case files, written: a `Case` as TOML of the schema kincheck-case/1, in SI units, every number with all its digits."""
+"""Case files, written: a `Case` as TOML of the schema kincheck-case/1, in SI units, every number
+with all its digits.
+"""
 
 from __future__ import annotations
 
@@ -17,24 +19,32 @@ from .coordinates import AXES
 from .schema import SCHEMA, own_fields
 
 # What a body has unless the file says otherwise.
-PLAIN: Mapping[str, Any] = {"origin": (0.0, 0.0, 0.0), "euler_parameters": (1.0, 0.0, 0.0, 0.0), "fixed": False}
+PLAIN: Mapping[str, Any] = {
+    "origin": (0.0, 0.0, 0.0),
+    "euler_parameters": (1.0, 0.0, 0.0, 0.0),
+    "fixed": False,
+}
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
-    """The text of a case file that is read as the same case, its reference excepted; samples to the last place.
+    """The text of a case file that is read as the same case, its reference excepted; samples to the
+    last place.
 
     Args:
         comments: lines to put on top.
 
     Raises:
-        CaseError: the case has what no case file can say: samples that are no even grid, or an output of a suspension.
+        CaseError: the case has what no case file can say: samples that are no even grid, or an
+            output of a suspension.
     """
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
     mechanism = case.mechanism
     for body in mechanism.bodies:
         given = {f.name: getattr(body, f.name) for f in fields(body) if f.name != "name"}
-        lines += _table("bodies", body.name, {key: value for key, value in given.items() if value != PLAIN[key]})
+        lines += _table(
+            "bodies", body.name, {key: value for key, value in given.items() if value != PLAIN[key]}
+        )
     for joint in (*mechanism.joints, *mechanism.grounded, *mechanism.couplers):
         what = {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         lines += _table("joints", joint.name, {"type": joint.type, **what, **_own(joint)})
@@ -46,7 +56,9 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         motion = case.sweep.motions.get(driver.name)
         if motion is not None:
             moved = motion.motion if isinstance(motion, Absolute) else motion
-            lines += _table(f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)})
+            lines += _table(
+                f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
+            )
     lines += ["", "[sweep]", *_keys(_sweep(case))]
     for output in case.outputs:
         lines += _table("outputs", output.name, dict(_output(case, output)))
@@ -56,19 +68,28 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
 def _sweep(case: Case) -> Mapping[str, Any]:
     sweep, values = case.sweep, case.sweep.values
     start, stop = float(values[0]), float(values[-1])
-    rounding = 4.0 * np.spacing(np.abs(values).max())  # of start + k * step, once in the file's units and once here
+    # of start + k * step, once in the file's units and once here
+    rounding = 4.0 * np.spacing(np.abs(values).max())
     if not (np.abs(np.linspace(start, stop, len(values)) - values) <= rounding).all():
-        raise CaseError(f"case {case.name!r}: its samples are no even grid, which is all that [sweep] can say; give an even one")
+        raise CaseError(
+            f"case {case.name!r}: its samples are no even grid, which is all that [sweep] can say;"
+            " give an even one"
+        )
     rate = {} if sweep.driver == TIME else {"rate": sweep.rate}
     return {"driver": sweep.driver, "start": start, "stop": stop, "steps": len(values), **rate}
 
 
 def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
     if not isinstance(output, Output):
-        raise CaseError(f"case {case.name!r}: output {output.name!r} is not a coordinate of a point; leave it out")
+        raise CaseError(
+            f"case {case.name!r}: output {output.name!r} is not a coordinate of a point; leave"
+            " it out"
+        )
     component = next((name for name, axis in AXES.items() if axis == output.direction), None)
     yield "point", output.point
-    yield from [("direction", output.direction)] if component is None else [("component", component)]
+    yield from (
+        [("direction", output.direction)] if component is None else [("component", component)]
+    )
     yield "relative", output.relative
     yield from (("atol", output.atol), ("rtol", output.rtol), ("why", output.why))
 
@@ -76,7 +97,9 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
 def _own(item: Any) -> Mapping[str, Any]:
     """The fields that a file gives; what may be left out and is, is not written."""
     described: Any = type(item)  # pyright: ignore[reportUnknownVariableType]
-    return {f.name: value for f in own_fields(described) if (value := getattr(item, f.name)) is not None}
+    return {
+        f.name: value for f in own_fields(described) if (value := getattr(item, f.name)) is not None
+    }
 
 
 def _table(room: str, name: str, values: Mapping[str, Any]) -> list[str]:
@@ -89,7 +112,11 @@ def _keys(values: Mapping[str, Any]) -> list[str]:
 
 def _key(name: str) -> str:
     """Bare where TOML allows it."""
-    return name if name.replace("_", "a").replace("-", "a").isalnum() and name.isascii() else json.dumps(name)
+    return (
+        name
+        if name.replace("_", "a").replace("-", "a").isalnum() and name.isascii()
+        else json.dumps(name)
+    )
 
 
 def _value(value: Any) -> str:

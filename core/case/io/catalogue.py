@@ -1,4 +1,6 @@
-"""The types that a case file can name, read off the registries: their keys, and what joints take and leave."""
+"""The types that a case file can name, read off the registries: their keys, and what joints take
+and leave.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,9 @@ from ..suspension import SuspensionOutput, own_keys
 from .driving import DRIVERS
 from .schema import kind_of, own_fields
 
-# Geometry that suits any joint. The two directions make a right angle up to the rounding of a table, as a cross wants it, and
-# point the same way on, as the shafts of a constant-velocity joint do.
+# Geometry that suits any joint. The two directions make a right angle up to the rounding of a
+# table, as a cross wants it, and point the same way on, as the shafts of a constant-velocity joint
+# do.
 _EXAMPLES: Mapping[Kind | None, Any] = {
     Kind.POSITION: (0.0, 0.0, 0.0),
     Kind.DIRECTION: (1.0, 0.0, 0.0),
@@ -28,35 +31,59 @@ _EXAMPLES: Mapping[Kind | None, Any] = {
 
 def catalogue() -> Iterator[str]:
     """Lines to print: joints, couplers, drivers and motions, a type each."""
-    yield "points and directions are [x, y, z], global, at the design; of points and axes there is one on each body"
+    yield (
+        "points and directions are [x, y, z], global, at the design; of points and axes there is"
+        " one on each body"
+    )
     yield "keys in brackets may be left out; body i is the first, j the second"
     yield 'joints: type, bodies = ["first", "second"], and'
-    yield from _columns([(name, _keys(cls), *_counts(cls), _meaning(cls)) for name, cls in sorted(Joint.registry.items())])
+    yield from _columns(
+        [
+            (name, _keys(cls), *_counts(cls), _meaning(cls))
+            for name, cls in sorted(Joint.registry.items())
+        ]
+    )
     yield 'joints that couple two others: type, joints = ["first", "second"], and'
     couplers = sorted(Coupler.registry.items())
     yield from _columns(
-        [(name, _keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}", _meaning(cls)) for name, cls in couplers]
+        [
+            (name, _keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}", _meaning(cls))
+            for name, cls in couplers
+        ]
     )
     yield "drivers: type, and"
-    yield from _columns([(name, _keys(cls), _meaning(cls)) for name, cls in sorted(DRIVERS.items())])
+    yield from _columns(
+        [(name, _keys(cls), _meaning(cls)) for name, cls in sorted(DRIVERS.items())]
+    )
     yield "motions of drivers: type, and"
-    yield from _columns([(name, _keys(cls), _meaning(cls)) for name, cls in sorted(Motion.registry.items())])
+    yield from _columns(
+        [(name, _keys(cls), _meaning(cls)) for name, cls in sorted(Motion.registry.items())]
+    )
 
 
 def output_catalogue() -> Iterator[str]:
-    """Lines to print: the types of outputs, with their unit, their keys, what they need of [suspension], and their signs."""
+    """Lines to print: the types of outputs, with their unit, their keys, what they need of
+    [suspension], and their signs.
+    """
     yield "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and"
     rows: list[tuple[str, ...]] = []
     for name, cls in sorted(SuspensionOutput.registry.items()):
-        keys = [each.name if each.default is MISSING else f"({each.name})" for each in own_keys(cls)]
+        keys = [
+            each.name if each.default is MISSING else f"({each.name})" for each in own_keys(cls)
+        ]
         needs = f"needs {', '.join(cls.needs)}" if cls.needs else ""
         rows.append((name, f"[{cls.measure}]", ", ".join(keys), f"positive: {cls.positive}", needs))
     yield from _columns(rows)
-    yield "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table [suspension] says of which wheel"
+    yield (
+        "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table"
+        " [suspension] says of which wheel"
+    )
 
 
 def rows_of(cls: type[Joint]) -> int | None:
-    """Number of constraint equations of a joint type; None where the example geometry is none for it."""
+    """Number of constraint equations of a joint type; None where the example geometry is none for
+    it.
+    """
     given = {each.name: _EXAMPLES[kind_of(each)] for each in own_fields(cls)}
     try:
         return cls("example", "first", "second", **given).rows
@@ -65,7 +92,9 @@ def rows_of(cls: type[Joint]) -> int | None:
 
 
 def _counts(cls: type[Joint]) -> tuple[str, str]:
-    """How many rows a joint takes, and how many freedoms it leaves and which, where they have names."""
+    """How many rows a joint takes, and how many freedoms it leaves and which, where they have
+    names.
+    """
     rows = rows_of(cls)
     count, left = ("?", "?") if rows is None else (str(rows), str(6 - rows))
     names = f": {', '.join(cls.freedoms)}" if cls.freedoms else ""
@@ -83,7 +112,9 @@ def _keys(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str
 
 
 def _meaning(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str:
-    """The first line of what a class says of itself; a dataclass that says nothing has its signature there."""
+    """The first line of what a class says of itself; a dataclass that says nothing has its
+    signature there.
+    """
     first, *_ = (cls.__doc__ or "").strip().splitlines() or [""]
     return "" if first.startswith(f"{cls.__name__}(") else first
 
@@ -91,4 +122,7 @@ def _meaning(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> 
 def _columns(rows: list[tuple[str, ...]]) -> Iterator[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
-        yield "  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        yield (
+            "  "
+            + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        )

@@ -20,21 +20,41 @@ from .document import class_of, explained, fault, join, shown, typed
 from .reference import Convert
 from .schema import CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
 
-DRIVERS: Mapping[str, type[Driver]] = {cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)}
+DRIVERS: Mapping[str, type[Driver]] = {
+    cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)
+}
 
 
 def read_drivers(file: Path, tables: Mapping[str, Any]) -> list[Driver]:
-    """The drivers of [drivers]; their motions are read by `read_sweep`, because what they mean depends on it."""
+    """The drivers of [drivers]; their motions are read by `read_sweep`, because what they mean
+    depends on it.
+    """
     if not tables:
-        raise fault(file, "drivers", "found no driver, expected at least one that moves; add [drivers.NAME]")
+        raise fault(
+            file, "drivers", "found no driver, expected at least one that moves; add [drivers.NAME]"
+        )
     if TIME in tables:
-        raise fault(file, join("drivers", TIME), f"found the name {TIME!r}, which [sweep] has for time itself; rename the driver")
+        raise fault(
+            file,
+            join("drivers", TIME),
+            f"found the name {TIME!r}, which [sweep] has for time itself; rename the driver",
+        )
     found = [_driver(file, join("drivers", name), name, value) for name, value in tables.items()]
     driven: dict[tuple[str, str], str] = {}
     for each in found:
-        if isinstance(each, JointDriver) and (other := driven.setdefault((each.joint, each.freedom), each.name)) != each.name:
-            problem = f"found {shown(each.joint)}, whose {each.freedom} {other!r} drives already, expected another joint"
-            raise fault(file, join(join("drivers", each.name), "joint"), f"{problem}; remove one of the drivers")
+        if (
+            isinstance(each, JointDriver)
+            and (other := driven.setdefault((each.joint, each.freedom), each.name)) != each.name
+        ):
+            problem = (
+                f"found {shown(each.joint)}, whose {each.freedom} {other!r} drives already,"
+                " expected another joint"
+            )
+            raise fault(
+                file,
+                join(join("drivers", each.name), "joint"),
+                f"{problem}; remove one of the drivers",
+            )
     return found
 
 
@@ -45,58 +65,102 @@ def _driver(file: Path, key: str, name: str, value: object) -> Driver:
         return cls(name, **{each.name: keys[each.name] for each in own_fields(cls)})
 
 
-def read_sweep(file: Path, keys: CaseKeys, mechanism: Mechanism, length: Unit, angle: Unit) -> tuple[Sweep, Unit]:
+def read_sweep(
+    file: Path, keys: CaseKeys, mechanism: Mechanism, length: Unit, angle: Unit
+) -> tuple[Sweep, Unit]:
     """The sweep with the motions of all other drivers, and what makes SI of what is swept."""
     sweep = typed(file, "sweep", keys.sweep, SweepKeys)
-    moved = {name: value["motion"] for name, value in keys.drivers.items() if value.get("motion") is not None}
+    moved = {
+        name: value["motion"]
+        for name, value in keys.drivers.items()
+        if value.get("motion") is not None
+    }
     _check(file, sweep, keys.sweep, keys.drivers, moved)
-    motions = {name: _motion(file, mechanism, name, value, length, angle) for name, value in moved.items()}
+    motions = {
+        name: _motion(file, mechanism, name, value, length, angle) for name, value in moved.items()
+    }
     convert, design = SECOND, 0.0
     if sweep.driver != TIME:
         driver = mechanism.driver(sweep.driver)
         convert, design = _unit(driver, length, angle), mechanism.design_value(sweep.driver)
-    grid = np.array([convert(value) for value in np.linspace(sweep.start, sweep.stop, sweep.steps).tolist()])
-    found = Sweep(sweep.driver, grid, convert(1.0 if sweep.rate is None else sweep.rate), design, motions)
+    grid = np.array(
+        [convert(value) for value in np.linspace(sweep.start, sweep.stop, sweep.steps).tolist()]
+    )
+    found = Sweep(
+        sweep.driver, grid, convert(1.0 if sweep.rate is None else sweep.rate), design, motions
+    )
     for name, motion in motions.items():
         _check_motion(file, join(join("drivers", name), "motion"), motion, found.path.times)
     return found, convert
 
 
-def _check(file: Path, sweep: SweepKeys, written: Mapping[str, Any], drivers: Mapping[str, Any], moved: Mapping[str, Any]) -> None:
+def _check(
+    file: Path,
+    sweep: SweepKeys,
+    written: Mapping[str, Any],
+    drivers: Mapping[str, Any],
+    moved: Mapping[str, Any],
+) -> None:
     """Refuse a sweep that contradicts itself or the motions."""
     if sweep.driver == TIME:
         if not moved:
             found = f"found {shown(TIME)}" if "driver" in written else "missing"
             problem = f"{found}, and no driver has a motion, expected something that moves"
-            raise fault(file, "sweep.driver", f"{problem}; name the driver to sweep, or add [drivers.NAME.motion]")
+            raise fault(
+                file,
+                "sweep.driver",
+                f"{problem}; name the driver to sweep, or add [drivers.NAME.motion]",
+            )
         if sweep.rate is not None:
-            problem = f"found {written['rate']!r} in a sweep of time, expected none, for the motions have rates of their own"
+            problem = (
+                f"found {written['rate']!r} in a sweep of time, expected none, for the motions have"
+                " rates of their own"
+            )
             raise fault(file, "sweep.rate", f"{problem}; remove it, or name the driver to sweep")
     elif sweep.driver not in drivers:
         known = [*drivers, TIME]
-        raise fault(file, "sweep.driver", f"found {shown(sweep.driver)}, expected a driver; {remedy(sweep.driver, known)}")
+        raise fault(
+            file,
+            "sweep.driver",
+            f"found {shown(sweep.driver)}, expected a driver; {remedy(sweep.driver, known)}",
+        )
     elif sweep.driver in moved:
         problem = "found a motion of the swept driver, expected the sweep alone to move it"
         advice = f'remove it, or sweep time: driver = "{TIME}", start and stop in seconds'
         raise fault(file, join(join("drivers", sweep.driver), "motion"), f"{problem}; {advice}")
     if sweep.rate == 0.0:
-        raise fault(file, "sweep.rate", "found 0, expected driver units per second; give 1 to differentiate by the driver's value")
+        raise fault(
+            file,
+            "sweep.rate",
+            "found 0, expected driver units per second; give 1 to differentiate by the driver's"
+            " value",
+        )
     if sweep.start == sweep.stop and sweep.steps > 1:
-        problem = f"found the start {written['start']!r} again with {sweep.steps} steps, expected another value"
+        problem = (
+            f"found the start {written['start']!r} again with {sweep.steps} steps, expected another"
+            " value"
+        )
         raise fault(file, "sweep.stop", f"{problem}; give steps = 1 for a single sample")
     if sweep.start != sweep.stop and sweep.steps == 1:
         found = f"found 1 with start {written['start']!r} and stop {written['stop']!r}"
         problem = f"{found}, expected 2 or more samples, both ends among them"
-        raise fault(file, "sweep.steps", f"{problem}; give more, or stop = start for a single sample")
+        raise fault(
+            file, "sweep.steps", f"{problem}; give more, or stop = start for a single sample"
+        )
 
 
-def _motion(file: Path, mechanism: Mechanism, name: str, value: object, length: Unit, angle: Unit) -> Motion:
+def _motion(
+    file: Path, mechanism: Mechanism, name: str, value: object, length: Unit, angle: Unit
+) -> Motion:
     key, driver = join(join("drivers", name), "motion"), mechanism.driver(name)
     cls = class_of(file, key, "motion", value, Motion.registry)
     keys = typed(file, key, value, motion_keys(cls))
-    converts = dict.fromkeys((Measure.DRIVER, Measure.DRIVER_RATE), _unit(driver, length, angle)) | {Measure.ANGLE: angle}
+    converts = dict.fromkeys(
+        (Measure.DRIVER, Measure.DRIVER_RATE), _unit(driver, length, angle)
+    ) | {Measure.ANGLE: angle}
     given = {
-        each.name: _scaled(getattr(keys, each.name), converts.get(each.metadata["measure"], float)) for each in own_fields(cls)
+        each.name: _scaled(getattr(keys, each.name), converts.get(each.metadata["measure"], float))
+        for each in own_fields(cls)
     }
     with explained(file, key):
         motion = cls(**given)
@@ -119,7 +183,11 @@ def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
     with np.errstate(all="ignore"):
         finite = np.isfinite(motion.at(times)).all()
     if not finite:
-        raise fault(file, key, "found numbers that overflow within the sweep, expected finite ones; correct them")
+        raise fault(
+            file,
+            key,
+            "found numbers that overflow within the sweep, expected finite ones; correct them",
+        )
 
 
 def _unit(driver: Driver, length: Unit, angle: Unit) -> Unit:

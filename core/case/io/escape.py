@@ -1,12 +1,16 @@
-"""Text that came from files or simulators, on its way to people: control characters are shown, and do nothing."""
+"""Text that came from files or simulators, on its way to people: control characters are shown, and
+do nothing.
+"""
 
 from __future__ import annotations
 
 
 def visible(text: str, also: str = "") -> str:
-    r"""The text with all that does not print as an escape: \x1b, \u202e, \udcff; spaces and all letters stay as they are.
+    r"""The text with all that does not print as an escape: \x1b, \u202e, \udcff; spaces and all
+    letters stay as they are.
 
-    A terminal obeys escape sequences, direction marks turn the order of what is read, and lone surrogates cannot be written.
+    A terminal obeys escape sequences, direction marks turn the order of what is read, and lone
+    surrogates cannot be written.
 
     Args:
         also: characters that may stay though they do not print.
@@ -14,7 +18,10 @@ def visible(text: str, also: str = "") -> str:
     if text.isprintable():
         return text
     return "".join(
-        letter if letter.isprintable() or letter in also else letter.encode("unicode_escape").decode("ascii") for letter in text
+        letter
+        if letter.isprintable() or letter in also
+        else letter.encode("unicode_escape").decode("ascii")
+        for letter in text
     )
 
 
@@ -24,7 +31,13 @@ def file_name(text: str) -> str:
 
 
 def cell(value: object) -> object:
-    """A value for a cell of a CSV file: a text that a spreadsheet would take for a formula, and compute, gets an apostrophe."""
+    """A value for a cell of a CSV file: a text that a spreadsheet would take for a formula, and
+    compute, gets an apostrophe.
+    """
     if not isinstance(value, str):
         return value
-    return f"'{visible(value)}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else visible(value)
+    return (
+        f"'{visible(value)}"
+        if value.startswith(("=", "+", "-", "@", "\t", "\r"))
+        else visible(value)
+    )

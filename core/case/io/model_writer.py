@@ -1,4 +1,6 @@
-"""What writes a mechanism for a simulator, and the way from the design position to where it shall start."""
+"""What writes a mechanism for a simulator, and the way from the design position to where it shall
+start.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +19,12 @@ from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array, BodyMotion
 from ..case import Case
 
-# Largest constraint residual of a start, relative to the mechanism's size: a thousand times the round-off of its coordinates.
+# Largest constraint residual of a start, relative to the mechanism's size: a thousand times the
+# round-off of its coordinates.
 TOL = 1e-12
 
-# Samples of the way, more where the bodies turn too far between them to count the turns of the joints.
+# Samples of the way, more where the bodies turn too far between them to count the turns of the
+# joints.
 SAMPLES = (33, 513, 8193)
 LARGEST_TURN = math.pi / 3.0
 
@@ -28,12 +32,15 @@ LARGEST_TURN = math.pi / 3.0
 class Writer(Protocol):
     """Writes a mechanism in a simulator's own format."""
 
-    def __call__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]) -> Mapping[str, str]:
+    def __call__(
+        self, mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+    ) -> Mapping[str, str]:
         """The texts of the files, by their endings.
 
         Args:
-            way: poses of the moving bodies from the design position to where the model shall start; between two samples no body
-                turns by more than 60 degrees, so that no joint turns by half a turn.
+            way: poses of the moving bodies from the design position to where the model shall start;
+                between two samples no body turns by more than 60 degrees, so that no joint turns by
+                half a turn.
             start: values of the drivers at its end, for the reader to see [m or rad].
 
         Raises:
@@ -43,7 +50,8 @@ class Writer(Protocol):
 
 
 def written(case: Case, write: Writer, at: float | None = None) -> Mapping[str, str]:
-    """A case's mechanism in a writer's format, starting at a value of its sweep, or at the design position.
+    """A case's mechanism in a writer's format, starting at a value of its sweep, or at the design
+    position.
 
     Args:
         at: of the swept driver, or time, as the sweep's values are [m, rad or s].
@@ -54,41 +62,61 @@ def written(case: Case, write: Writer, at: float | None = None) -> Mapping[str, 
     stop = case.sweep.design if at is None else at
     start = replace(case.sweep, values=np.array([stop])).moved
     held = {driver.name: 0.0 for driver in case.mechanism.drivers}
-    return write(case.mechanism, way_to(case, stop), held | {name: float(values[0]) for name, values in start.items()})
+    return write(
+        case.mechanism,
+        way_to(case, stop),
+        held | {name: float(values[0]) for name, values in start.items()},
+    )
 
 
 def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
-    """The poses of the moving bodies from the design position to a value of the sweep; see `Writer`.
+    """The poses of the moving bodies from the design position to a value of the sweep; see
+    `Writer`.
 
     Raises:
         SolveError: it cannot be reached.
     """
     if not math.isfinite(stop):
-        raise SolveError(f"case {case.name!r}: the start {stop} is not finite; give a value of {case.sweep.driver!r}")
+        raise SolveError(
+            f"case {case.name!r}: the start {stop} is not finite; give a value of"
+            f" {case.sweep.driver!r}"
+        )
     bodies, path = tuple(body.name for body in case.mechanism.moving), case.sweep.path
-    request, begin = Request(tuple(path.motions), (), bodies, order=0), start_of(case.mechanism, path)
+    request, begin = (
+        Request(tuple(path.motions), (), bodies, order=0),
+        start_of(case.mechanism, path),
+    )
     first = case.sweep.design + case.sweep.rate * begin.time
     for samples in (1,) if stop == first and begin.lead is None else SAMPLES:
-        values: Array = np.linspace(stop, first, samples)[::-1]  # its first is exact, also where it is the only one
+        # its first is exact, also where it is the only one
+        values: Array = np.linspace(stop, first, samples)[::-1]
         ways = [replace(case.sweep, values=values).path]
         if begin.lead:
             ways.insert(0, replace(begin.lead, times=np.linspace(0.0, 1.0, samples)))
         found = [prepare(case.mechanism, request, way)(TOL) for way in ways]
         if not all(each.solved.all() for each in found):
             why = "; ".join(filter(None, [each.message for each in found]))
-            raise SolveError(f"case {case.name!r}: there is no way from the design to {case.sweep.driver} = {stop:.9g}: {why}")
+            raise SolveError(
+                f"case {case.name!r}: there is no way from the design to {case.sweep.driver} ="
+                f" {stop:.9g}: {why}"
+            )
         whole = {name: _joined([each.bodies[name] for each in found]) for name in bodies}
         if max(map(_turn, whole.values())) <= LARGEST_TURN:
             return whole
     raise SolveError(
-        f"case {case.name!r}: on the way to {case.sweep.driver} = {stop:.9g} a body turns by more than 60 degrees between two of "
-        f"{SAMPLES[-1]} samples; give a start closer to the design"
+        f"case {case.name!r}: on the way to {case.sweep.driver} = {stop:.9g} a body turns by more"
+        f" than 60 degrees between two of {SAMPLES[-1]} samples; give a start closer to the design"
     )
 
 
 def _joined(parts: Sequence[BodyMotion]) -> BodyMotion:
     """Return motions one after the other."""
-    return BodyMotion(np.concatenate([each.r for each in parts]), np.concatenate([each.p for each in parts]), None, None)
+    return BodyMotion(
+        np.concatenate([each.r for each in parts]),
+        np.concatenate([each.p for each in parts]),
+        None,
+        None,
+    )
 
 
 def _turn(motion: BodyMotion) -> float:

@@ -14,7 +14,8 @@ class Supplied:
         units: of the coordinates in a file of hardpoints: "mm", "m", ...
         axes: where x, y and z point in a file of hardpoints: "forward,left,up", ...
         travel: how far the wheel of a suspension goes up and down: "METRES" or "METRES:SAMPLES".
-        drive: the joint of a model that is driven: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in its coordinate [rad, m].
+        drive: the joint of a model that is driven: "JOINT:START:STOP" or
+            "JOINT:START:STOP:SAMPLES", in its coordinate [rad, m].
         hold: joints or free bodies of a model that are held where they are.
     """
 

@@ -1,4 +1,6 @@
-"""The file of a proved reference, schema kincheck-reference/1, and its use as the truth of a case."""
+"""The file of a proved reference, schema kincheck-reference/1, and its use as the truth of a
+case.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +19,21 @@ from ..case import Case, Origin, Quantity, Series, Truth
 from .document import fault, read_text, sha256, shown
 
 LARGEST_FILE = 256_000_000
-# Twelve digits of a driver value, as for reference tables: what is off by less moves no output by as much as a tolerance.
+# Twelve digits of a driver value, as for reference tables: what is off by less moves no output by
+# as much as a tolerance.
 SAME_GRID = 1e-12
 # Not all that Python takes for a number: not 1_0, not nan.
 _DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)
 
 
 class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
-    """One output, SI, as decimals; null where a sample is not proved or the output is not known there.
+    """One output, SI, as decimals; null where a sample is not proved or the output is not known
+    there.
 
     Attributes:
         signs: the convention of signs and axes; empty where the case's own axes are all there is.
-        radius: proved bounds of |printed - true| for position, velocity and acceleration, the largest over the samples.
+        radius: proved bounds of |printed - true| for position, velocity and acceleration, the
+            largest over the samples.
         reason: why there are no numbers, where there are none.
     """
 
@@ -45,11 +50,13 @@ class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The proof of a sample, or the reason why there is none.
 
     Attributes:
-        alone: radius of the box around the native pose that holds exactly one solution [lengths: units of the mechanism's size].
+        alone: radius of the box around the native pose that holds exactly one solution [lengths:
+            units of the mechanism's size].
         contraction: of Krawczyk's operator in that box, below one.
         branch: a lower bound of all branch tests; none where the equations have no spurious zero.
         redundant: an upper bound of the rows that are left out, at the solution; none without any.
-        contradicted: left-out rows that are proved not to be zero: the geometry, as rounded, closes only without them.
+        contradicted: left-out rows that are proved not to be zero: the geometry, as rounded, closes
+            only without them.
         left_out: those rows, where they are others than `Reference.redundant`.
     """
 
@@ -107,10 +114,16 @@ def read(file: Path) -> Reference:
     try:
         return msgspec.json.decode(text, type=Reference)
     except (msgspec.DecodeError, RecursionError) as error:
-        raise fault(file, "", f"found {error}, expected a proved reference; make one with kincheck reference CASE") from None
+        raise fault(
+            file,
+            "",
+            f"found {error}, expected a proved reference; make one with kincheck reference CASE",
+        ) from None
 
 
-def series(file: Path, found: Reference, values: Array, outputs: Sequence[Quantity]) -> dict[str, Series]:
+def series(
+    file: Path, found: Reference, values: Array, outputs: Sequence[Quantity]
+) -> dict[str, Series]:
     """The doubles nearest to the proved numbers, by output; NaN at samples that are not proved.
 
     Args:
@@ -122,39 +135,74 @@ def series(file: Path, found: Reference, values: Array, outputs: Sequence[Quanti
         CaseError: the grid or the outputs, or their signs, are not those of the case.
     """
     grid = np.array(next(iter(found.driver.values())) if found.driver else [])
-    if grid.shape != values.shape or not np.allclose(grid, values, rtol=0.0, atol=SAME_GRID * float(np.abs(values).max())):
-        raise fault(file, "driver", "found other samples than those of the sweep, expected the same; make the reference anew")
+    if grid.shape != values.shape or not np.allclose(
+        grid, values, rtol=0.0, atol=SAME_GRID * float(np.abs(values).max())
+    ):
+        raise fault(
+            file,
+            "driver",
+            "found other samples than those of the sweep, expected the same; make the reference"
+            " anew",
+        )
     proved = {name: each for name, each in found.outputs.items() if each.reason is None}
     for output in outputs:
-        if output.name in proved and (proved[output.name].unit, proved[output.name].signs) != (output.unit, output.signs):
-            problem = "found another unit or convention of signs, expected that of the case; make the reference anew"
+        if output.name in proved and (proved[output.name].unit, proved[output.name].signs) != (
+            output.unit,
+            output.signs,
+        ):
+            problem = (
+                "found another unit or convention of signs, expected that of the case; make the"
+                " reference anew"
+            )
             raise fault(file, f"outputs.{output.name}", problem)
     names = [output.name for output in outputs if output.name in proved]
     if not names:
-        raise fault(file, "outputs", f"found {', '.join(proved) or 'none'}, expected outputs of the case; make the reference anew")
+        raise fault(
+            file,
+            "outputs",
+            f"found {', '.join(proved) or 'none'}, expected outputs of the case; make the reference"
+            " anew",
+        )
     return {name: _series(file, name, proved[name], len(values)) for name in names}
 
 
 def _series(file: Path, name: str, found: ProvedSeries, count: int) -> Series:
     columns = {quantity: getattr(found, quantity) for quantity in QUANTITIES}
-    position, *derivatives = (_numbers(file, f"outputs.{name}.{each}", columns[each], count) for each in columns)
-    return Series(position, *(column if np.isfinite(column).any() else None for column in derivatives))
+    position, *derivatives = (
+        _numbers(file, f"outputs.{name}.{each}", columns[each], count) for each in columns
+    )
+    return Series(
+        position, *(column if np.isfinite(column).any() else None for column in derivatives)
+    )
 
 
 def _numbers(file: Path, key: str, column: Sequence[str | None], count: int) -> Array:
     if len(column) != count:
-        raise fault(file, key, f"found {len(column)} samples, expected {count} as in the sweep; make the reference anew")
+        raise fault(
+            file,
+            key,
+            f"found {len(column)} samples, expected {count} as in the sweep; make the reference"
+            " anew",
+        )
     for k, text in enumerate(column):
         if text is not None and not (_DECIMAL.fullmatch(text) and math.isfinite(float(text))):
-            raise fault(file, f"{key}[{k}]", f"found {shown(text)}, expected a decimal number; make the reference anew")
+            raise fault(
+                file,
+                f"{key}[{k}]",
+                f"found {shown(text)}, expected a decimal number; make the reference anew",
+            )
     return np.array([np.nan if text is None else float(text) for text in column])
 
 
-def judged_by(cases: Sequence[Case], files: Sequence[Path], unused: list[str] | None = None) -> list[Case]:
-    """The cases with the proved references in these files as their truth, which makes it an in_house_oracle.
+def judged_by(
+    cases: Sequence[Case], files: Sequence[Path], unused: list[str] | None = None
+) -> list[Case]:
+    """The cases with the proved references in these files as their truth, which makes it an
+    in_house_oracle.
 
     Args:
-        unused: takes a message on each file that is for a case that is not among these; without, it is an error.
+        unused: takes a message on each file that is for a case that is not among these; without, it
+            is an error.
 
     Raises:
         CaseError: a file cannot be used, or is for a case that is not among these.
@@ -163,7 +211,12 @@ def judged_by(cases: Sequence[Case], files: Sequence[Path], unused: list[str] | 
     for file in files:
         proved = read(file)
         if proved.case not in found:
-            stray = fault(file, "case", f"found {proved.case!r}, expected one of the cases to be run: {', '.join(found) or 'none'}")
+            stray = fault(
+                file,
+                "case",
+                f"found {proved.case!r}, expected one of the cases to be run:"
+                f" {', '.join(found) or 'none'}",
+            )
             if unused is None:
                 raise stray
             unused.append(str(stray))
@@ -171,5 +224,7 @@ def judged_by(cases: Sequence[Case], files: Sequence[Path], unused: list[str] | 
         case = found[proved.case]
         truth = series(file, proved, case.sweep.values, case.outputs)
         origin = Origin(f"proved by kincheck {proved.kincheck}", file.name, sha256(file), own=True)
-        found[case.name] = replace(case, truth=Truth.IN_HOUSE_ORACLE, reference=truth, origin=origin)
+        found[case.name] = replace(
+            case, truth=Truth.IN_HOUSE_ORACLE, reference=truth, origin=origin
+        )
     return list(found.values())

@@ -1,10 +1,13 @@
-"""The keys of a case file, schema kincheck-case/1: which there are, what each holds, and what it is when left out.
+"""The keys of a case file, schema kincheck-case/1: which there are, what each holds, and what it is
+when left out.
 
-The keys of a joint's geometry, of a driver and of a motion are read off the fields of its class: a new type needs nothing here.
+The keys of a joint's geometry, of a driver and of a motion are read off the fields of its class: a
+new type needs nothing here.
 
-Reference. A case file is TOML, or JSON with the same keys. Points and directions are global, at the design position, as in a
-table of hardpoints; directions have any length but zero. Numbers are in SI units and radians unless [units] says otherwise;
-results always are. Keys in brackets may be left out. `kincheck list --joints` prints all types there are, with their keys.
+Reference. A case file is TOML, or JSON with the same keys. Points and directions are global, at the
+design position, as in a table of hardpoints; directions have any length but zero. Numbers are in SI
+units and radians unless [units] says otherwise; results always are. Keys in brackets may be left
+out. `kincheck list --joints` prints all types there are, with their keys.
 
     schema = "kincheck-case/1"
     name, source         what it is called, and where the numbers come from
@@ -14,50 +17,61 @@ results always are. Keys in brackets may be left out. `kincheck list --joints` p
     [bodies.NAME]        (origin) = [0, 0, 0], (euler_parameters) = [1, 0, 0, 0], e0..e3, body to global; (fixed) = false
                          the body "ground" is there without being declared
     [joints.NAME]        type, bodies = [first, second], and what the type asks for: point, axis, lengths, ...
-                         a type of your own: --joint-type MODULE:CLASS on the command line has it known
-                         type, joints = [first, second], where it couples two other joints: gear (ratio), rack_pinion (radius)
-                         a joint's rotation and displacement are those of its second body relative to its first, about and
-                         along its axis by the right-hand rule, zero at design
+                         a type of your own: --joint-type MODULE:CLASS on the command line has it
+                         known type, joints = [first, second], where it couples two other joints:
+                         gear (ratio), rack_pinion (radius) a joint's rotation and displacement are
+                         those of its second body relative to its first, about and along its axis by
+                         the right-hand rule, zero at design
     [points.NAME]        body, position: a point that is compared, or driven
     [drivers.NAME]       type = "point_coordinate": point, direction, (relative) = true
-                         type = "joint_angle" or "joint_displacement": joint, (relative) = true; of joints that have a rotation
-                         or a translation: revolute, cylindrical, screw, planar (its turn), translational
-                         values are measured from the design position; relative = false: absolute, which for joints is the same
+                         type = "joint_angle" or "joint_displacement": joint, (relative) = true; of
+                         joints that have a rotation or a translation: revolute, cylindrical, screw,
+                         planar (its turn), translational values are measured from the design
+                         position; relative = false: absolute, which for joints is the same
     [drivers.NAME.motion]   how it goes with time; without, it holds its design value unless it is swept
-                         type = "ramp": rate, per second
-                         type = "sine": amplitude, frequency [Hz], (phase) = 0: amplitude sin(2 pi frequency t + phase)
-                         type = "table": times [s], values: the natural cubic spline through them, which must cover the sweep
+                         type = "ramp": rate, per second type = "sine": amplitude, frequency [Hz],
+                         (phase) = 0: amplitude sin(2 pi frequency t + phase) type = "table": times
+                         [s], values: the natural cubic spline through them, which must cover the
+                         sweep
     [sweep]              (driver), start, stop, steps: samples with both ends, 1 where they are the same; (rate) = 1, in driver
-                         units per second
-                         driver: its samples from start to stop; it moves at the rate, whose sign says which way, and has its design
-                         value at time zero
-                         no driver, or "time": start and stop are times [s], there is no rate, and the motions move everything
-                         both are followed from the design position, both ways: from time zero, or from a sample, where the
-                         values are those of the design to six digits; where none are, all drivers go straight from the design
-                         to their values at time zero if the sweep has it, else at the first sample, and the result says so
+                         units per second driver: its samples from start to stop; it moves at the
+                         rate, whose sign says which way, and has its design value at time zero no
+                         driver, or "time": start and stop are times [s], there is no rate, and the
+                         motions move everything both are followed from the design position, both
+                         ways: from time zero, or from a sample, where the values are those of the
+                         design to six digits; where none are, all drivers go straight from the
+                         design to their values at time zero if the sweep has it, else at the first
+                         sample, and the result says so
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
-                         type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list --outputs` prints them with their
-                         keys, signs, and what they need there; each comes with its derivative by wheel travel, NAME.per_travel
-                         (relative) = false: measured from the design; not for quotients of velocities, such as motion_ratio
-                         (atol), in the output's unit, (rtol), of the range of the true values: with either, (why), the reason
-                         no outputs: x, y and z of every point
+                         type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list
+                         --outputs` prints them with their keys, signs, and what they need there;
+                         each comes with its derivative by wheel travel, NAME.per_travel (relative)
+                         = false: measured from the design; not for quotients of velocities, such as
+                         motion_ratio (atol), in the output's unit, (rtol), of the range of the true
+                         values: with either, (why), the reason no outputs: x, y and z of every
+                         point
     [suspension]         what suspension outputs need to know of the vehicle
-                         convention = "iso8855" or "sae_j670" (z down), side = "left" or "right": whose signs, and which wheel
-                         forward, up: directions of the vehicle in the file's axes, at right angles
-                         (wheel_center) = "wheel_center", the name of a point; (center_plane) = [0, 0, 0], a point in the middle
-                         (static_toe) = 0, toe-in, and (static_camber) = 0, top outboard: angles of the wheel at design
-                         (kingpin) = ["lower", "upper"], names of points; (wheel_radius), loaded, to the contact centre
-                         (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
-                         (brakes) = "outboard", (drive) = "inboard": what holds the torque, wheel carrier or vehicle body
-                         (brake_share), (drive_share): parts of the vehicle's force at this axle, 0 to 1
-                         (per_travel) = true: derivatives by travel, the upward way of the wheel centre
+                         convention = "iso8855" or "sae_j670" (z down), side = "left" or "right":
+                         whose signs, and which wheel forward, up: directions of the vehicle in the
+                         file's axes, at right angles (wheel_center) = "wheel_center", the name of a
+                         point; (center_plane) = [0, 0, 0], a point in the middle (static_toe) = 0,
+                         toe-in, and (static_camber) = 0, top outboard: angles of the wheel at
+                         design (kingpin) = ["lower", "upper"], names of points; (wheel_radius),
+                         loaded, to the contact centre (axle) = "front" or "rear"; (wheelbase),
+                         (cg_height), above the road (brakes) = "outboard", (drive) = "inboard":
+                         what holds the torque, wheel carrier or vehicle body (brake_share),
+                         (drive_share): parts of the vehicle's force at this axle, 0 to 1
+                         (per_travel) = true: derivatives by travel, the upward way of the wheel
+                         centre
     [reference]          true values: file, the name of a CSV file beside the case file, or rows, with (columns)
-                         beside is in its folder or below, links followed: a case file from elsewhere has nothing else opened
-                         first column: what is swept, on its grid; others: OUTPUT, OUTPUT.velocity, OUTPUT.acceleration
-                         a CSV file of suspension outputs names their convention in a comment: # signs: iso8855
-                         (citation), where the true values come from: author, title, page or address; without, agreement with
-                         them is not called validated, whatever truth says
-                         (digest) = "sha256:...", of the file, as sha256sum prints it: a file of another content is refused
+                         beside is in its folder or below, links followed: a case file from
+                         elsewhere has nothing else opened first column: what is swept, on its grid;
+                         others: OUTPUT, OUTPUT.velocity, OUTPUT.acceleration a CSV file of
+                         suspension outputs names their convention in a comment: # signs: iso8855
+                         (citation), where the true values come from: author, title, page or
+                         address; without, agreement with them is not called validated, whatever
+                         truth says (digest) = "sha256:...", of the file, as sha256sum prints it: a
+                         file of another content is refused
 """
 
 from __future__ import annotations
@@ -87,7 +101,9 @@ Number = Annotated[float, Meta(description="a number")]
 Size = Annotated[float, Meta(ge=0.0, description="a number that is not negative")]
 Numbers3 = Annotated[Vector, Meta(description="three numbers [x, y, z]")]
 Numbers = Annotated[tuple[float, ...], Meta(description="a list of numbers")]
-Numbers4 = Annotated[tuple[float, float, float, float], Meta(description="four numbers [e0, e1, e2, e3]")]
+Numbers4 = Annotated[
+    tuple[float, float, float, float], Meta(description="four numbers [e0, e1, e2, e3]")
+]
 Table = Annotated[dict[str, Any], Meta(description="a table")]
 Bodies = Annotated[tuple[str, str], Meta(description='two names ["first body", "second body"]')]
 Joints = Annotated[tuple[str, str], Meta(description='two names ["first joint", "second joint"]')]
@@ -100,7 +116,13 @@ _SHAPES: Mapping[Kind, Any] = {
     Kind.DIRECTIONS: tuple[Vector, Vector],
     Kind.LENGTH: float,
 }
-_OF_FIELDS: Mapping[Any, Any] = {str: Text, bool: Flag, float: Number, Vector: Numbers3, tuple[float, ...]: Numbers}
+_OF_FIELDS: Mapping[Any, Any] = {
+    str: Text,
+    bool: Flag,
+    float: Number,
+    Vector: Numbers3,
+    tuple[float, ...]: Numbers,
+}
 
 
 class UnitsKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -115,7 +137,9 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
 
     schema: Annotated[str, Meta(description=f'"{SCHEMA}"')]
     name: Text
-    source: Annotated[str, Meta(min_length=1, description="a text that says where the numbers come from")]
+    source: Annotated[
+        str, Meta(min_length=1, description="a text that says where the numbers come from")
+    ]
     bodies: Table
     drivers: Table
     sweep: Table
@@ -149,7 +173,10 @@ class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     driver: Text = TIME
     start: Number
     stop: Number
-    steps: Annotated[int, Meta(ge=1, le=MOST_SAMPLES, description=f"a whole number of samples, 1 to {MOST_SAMPLES}")]
+    steps: Annotated[
+        int,
+        Meta(ge=1, le=MOST_SAMPLES, description=f"a whole number of samples, 1 to {MOST_SAMPLES}"),
+    ]
     rate: Number | None = None
 
 
@@ -178,10 +205,18 @@ _INHERITED = {each.name for base in (Joint, Coupler, Driver, Motion) for each in
 @cache
 def joint_keys(cls: type[Joint] | type[Coupler]) -> type[msgspec.Struct]:
     """The keys of a joint of that class: type, the bodies or joints it joins, and its geometry."""
-    keys: _Keys = [("type", Text), ("joints", Joints) if issubclass(cls, Coupler) else ("bodies", Bodies)]
+    keys: _Keys = [
+        ("type", Text),
+        ("joints", Joints) if issubclass(cls, Coupler) else ("bodies", Bodies),
+    ]
     for each in own_fields(cls):
         kind = kind_of(each)
-        keys.append(_key(each, Number if kind is None else Annotated[_SHAPES[kind], Meta(description=kind.value)]))
+        keys.append(
+            _key(
+                each,
+                Number if kind is None else Annotated[_SHAPES[kind], Meta(description=kind.value)],
+            )
+        )
     return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True)
 
 
@@ -207,9 +242,15 @@ def kind_of(each: Field[Any]) -> Kind | None:
     return each.metadata.get("kind")
 
 
-def _keys_of_fields(cls: type[Driver] | type[Motion], *more: tuple[str, Any, Any]) -> type[msgspec.Struct]:
+def _keys_of_fields(
+    cls: type[Driver] | type[Motion], *more: tuple[str, Any, Any]
+) -> type[msgspec.Struct]:
     hints = get_type_hints(cls)
-    keys: _Keys = [("type", Text), *(_key(each, _OF_FIELDS[hints[each.name]]) for each in own_fields(cls)), *more]
+    keys: _Keys = [
+        ("type", Text),
+        *(_key(each, _OF_FIELDS[hints[each.name]]) for each in own_fields(cls)),
+        *more,
+    ]
     return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True)
 
 

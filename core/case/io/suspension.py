@@ -1,4 +1,6 @@
-"""Suspension outputs of a case file: the [suspension] table, and [outputs.NAME] with a type, onto `harness.suspension`."""
+"""Suspension outputs of a case file: the [suspension] table, and [outputs.NAME] with a type, onto
+`harness.suspension`.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +19,25 @@ from ...algebra import vec
 from ...errors import remedy
 from ...mechanism.mechanism import Mechanism, Point, Vector
 from ..case import Case, Quantity, size
-from ..suspension import Axle, Convention, PerTravel, Rate, Reaction, Side, SuspensionOutput, Vehicle, own_keys
+from ..suspension import (
+    Axle,
+    Convention,
+    PerTravel,
+    Rate,
+    Reaction,
+    Side,
+    SuspensionOutput,
+    Vehicle,
+    own_keys,
+)
 from ..units import Unit
 from .document import fault, join, shown, typed
 from .reference import Convert
 from .schema import Flag, Number, Numbers3, Text, ToleranceKeys
 from .tolerance import tolerance
 
-# Axes written to nine digits are at right angles to about 1e-9; a slip in a sign or a digit is far more.
+# Axes written to nine digits are at right angles to about 1e-9; a slip in a sign or a digit is far
+# more.
 SQUARE = 1e-8
 
 
@@ -70,17 +83,25 @@ _NOT_OF_VEHICLE = ("center_plane", "per_travel")
 
 @cache
 def output_keys(cls: type[SuspensionOutput]) -> type[msgspec.Struct]:
-    """The keys of a suspension output of that class: type, its fields, and a tolerance with its reason."""
+    """The keys of a suspension output of that class: type, its fields, and a tolerance with its
+    reason.
+    """
     hints = get_type_hints(cls)
     keys: list[Any] = [("type", Text)]
     for each in own_keys(cls):
         shape = _shape_of(hints[each.name])
-        keys.append((each.name, shape) if each.default is MISSING else (each.name, shape, each.default))
-    return msgspec.defstruct(cls.__name__, keys, bases=(ToleranceKeys,), kw_only=True, forbid_unknown_fields=True)
+        keys.append(
+            (each.name, shape) if each.default is MISSING else (each.name, shape, each.default)
+        )
+    return msgspec.defstruct(
+        cls.__name__, keys, bases=(ToleranceKeys,), kw_only=True, forbid_unknown_fields=True
+    )
 
 
 def _shape_of(hint: Any) -> Any:
-    """The annotation of an output's own field: one of a few words, the names of two points, or true and false."""
+    """The annotation of an output's own field: one of a few words, the names of two points, or true
+    and false.
+    """
     if isinstance(hint, type) and issubclass(hint, StrEnum):
         return Annotated[hint, _one_of(hint)]
     return {tuple[str, str]: Points, bool: Flag}[hint]
@@ -94,20 +115,37 @@ class SuspensionTable:
     per_travel: bool
 
 
-def read_suspension(file: Path, value: object, mechanism: Mechanism, length: Unit, angle: Convert) -> SuspensionTable:
+def read_suspension(
+    file: Path, value: object, mechanism: Mechanism, length: Unit, angle: Convert
+) -> SuspensionTable:
     """The table in SI.
 
     Raises:
-        CaseError: axes that are none, points that are not there, or a wheel that is not where its side says.
+        CaseError: axes that are none, points that are not there, or a wheel that is not where its
+            side says.
     """
     keys = typed(file, "suspension", value, SuspensionKeys)
     forward, up = (_direction(file, name, getattr(keys, name)) for name in ("forward", "up"))
     if abs(vec(forward) @ vec(up)) > SQUARE:
-        found = f"found {shown(keys.up)}, which is not at right angles to forward = {shown(keys.forward)}"
-        raise fault(file, "suspension.up", f"{found}, expected axes of the vehicle's body; correct one of them")
-    for key, name in (("wheel_center", keys.wheel_center), *(("kingpin", name) for name in keys.kingpin or ())):
+        found = (
+            f"found {shown(keys.up)}, which is not at right angles to forward ="
+            f" {shown(keys.forward)}"
+        )
+        raise fault(
+            file,
+            "suspension.up",
+            f"{found}, expected axes of the vehicle's body; correct one of them",
+        )
+    for key, name in (
+        ("wheel_center", keys.wheel_center),
+        *(("kingpin", name) for name in keys.kingpin or ()),
+    ):
         _check_point(file, join("suspension", key), name, mechanism)
-    given: dict[str, Any] = {name: each for name, each in msgspec.structs.asdict(keys).items() if name not in _NOT_OF_VEHICLE}
+    given: dict[str, Any] = {
+        name: each
+        for name, each in msgspec.structs.asdict(keys).items()
+        if name not in _NOT_OF_VEHICLE
+    }
     given |= {name: length(given[name]) for name in _LENGTHS if given[name] is not None}
     given |= {name: angle(given[name]) for name in ("static_toe", "static_camber")}
     given |= {"forward": forward, "up": up, "middle": tuple(map(length, keys.center_plane))}
@@ -118,7 +156,11 @@ def read_suspension(file: Path, value: object, mechanism: Mechanism, length: Uni
 
 def _direction(file: Path, key: str, found: Vector) -> Vector:
     if not any(found):
-        raise fault(file, join("suspension", key), "found zero, expected a direction; give one of any other length")
+        raise fault(
+            file,
+            join("suspension", key),
+            "found zero, expected a direction; give one of any other length",
+        )
     long = math.hypot(*found)
     return found[0] / long, found[1] / long, found[2] / long
 
@@ -130,23 +172,37 @@ def _check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:
 
 
 def _check_side(file: Path, vehicle: Vehicle, mechanism: Mechanism, length: Unit) -> None:
-    """What most often goes wrong: hardpoints of one side or of mirrored axes under the name of the other side."""
+    """What most often goes wrong: hardpoints of one side or of mirrored axes under the name of the
+    other side.
+    """
     point = mechanism.point(vehicle.wheel_center)
     if mechanism.is_fixed(point.body):
-        problem = f"found {shown(point.name)}, which is on {shown(point.body)}, expected a point of a body that moves"
+        problem = (
+            f"found {shown(point.name)}, which is on {shown(point.body)}, expected a point of a"
+            " body that moves"
+        )
         raise fault(file, "suspension.wheel_center", f"{problem}; name the centre of the wheel")
     aside = vehicle.outboard @ (vec(point.position) - vec(vehicle.middle))
     if aside <= 0.0:
-        problem = f"found {shown(str(vehicle.side))}, but {vehicle.wheel_center!r} is {length.written(-aside)} on the other side"
+        problem = (
+            f"found {shown(str(vehicle.side))}, but {vehicle.wheel_center!r} is"
+            f" {length.written(-aside)} on the other side"
+        )
         expected = "expected the side on which it is, looking forward with up upwards"
         raise fault(
-            file, "suspension.side", f"{problem} of the centre plane, {expected}; correct side, forward, up or center_plane"
+            file,
+            "suspension.side",
+            f"{problem} of the centre plane, {expected}; correct side, forward, up or center_plane",
         )
     if vehicle.kingpin is not None:
         lower, upper = (mechanism.point(name).position for name in vehicle.kingpin)
         if vec(vehicle.up) @ (vec(upper) - vec(lower)) <= 0.0:
             problem = f"found {list(vehicle.kingpin)!r}, the first of which is not the lower"
-            raise fault(file, "suspension.kingpin", f"{problem}, expected the lower point, then the upper; give them in this order")
+            raise fault(
+                file,
+                "suspension.kingpin",
+                f"{problem}, expected the lower point, then the upper; give them in this order",
+            )
 
 
 def read_output(
@@ -166,17 +222,31 @@ def read_output(
         units: from the file's units to SI, by the unit there.
 
     Raises:
-        CaseError: unknown key, something missing that the type needs, or a type that this wheel does not have.
+        CaseError: unknown key, something missing that the type needs, or a type that this wheel
+            does not have.
     """
     if table is None:
-        raise fault(file, "suspension", f"missing, expected a table for {key} of type {cls.type!r}; add [suspension]")
+        raise fault(
+            file,
+            "suspension",
+            f"missing, expected a table for {key} of type {cls.type!r}; add [suspension]",
+        )
     vehicle = table.vehicle
     keys: Any = typed(file, key, value, output_keys(cls))
     for need in cls.needs:
         if getattr(vehicle, need) is None:
-            raise fault(file, join("suspension", need), f"missing, expected it for {key} of type {cls.type!r}; add it")
+            raise fault(
+                file,
+                join("suspension", need),
+                f"missing, expected it for {key} of type {cls.type!r}; add it",
+            )
     given = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
-    output = cls(name, vehicle, *tolerance(file, key, keys, units[cls.measure], size(case), cls.measure), **given)
+    output = cls(
+        name,
+        vehicle,
+        *tolerance(file, key, keys, units[cls.measure], size(case), cls.measure),
+        **given,
+    )
     if problem := output.problem:
         raise fault(file, key, problem)
     for each in own_keys(cls):
@@ -184,8 +254,15 @@ def read_output(
             for point in given[each.name]:
                 _check_point(file, join(key, each.name), point, case.mechanism)
     if isinstance(output, Rate) and len(moving := list(case.sweep.path.motions)) > 1:
-        found = f"found {cls.type!r} while {', '.join(moving)} move, expected wheel travel alone to move"
-        raise fault(file, join(key, "type"), f"{found}, for it is a quotient of velocities; remove the motions or the output")
+        found = (
+            f"found {cls.type!r} while {', '.join(moving)} move, expected wheel travel alone to"
+            " move"
+        )
+        raise fault(
+            file,
+            join(key, "type"),
+            f"{found}, for it is a quotient of velocities; remove the motions or the output",
+        )
     return output
 
 
@@ -193,7 +270,8 @@ def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...
     """The outputs, each suspension output followed by its derivative by travel.
 
     Args:
-        size: of the mechanism [m]: moving its pose by d changes a slope by about d / size of what d changes the output by.
+        size: of the mechanism [m]: moving its pose by d changes a slope by about d / size of what d
+            changes the output by.
     """
     both: list[Quantity] = []
     for output in outputs:
@@ -211,5 +289,9 @@ def with_markers(mechanism: Mechanism, outputs: Sequence[Quantity]) -> Mechanism
         if isinstance(output, SuspensionOutput):
             center = mechanism.point(output.vehicle.wheel_center)
             places = output.vehicle.marker_positions(center.position)
-            added |= {name: Point(name, center.body, place) for name, place in places.items() if name in read}
+            added |= {
+                name: Point(name, center.body, place)
+                for name, place in places.items()
+                if name in read
+            }
     return replace(mechanism, points=[*mechanism.points, *added.values()]) if added else mechanism

@@ -9,38 +9,46 @@ from .document import fault, join
 from .reference import Convert
 from .schema import ToleranceKeys
 
-# Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized mechanisms at 1e-16 m.
+# Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
+# mechanisms at 1e-16 m.
 DEFAULT_ATOL = 1e-9
-# Near a dead centre outputs go thousands of times as fast as their driver, by whose pace `atol` is passed on, and so do errors: a
-# loop of a revolute, a cylindrical joint and a pin in a slot, 1,855 m/s^2 at a pace of 0.5 /s, proved: the engines are within
-# 3e-10 m/s^2, which 1e-9 m at that pace does not allow.
+# Near a dead centre outputs go thousands of times as fast as their driver, by whose pace `atol` is
+# passed on, and so do errors: a loop of a revolute, a cylindrical joint and a pin in a slot, 1,855
+# m/s^2 at a pace of 0.5 /s, proved: the engines are within 3e-10 m/s^2, which 1e-9 m at that pace
+# does not allow.
 DEFAULT_RTOL = 1e-9
 _OF_RANGE = "; and of values whose range is larger, as much of the range"
 # Of mechanisms below a millimetre: a nanometre is as large as some of them.
 PART_OF_SIZE = 1e-6
 DEFAULT_WHY = (
-    "the default of 1e-9 m, or a millionth of the size of mechanisms below a millimetre: a thousandth of the micrometre that "
-    "hardpoints are measured to, and millions of times the round-off of metre-sized coordinates in double precision"
-    f"{_OF_RANGE}"
+    "the default of 1e-9 m, or a millionth of the size of mechanisms below a millimetre: a"
+    " thousandth of the micrometre that hardpoints are measured to, and millions of times the"
+    f" round-off of metre-sized coordinates in double precision{_OF_RANGE}"
 )
 _DEFAULTS: Mapping[str, str] = {
     "m": DEFAULT_WHY,
     "rad": (
-        "the default of 1e-9 rad: a nanometre, the default of lengths, at a metre; a hundred-thousandth of the hundredth of a "
-        "degree that wheel alignment is measured to, and millions of times the round-off of an angle in double precision"
-        f"{_OF_RANGE}"
+        "the default of 1e-9 rad: a nanometre, the default of lengths, at a metre; a"
+        " hundred-thousandth of the hundredth of a degree that wheel alignment is measured to, and"
+        f" millions of times the round-off of an angle in double precision{_OF_RANGE}"
     ),
     "1": (
-        "the default of 1e-9 of a ratio: a nanometre, the default of lengths, in a metre, and millions of times the round-off "
-        f"of a ratio near one in double precision{_OF_RANGE}"
+        "the default of 1e-9 of a ratio: a nanometre, the default of lengths, in a metre, and"
+        f" millions of times the round-off of a ratio near one in double precision{_OF_RANGE}"
     ),
 }
 """The reason for the default by the unit of the output."""
 
 
 def default(size: float, unit: str = "m") -> tuple[float, float, str]:
-    """atol [unit], rtol [-] and the reason for them, where a mechanism of that size [m] is told none."""
-    return min(DEFAULT_ATOL, PART_OF_SIZE * size) if unit == "m" else DEFAULT_ATOL, DEFAULT_RTOL, _DEFAULTS[unit]
+    """atol [unit], rtol [-] and the reason for them, where a mechanism of that size [m] is told
+    none.
+    """
+    return (
+        min(DEFAULT_ATOL, PART_OF_SIZE * size) if unit == "m" else DEFAULT_ATOL,
+        DEFAULT_RTOL,
+        _DEFAULTS[unit],
+    )
 
 
 def tolerance(
@@ -57,8 +65,16 @@ def tolerance(
     """
     if keys.atol is None and keys.rtol is None:
         if keys.why is not None:
-            raise fault(file, join(key, "why"), "found a reason without a tolerance, expected both; add atol or rtol")
+            raise fault(
+                file,
+                join(key, "why"),
+                "found a reason without a tolerance, expected both; add atol or rtol",
+            )
         return default(size, unit)
     if keys.why is None:
-        raise fault(file, join(key, "why"), "missing, expected the reason for the tolerance; add the key 'why'")
+        raise fault(
+            file,
+            join(key, "why"),
+            "missing, expected the reason for the tolerance; add the key 'why'",
+        )
     return convert(keys.atol or 0.0), keys.rtol or 0.0, keys.why

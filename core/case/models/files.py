@@ -24,25 +24,39 @@ CASE, CHRONO, ADAMS, TABLE, MODEL = (
     "MJCF model",
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
-_OPTIONS = {CASE: (), MODEL: ("drive", "hold"), **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel"))}
+_OPTIONS = {
+    CASE: (),
+    MODEL: ("drive", "hold"),
+    **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel")),
+}
 
 
 def load(file: Path, supplied: Supplied = NOTHING) -> Case:
     """The case in a file of any kind that can be read.
 
     Raises:
-        CaseError: the file cannot be read, does not make sense, or does not say enough; or an option is not for such files.
+        CaseError: the file cannot be read, does not make sense, or does not say enough; or an
+            option is not for such files.
     """
     kind = kind_of(file, supplied)
     for option in supplied.given:
         if option not in _OPTIONS[kind]:
             known = ", ".join(f"--{name}" for name in _OPTIONS[kind]) or "no such option"
-            raise fault(file, f"--{option}", f"found for a {kind}, which takes {known}; leave it out, or name this file by itself")
+            raise fault(
+                file,
+                f"--{option}",
+                f"found for a {kind}, which takes {known}; leave it out, or name this file by"
+                " itself",
+            )
     if kind == CASE:
         return load_case(file)
     text = _text(file)
     if not file.stem.isprintable():  # it becomes the name of the case
-        raise fault(file, "", "found a file name with control characters, expected printable ones; rename the file")
+        raise fault(
+            file,
+            "",
+            "found a file name with control characters, expected printable ones; rename the file",
+        )
     if kind == MODEL:
         from .mjcf.read import read_mjcf
 
@@ -52,11 +66,14 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
     from .hardpoints.plain import read_plain
     from .hardpoints.read import read_hardpoints
 
-    return read_hardpoints(file, text, {CHRONO: read_chrono, ADAMS: read_adams, TABLE: read_plain}[kind], supplied)
+    return read_hardpoints(
+        file, text, {CHRONO: read_chrono, ADAMS: read_adams, TABLE: read_plain}[kind], supplied
+    )
 
 
 def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
-    """What kind of file it is; a file of no known kind is a case file, whose reader says what that needs.
+    """What kind of file it is; a file of no known kind is a case file, whose reader says what that
+    needs.
 
     Raises:
         CaseError: a file that has to be looked into for it cannot be read.
@@ -68,7 +85,11 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         from .hardpoints.chrono import without_comments
 
         tables = parse(file, without_comments(_text(file)))
-        return CHRONO if "schema" not in tables and ("Template" in tables or supplied.template) else CASE
+        return (
+            CHRONO
+            if "schema" not in tables and ("Template" in tables or supplied.template)
+            else CASE
+        )
     for kind, suffixes in ((TABLE, TABLES), (ADAMS, ADAMS_FILES), (MODEL, MODELS)):
         if suffix in suffixes:
             return kind
@@ -81,4 +102,6 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
 
 
 def _text(file: Path) -> str:
-    return read_text(file, LARGEST_FILE, "hardpoints and mechanisms need far less; take out what is not geometry")
+    return read_text(
+        file, LARGEST_FILE, "hardpoints and mechanisms need far less; take out what is not geometry"
+    )

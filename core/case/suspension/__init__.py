@@ -1,4 +1,6 @@
-"""Suspensions: outputs as kinematics engineers know them, each with its derivative by wheel travel and its sign in words."""
+"""Suspensions: outputs as kinematics engineers know them, each with its derivative by wheel travel
+and its sign in words.
+"""
 
 from . import instant_axis as instant_axis
 from . import steering_axis as steering_axis

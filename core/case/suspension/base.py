@@ -1,7 +1,9 @@
-"""What an output of a suspension is: a formula over the vectors of a corner, and what it tells of its unit and sign.
+"""What an output of a suspension is: a formula over the vectors of a corner, and what it tells of
+its unit and sign.
 
-A new output type is a frozen dataclass with `type`, `measure`, `positive`, `needs`, `reads` and a formula, below one of the three
-kinds here. Declaring the class registers it: case files can name it at once, and `kincheck list --outputs` prints it.
+A new output type is a frozen dataclass with `type`, `measure`, `positive`, `needs`, `reads` and a
+formula, below one of the three kinds here. Declaring the class registers it: case files can name it
+at once, and `kincheck list --outputs` prints it.
 """
 
 from __future__ import annotations
@@ -20,8 +22,9 @@ from ..case import PER_TRAVEL
 from .corner import Corner
 from .vehicle import Vehicle
 
-# Samples at which the wheel travels slower than this part of the fastest point are left out: there a quotient by the speed of
-# travel has lost three digits of the rates it is made of, and more the slower it gets.
+# Samples at which the wheel travels slower than this part of the fastest point are left out: there
+# a quotient by the speed of travel has lost three digits of the rates it is made of, and more the
+# slower it gets.
 STILL = 1e-3
 
 
@@ -90,7 +93,9 @@ class SuspensionOutput(ABC):
 
     @property
     def problem(self) -> str:
-        """Why there is no such output of this wheel: what was found, expected, and what to do; empty where there is."""
+        """Why there is no such output of this wheel: what was found, expected, and what to do;
+        empty where there is.
+        """
         return ""
 
     @property
@@ -150,7 +155,8 @@ class Rate(SuspensionOutput):
 
 @dataclass(frozen=True)
 class PerTravel:
-    """The derivative of an output by wheel travel: upward displacement of the wheel centre against the vehicle's body, jounce.
+    """The derivative of an output by wheel travel: upward displacement of the wheel centre against
+    the vehicle's body, jounce.
 
     It is the slope along the sweep, q' / s': with further drivers that move, their share is in it.
 
@@ -210,7 +216,11 @@ class PerTravel:
     def facts(self) -> Mapping[str, Any]:
         """What a reader of results needs to know of it."""
         known: Sequence[str] = ("name", "unit", "sense", "atol", "rtol", "why")
-        return {"type": "per_travel", "of": self.of_output.name, **{each: getattr(self, each) for each in known}}
+        return {
+            "type": "per_travel",
+            "of": self.of_output.name,
+            **{each: getattr(self, each) for each in known},
+        }
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """The slope, NaN where the wheel stands still."""
@@ -219,10 +229,15 @@ class PerTravel:
 
 
 def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
-    """The quotient by the speed of travel, NaN where that is as good as zero beside the fastest of the points."""
+    """The quotient by the speed of travel, NaN where that is as good as zero beside the fastest of
+    the points.
+    """
     travel = np.abs(corner.center.z.v)
-    speeds = [np.sqrt(sum(component.v * component.v for component in point)) for point in at.values()]
-    # over points and samples, not over lanes: variants of a design may be side by side, and are not to be judged by one another
+    speeds = [
+        np.sqrt(sum(component.v * component.v for component in point)) for point in at.values()
+    ]
+    # over points and samples, not over lanes: variants of a design may be side by side, and are not
+    # to be judged by one another
     fastest = np.max(np.nan_to_num(np.array(speeds)), axis=(0, 1), initial=0.0)
     still = ~(travel > STILL * fastest)
 

@@ -1,9 +1,10 @@
 """A corner of the vehicle in motion: the vectors of which its outputs are made.
 
-Everything is in corner axes: x forward, y outboard, z up, the origin in the vehicle's centre plane. A right wheel is the mirror
-image of a left one, and in corner axes both have the same coordinates: one formula serves both, and left and right cannot be
-told apart but by the outputs that mean to. For a right wheel these axes are left-handed: a cross product in them has the other
-sign, so it may only be used where that cancels.
+Everything is in corner axes: x forward, y outboard, z up, the origin in the vehicle's centre plane.
+A right wheel is the mirror image of a left one, and in corner axes both have the same coordinates:
+one formula serves both, and left and right cannot be told apart but by the outputs that mean to.
+For a right wheel these axes are left-handed: a cross product in them has the other sign, so it may
+only be used where that cancels.
 
 All angles come from vectors: toe and camber of a turned wheel are no Euler angles of its carrier.
 """
@@ -47,7 +48,9 @@ class Corner:
 
     @property
     def heading(self) -> Vec3:
-        """Unit vector along the intersection of the wheel plane with the road, forward [-]; z is zero."""
+        """Unit vector along the intersection of the wheel plane with the road, forward [-]; z is
+        zero.
+        """
         s = self.spin
         level = sqrt(s.x * s.x + s.y * s.y)
         return Vec3(s.y / level, -s.x / level, 0.0)
@@ -67,23 +70,29 @@ class Corner:
 
     @property
     def contact(self) -> Vec3:
-        """The contact centre [m]: the lowest point of a disc with the wheel's radius. The road is level with it."""
+        """The contact centre [m]: the lowest point of a disc with the wheel's radius. The road is
+        level with it.
+        """
         radius = self.vehicle.wheel_radius
         assert radius is not None
         return self.center - radius * self.rise
 
     @property
     def contact_velocity(self) -> Vec3:
-        """Velocity of the wheel carrier's point that is at the contact centre, the wheel locked to its carrier [m/s].
+        """Velocity of the wheel carrier's point that is at the contact centre, the wheel locked to
+        its carrier [m/s].
 
-        Its arm from the wheel centre is -R (top.w top + third.w third) in directions fixed to the carrier, at right angles to
-        the axis of rotation; only these turn. The third direction, a cross product, is there twice, so its sense cancels.
+        Its arm from the wheel centre is -R (top.w top + third.w third) in directions fixed to the
+        carrier, at right angles to the axis of rotation; only these turn. The third direction, a
+        cross product, is there twice, so its sense cancels.
         """
         radius, w, s = self.vehicle.wheel_radius, self.rise, self.spin
         assert radius is not None
         top = _unit(self.point(self.vehicle.top_marker) - self.center)
         third = cross(s, top)
-        return velocity(self.center) - radius * ((top @ w) * velocity(top) + (third @ w) * velocity(third))
+        return velocity(self.center) - radius * (
+            (top @ w) * velocity(top) + (third @ w) * velocity(third)
+        )
 
     @property
     def kingpin(self) -> tuple[Vec3, Vec3]:
@@ -94,7 +103,9 @@ class Corner:
 
     @property
     def kingpin_offset(self) -> Vec3:
-        """The vector from the contact centre to where the steering axis meets the road [m]; z is zero."""
+        """The vector from the contact centre to where the steering axis meets the road [m]; z is
+        zero.
+        """
         lower, axis = self.kingpin
         contact = self.contact
         return lower + ((contact.z - lower.z) / axis.z) * axis - contact

@@ -1,8 +1,10 @@
-"""Outputs of the way the wheel is going: roll centre, motion ratio, anti-dive, anti-squat and anti-lift.
+"""Outputs of the way the wheel is going: roll centre, motion ratio, anti-dive, anti-squat and
+anti-lift.
 
-They are quotients of velocities. In a view along an axis of the vehicle, the instant centre of the wheel carrier lies on the
-normal to the velocity of any of its points; the line from the contact centre to it is all that roll centre and anti-effects need.
-Definitions: W. F. and D. L. Milliken, Race Car Vehicle Dynamics, chapter 17.
+They are quotients of velocities. In a view along an axis of the vehicle, the instant centre of the
+wheel carrier lies on the normal to the velocity of any of its points; the line from the contact
+centre to it is all that roll centre and anti-effects need. Definitions: W. F. and D. L. Milliken,
+Race Car Vehicle Dynamics, chapter 17.
 """
 
 from __future__ import annotations
@@ -20,10 +22,12 @@ _CARRIER = ("wheel_center", "spin_marker", "top_marker")
 
 @dataclass(frozen=True)
 class RollCenterHeight(Rate):
-    """Height above the road of the kinematic roll centre of an axle whose wheels travel in parallel.
+    """Height above the road of the kinematic roll centre of an axle whose wheels travel in
+    parallel.
 
-    The line from the contact centre to the instant centre of the front view, cut with the vehicle's centre plane: with the
-    contact's velocity (v_y, v_z) it is normal to that and rises by v_y / v_z over a metre inboard.
+    The line from the contact centre to the instant centre of the front view, cut with the vehicle's
+    centre plane: with the contact's velocity (v_y, v_z) it is normal to that and rises by v_y / v_z
+    over a metre inboard.
     """
 
     type = "roll_center_height"
@@ -66,11 +70,13 @@ class MotionRatio(Rate):
 
 @dataclass(frozen=True)
 class _Anti(Rate):
-    """The part of a load transfer that the suspension links take, so that the springs need not: 1 is all of it.
+    """The part of a load transfer that the suspension links take, so that the springs need not: 1
+    is all of it.
 
-    share * tan * wheelbase / cg_height, tan being the slope of the side view's line from the wheel to the instant centre,
-    rising towards the middle of the vehicle. It starts at the contact centre where the wheel carrier holds the torque, and at
-    the wheel centre where the vehicle's body does, through a shaft.
+    share * tan * wheelbase / cg_height, tan being the slope of the side view's line from the wheel
+    to the instant centre, rising towards the middle of the vehicle. It starts at the contact centre
+    where the wheel carrier holds the torque, and at the wheel centre where the vehicle's body does,
+    through a shaft.
     """
 
     measure = "1"
@@ -85,13 +91,16 @@ class _Anti(Rate):
         if self.vehicle.axle is self.axle:
             return ""
         return (
-            f"found {self.type!r} of a {self.vehicle.axle} axle, expected a {self.axle} one; remove it, or correct suspension.axle"
+            f"found {self.type!r} of a {self.vehicle.axle} axle, expected a {self.axle} one; remove"
+            " it, or correct suspension.axle"
         )
 
     def value(self, corner: Corner) -> Jet:
         """Part of the load transfer [-]."""
         car = self.vehicle
-        share, reaction = (car.brake_share, car.brakes) if self.braking else (car.drive_share, car.drive)
+        share, reaction = (
+            (car.brake_share, car.brakes) if self.braking else (car.drive_share, car.drive)
+        )
         assert share is not None
         assert car.wheelbase is not None
         assert car.cg_height is not None

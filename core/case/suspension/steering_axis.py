@@ -1,4 +1,6 @@
-"""Outputs of the steering axis, a line through two points: the physical one, not the axis about which the wheel turns at once."""
+"""Outputs of the steering axis, a line through two points: the physical one, not the axis about
+which the wheel turns at once.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ class KingpinInclination(_Inclination):
 
 @dataclass(frozen=True)
 class _GroundOffset(Attitude):
-    """A component of the way between the contact centre and where the steering axis meets the road."""
+    """A component of the way between the contact centre and where the steering axis meets the
+    road.
+    """
 
     measure = "m"
     needs = ("wheel_radius", "kingpin")
@@ -55,9 +59,11 @@ class _GroundOffset(Attitude):
 
 @dataclass(frozen=True)
 class ScrubRadius(_GroundOffset):
-    """Steering axis offset at ground: from where the axis meets the road to the contact centre, across the wheel's heading.
+    """Steering axis offset at ground: from where the axis meets the road to the contact centre,
+    across the wheel's heading.
 
-    As in ISO 8855 and Adams/Car it is measured along the tyre's axes, which turn with the wheel, not along the vehicle's.
+    As in ISO 8855 and Adams/Car it is measured along the tyre's axes, which turn with the wheel,
+    not along the vehicle's.
     """
 
     type = "scrub_radius"
@@ -70,7 +76,9 @@ class ScrubRadius(_GroundOffset):
 
 @dataclass(frozen=True)
 class MechanicalTrail(_GroundOffset):
-    """Castor offset at ground (ISO 8855, 7.2.3): from the contact centre to where the axis meets the road, along the heading."""
+    """Castor offset at ground (ISO 8855, 7.2.3): from the contact centre to where the axis meets
+    the road, along the heading.
+    """
 
     type = "mechanical_trail"
     positive = "the axis meeting the road ahead of the contact centre"

@@ -1,4 +1,6 @@
-"""What the outputs of a suspension need to know of the vehicle beside the motion of points: axes, signs, wheel and axle."""
+"""What the outputs of a suspension need to know of the vehicle beside the motion of points: axes,
+signs, wheel and axle.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +12,15 @@ from ...algebra import Vec3, cross, vec
 from ...mechanism.mechanism import Vector
 from ..case import MARKER
 
-# Metres between the wheel centre and the points that show how the wheel carrier turns: a rim's radius, so that directions
-# keep all digits of positions.
+# Metres between the wheel centre and the points that show how the wheel carrier turns: a rim's
+# radius, so that directions keep all digits of positions.
 MARKER_DISTANCE = 0.25
 
 
 class Convention(StrEnum):
-    """Whose axes and signs the outputs have. SAE J670 also allows z up; here its name means its historical z down."""
+    """Whose axes and signs the outputs have. SAE J670 also allows z up; here its name means its
+    historical z down.
+    """
 
     ISO_8855 = "iso8855"
     SAE_J670 = "sae_j670"
@@ -24,11 +28,17 @@ class Convention(StrEnum):
     @property
     def words(self) -> str:
         """The standard and its axes."""
-        return "ISO 8855 (x forward, y left, z up)" if self is Convention.ISO_8855 else "SAE J670 (x forward, y right, z down)"
+        return (
+            "ISO 8855 (x forward, y left, z up)"
+            if self is Convention.ISO_8855
+            else "SAE J670 (x forward, y right, z down)"
+        )
 
     @property
     def up(self) -> int:
-        """What makes a component along z of one that is upwards; and one along y of one that is to the left."""
+        """What makes a component along z of one that is upwards; and one along y of one that is to
+        the left.
+        """
         return 1 if self is Convention.ISO_8855 else -1
 
 
@@ -52,7 +62,9 @@ class Axle(StrEnum):
 
 
 class Reaction(StrEnum):
-    """Where the torque of brakes or drive is held: on the wheel carrier, or on the vehicle's body."""
+    """Where the torque of brakes or drive is held: on the wheel carrier, or on the vehicle's
+    body.
+    """
 
     OUTBOARD = "outboard"
     INBOARD = "inboard"
@@ -60,7 +72,8 @@ class Reaction(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Vehicle:
-    """One wheel's corner of a vehicle; SI, global axes at design. What is None is not known and not needed.
+    """One wheel's corner of a vehicle; SI, global axes at design. What is None is not known and not
+    needed.
 
     Attributes:
         forward, up: unit vectors fixed to the vehicle's body, at right angles [-].
@@ -105,12 +118,16 @@ class Vehicle:
 
     @property
     def spin_marker(self) -> str:
-        """Name of the point on the wheel carrier that is outboard of the wheel centre on the axis of rotation."""
+        """Name of the point on the wheel carrier that is outboard of the wheel centre on the axis
+        of rotation.
+        """
         return f"{MARKER}{self.wheel_center}.spin"
 
     @property
     def top_marker(self) -> str:
-        """Name of the point on the wheel carrier that is beside the wheel centre in the wheel plane, upwards at design."""
+        """Name of the point on the wheel carrier that is beside the wheel centre in the wheel
+        plane, upwards at design.
+        """
         return f"{MARKER}{self.wheel_center}.top"
 
     def marker_positions(self, center: Vector) -> dict[str, Vector]:
@@ -119,14 +136,21 @@ class Vehicle:
         top = u - (u @ s) * s
         top = (1.0 / math.sqrt(top @ top)) * top
         sides = {self.spin_marker: s, self.top_marker: top}
-        return {name: _numbers(vec(center) + MARKER_DISTANCE * along) for name, along in sides.items()}
+        return {
+            name: _numbers(vec(center) + MARKER_DISTANCE * along) for name, along in sides.items()
+        }
 
     @property
     def signs(self) -> str:
-        """The convention, the wheel and the axes in words: what heads every table of these outputs."""
+        """The convention, the wheel and the axes in words: what heads every table of these
+        outputs.
+        """
         where = f"{self.axle} {self.side}" if self.axle else str(self.side)
         forward, up = (", ".join(f"{x:g}" for x in axis) for axis in (self.forward, self.up))
-        return f"{self.convention.words}; {where} wheel; forward is [{forward}] and up [{up}] in the case's axes"
+        return (
+            f"{self.convention.words}; {where} wheel; forward is [{forward}] and up [{up}] in the"
+            " case's axes"
+        )
 
 
 def _numbers(a: Vec3) -> Vector:

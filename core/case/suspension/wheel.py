@@ -1,4 +1,6 @@
-"""Outputs of the wheel: toe, camber, steer angle, and how the wheel centre or the contact centre shifts."""
+"""Outputs of the wheel: toe, camber, steer angle, and how the wheel centre or the contact centre
+shifts.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ class Toe(Attitude):
 
 @dataclass(frozen=True)
 class SteerAngle(Attitude):
-    """The same angle about the z axis of the convention by the right-hand rule: one sign for both wheels."""
+    """The same angle about the z axis of the convention by the right-hand rule: one sign for both
+    wheels.
+    """
 
     type = "steer_angle"
     measure = "rad"
@@ -57,7 +61,11 @@ class SteerAngle(Attitude):
     @property
     def sense(self) -> str:
         """Left about an axis that points up, right about one that points down."""
-        return "positive: to the left" if self.vehicle.convention is Convention.ISO_8855 else "positive: to the right"
+        return (
+            "positive: to the left"
+            if self.vehicle.convention is Convention.ISO_8855
+            else "positive: to the right"
+        )
 
     def value(self, corner: Corner) -> Jet:
         """Steer angle [rad]."""
@@ -96,7 +104,10 @@ class _Shift(Change):
         """The contact centre is known from the wheel's radius only."""
         if self.at is Place.WHEEL_CENTER or self.vehicle.wheel_radius is not None:
             return ""
-        return 'found no wheel_radius in [suspension], expected it for the contact centre; add it, or at = "wheel_center"'
+        return (
+            "found no wheel_radius in [suspension], expected it for the contact centre; add it, or"
+            ' at = "wheel_center"'
+        )
 
     def _position(self, corner: Corner) -> Vec3:
         return corner.contact if self.at is Place.CONTACT else corner.center
@@ -104,7 +115,9 @@ class _Shift(Change):
 
 @dataclass(frozen=True)
 class HalfTrackChange(_Shift):
-    """Lateral shift of the contact centre, or of the wheel centre: half of an axle's track change in parallel travel."""
+    """Lateral shift of the contact centre, or of the wheel centre: half of an axle's track change
+    in parallel travel.
+    """
 
     type = "half_track_change"
     measure = "m"
@@ -117,7 +130,9 @@ class HalfTrackChange(_Shift):
 
 @dataclass(frozen=True)
 class WheelbaseChange(_Shift):
-    """Longitudinal shift of the contact centre, or of the wheel centre: forward lengthens at the front, rearward at the rear."""
+    """Longitudinal shift of the contact centre, or of the wheel centre: forward lengthens at the
+    front, rearward at the rear.
+    """
 
     type = "wheelbase_change"
     measure = "m"
@@ -127,7 +142,10 @@ class WheelbaseChange(_Shift):
     @property
     def sense(self) -> str:
         """The wheel base gets longer."""
-        return f"positive: {'forward' if self.vehicle.axle is Axle.FRONT else 'rearward'}, a longer wheel base"
+        return (
+            f"positive: {'forward' if self.vehicle.axle is Axle.FRONT else 'rearward'}, a longer"
+            " wheel base"
+        )
 
     def value(self, corner: Corner) -> Jet:
         """Coordinate along the wheel base [m]."""
@@ -150,12 +168,20 @@ class WheelDisplacement(Change):
     def sense(self) -> str:
         """Where the axis points."""
         iso = self.vehicle.convention is Convention.ISO_8855
-        ways = {AxisName.X: "forward", AxisName.Y: "left" if iso else "right", AxisName.Z: "up" if iso else "down"}
+        ways = {
+            AxisName.X: "forward",
+            AxisName.Y: "left" if iso else "right",
+            AxisName.Z: "up" if iso else "down",
+        }
         return f"positive: {ways[self.component]}"
 
     def value(self, corner: Corner) -> Jet:
         """Coordinate [m]."""
         x, y, z = corner.center
         up = self.vehicle.convention.up
-        shifts: dict[AxisName, Jet] = {AxisName.X: x, AxisName.Y: up * self.vehicle.side.left * y, AxisName.Z: up * z}
+        shifts: dict[AxisName, Jet] = {
+            AxisName.X: x,
+            AxisName.Y: up * self.vehicle.side.left * y,
+            AxisName.Z: up * z,
+        }
         return shifts[self.component]

@@ -1,1 +1,3 @@
-"""Variations of a design: places of its geometry, laws of their variation, and the file that declares them."""
+"""Variations of a design: places of its geometry, laws of their variation, and the file that
+declares them.
+"""

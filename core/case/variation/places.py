@@ -1,4 +1,6 @@
-"""The places of a mechanism's geometry as somebody names them: found by name, and with all that is at the same point."""
+"""The places of a mechanism's geometry as somebody names them: found by name, and with all that is
+at the same point.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,8 @@ from ...kinematics.formulation.parameters import kinds, places
 from ...mechanism.mechanism import Mechanism
 from ..case import MARKER
 
-# Positions closer than this are one hardpoint [m]: tables are measured to about a micrometre at best.
+# Positions closer than this are one hardpoint [m]: tables are measured to about a micrometre at
+# best.
 SAME = 1e-6
 
 
@@ -51,9 +54,13 @@ class Geometry:
             and (place.startswith(f"{name}.") or place.partition(".")[2].startswith(f"{name}."))
         ]
         if not found:
-            raise PlaceError(f"expected a position, direction or length of the case; {remedy(name, self.named)}")
+            raise PlaceError(
+                f"expected a position, direction or length of the case; {remedy(name, self.named)}"
+            )
         if any(place not in self.together(found[0]) for place in found):
-            raise PlaceError(f"which may be {' or '.join(found)}, expected one place; write it in full")
+            raise PlaceError(
+                f"which may be {' or '.join(found)}, expected one place; write it in full"
+            )
         return found[0]
 
     def together(self, place: str) -> tuple[str, ...]:
@@ -62,7 +69,9 @@ class Geometry:
             return (place,)
         here = self.values[place]
         return tuple(
-            each for each in self.named if self.kinds[each] is Kind.POSITION and math.dist(here, self.values[each]) <= SAME
+            each
+            for each in self.named
+            if self.kinds[each] is Kind.POSITION and math.dist(here, self.values[each]) <= SAME
         )
 
     def with_markers(self, moved: Iterable[str]) -> tuple[str, ...]:
@@ -70,7 +79,11 @@ class Geometry:
         found = [*moved]
         for place in self.values:
             if place.startswith(f"points.{MARKER}"):
-                center = place.removeprefix(f"points.{MARKER}").removesuffix(".position").rpartition(".")[0]
+                center = (
+                    place.removeprefix(f"points.{MARKER}")
+                    .removesuffix(".position")
+                    .rpartition(".")[0]
+                )
                 if f"points.{center}.position" in found:
                     found.append(place)
         return tuple(found)

@@ -1,7 +1,9 @@
-"""How a design is varied: independent coordinates, what each moves, and the numbers of every variant by its index.
+"""How a design is varied: independent coordinates, what each moves, and the numbers of every
+variant by its index.
 
-A variant is known by seed and index alone: `DRAWN` of them are drawn by a generator of their own, whose seed sequence is the
-study's spawned by their place, so that any machine can make any variants, and one can be made again by itself.
+A variant is known by seed and index alone: `DRAWN` of them are drawn by a generator of their own,
+whose seed sequence is the study's spawned by their place, so that any machine can make any
+variants, and one can be made again by itself.
 """
 
 from __future__ import annotations
@@ -46,7 +48,8 @@ class Stream(IntEnum):
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One number that varies independently: a coordinate of a hardpoint, a component of a direction, a length.
+    """One number that varies independently: a coordinate of a hardpoint, a component of a
+    direction, a length.
 
     Attributes:
         hardpoint: name in the file.
@@ -72,10 +75,12 @@ class Coordinate:
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """The coordinates that vary, and how the places of the geometry follow them: nominal + moves @ offsets.
+    """The coordinates that vary, and how the places of the geometry follow them: nominal + moves @
+    offsets.
 
     Attributes:
-        places: names of the varied places (see `analysis.equations.geometry.places`), with how many numbers each has.
+        places: names of the varied places (see `analysis.equations.geometry.places`), with how many
+            numbers each has.
         nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
         moves: shape (numbers, coordinates).
     """
@@ -102,7 +107,8 @@ class Variation:
     def geometry(self, offsets: Array) -> Array:
         """Numbers of the varied places, shape (numbers, V), from offsets, shape (coordinates, V).
 
-        Term by term: a matrix product may round differently with the number of columns and with the machine.
+        Term by term: a matrix product may round differently with the number of columns and with the
+        machine.
         """
         found = np.repeat(self.nominal[:, None], offsets.shape[1], axis=1)
         for number, coordinate in np.argwhere(self.moves).tolist():
@@ -110,9 +116,13 @@ class Variation:
         return found
 
     def values(self, offsets: Array) -> dict[str, tuple[float, ...]]:
-        """The value of every varied place of one variant, from its offsets, shape (coordinates,)."""
+        """The value of every varied place of one variant, from its offsets, shape
+        (coordinates,).
+        """
         numbers = iter(self.geometry(offsets[:, None])[:, 0].tolist())
-        return {place: tuple(next(numbers) for _ in range(size)) for place, size in self.places.items()}
+        return {
+            place: tuple(next(numbers) for _ in range(size)) for place, size in self.places.items()
+        }
 
     def offsets(self, seed: int, first: int, count: int) -> Array:
         """Offsets of variants from the nominal design [units], shape (coordinates, count)."""
@@ -126,17 +136,29 @@ class Variation:
 
     def _drawn(self, seed: int, first: int, count: int) -> Array:
         places = range(first // DRAWN, -(-(first + count) // DRAWN))
-        found = np.concatenate([self._draw(generator(seed, place, Stream.GEOMETRY)) for place in places], axis=1)
+        found = np.concatenate(
+            [self._draw(generator(seed, place, Stream.GEOMETRY)) for place in places], axis=1
+        )
         skipped = first - places.start * DRAWN
         return found[:, skipped : skipped + count]
 
     def _draw(self, random: np.random.Generator) -> Array:
-        """A whole draw, however much of it is wanted: what a variant is must not depend on how many there are."""
+        """A whole draw, however much of it is wanted: what a variant is must not depend on how many
+        there are.
+        """
         rows = list[Array]()
-        for law, some in groupby(self.coordinates, lambda each: each.law):  # those of one law by one call, without Python's lock
+        # those of one law by one call, without Python's lock
+        for law, some in groupby(self.coordinates, lambda each: each.law):
             scale = np.array([each.scale for each in some])[:, None]
             shape = len(scale), DRAWN
-            rows.append(scale * (random.standard_normal(shape) if law is Law.NORMAL else random.uniform(-1.0, 1.0, shape)))
+            rows.append(
+                scale
+                * (
+                    random.standard_normal(shape)
+                    if law is Law.NORMAL
+                    else random.uniform(-1.0, 1.0, shape)
+                )
+            )
         return np.concatenate(rows)
 
     def _listed(self, indices: NDArray[np.int64]) -> Array:
@@ -156,9 +178,13 @@ class Variation:
     def _steps(self) -> tuple[NDArray[np.int64], Array]:
         """Coordinate and offset of every variant of one at a time but the first."""
         pairs = [(row, value) for row, each in enumerate(self.coordinates) for value in each.values]
-        return np.array([row for row, _ in pairs], dtype=np.int64), np.array([value for _, value in pairs])
+        return np.array([row for row, _ in pairs], dtype=np.int64), np.array(
+            [value for _, value in pairs]
+        )
 
 
 def generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
     """Philox, seeded by a child of the study's seed sequence: the place-th draw of a stream."""
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream)))))
+    return np.random.Generator(
+        np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream))))
+    )

@@ -2,7 +2,8 @@
 
 This folder is the package kincheck itself; its parts lie in folders of their own.
 
-It imports next to nothing before it takes signals, so that an interrupt is one line while the rest is imported too.
+It imports next to nothing before it takes signals, so that an interrupt is one line while the rest
+is imported too.
 """
 
 import os
@@ -17,7 +18,9 @@ SIGNALS = 128
 
 def leave(number: int, frame: FrameType | None) -> None:
     """End the process at a signal that comes before the command begins or after it has ended."""
-    os.write(2, b"kincheck: terminated\n" if number == signal.SIGTERM else b"kincheck: interrupted\n")
+    os.write(
+        2, b"kincheck: terminated\n" if number == signal.SIGTERM else b"kincheck: interrupted\n"
+    )
     os._exit(SIGNALS + number)
 
 
@@ -26,13 +29,16 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, leave)
-    # by its name: relative to this file, as installed, it would be .core, which no checker finds in the sources
+    # by its name: relative to this file, as installed, it would be .core, which no checker finds in
+    # the sources
     status: int = import_module("kincheck.core.cli.main").main()
-    if status > SIGNALS:  # Python would end by the signal itself if the interrupt has come while a text was executed
+    # Python would end by the signal itself if the interrupt has come while a text was executed
+    if status > SIGNALS:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done; while Python ends, it would end by the signal
+    # all is done; while Python ends, it would end by the signal
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     return status
 
 

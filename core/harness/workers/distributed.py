@@ -1,4 +1,6 @@
-"""Pairs solved on a dask.distributed cluster: a task each, and on its machine a worker process, so that limits hold there too."""
+"""Pairs solved on a dask.distributed cluster: a task each, and on its machine a worker process, so
+that limits hold there too.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,8 @@ from ..resource_limits import Limits
 from .messages import pack
 from .worker import Seat
 
-# For a port to answer [s], and as long again for a scheduler behind it: each takes milliseconds, unless packets are lost, which are
-# sent again after 1 s and after 3 s.
+# For a port to answer [s], and as long again for a scheduler behind it: each takes milliseconds,
+# unless packets are lost, which are sent again after 1 s and after 3 s.
 ANSWER = 5.0
 # For a scheduler that has answered to do so again, if it is lost on the way [s].
 CONNECT = 20.0
@@ -31,10 +33,12 @@ class ClusterError(KincheckError):
 
 
 def on_cluster(address: str, limits: Limits) -> Solver:
-    """The solver on the workers of a scheduler. A pair whose worker is lost is solved by another; its result comes once.
+    """The solver on the workers of a scheduler. A pair whose worker is lost is solved by another;
+    its result comes once.
 
     Raises:
-        ClusterError: dask.distributed is not installed, the scheduler does not answer, or it has gone meanwhile.
+        ClusterError: dask.distributed is not installed, the scheduler does not answer, or it has
+            gone meanwhile.
     """
 
     def solve(pairs: Sequence[Pair]) -> Attempts:
@@ -52,52 +56,78 @@ def connected(distributed: Any, address: str) -> Any:
         ClusterError: the address cannot be one, or no scheduler answers there.
     """
     try:
-        # asked before there is a client, for one that finds no scheduler waits for its own end in vain; and in a thread, for that
-        # of a notebook has a loop already
+        # asked before there is a client, for one that finds no scheduler waits for its own end in
+        # vain; and in a thread, for that of a notebook has a loop already
         with ThreadPoolExecutor(1) as aside:
-            aside.submit(asyncio.run, asyncio.wait_for(_asked(distributed, address), 2.0 * ANSWER)).result()
+            aside.submit(
+                asyncio.run, asyncio.wait_for(_asked(distributed, address), 2.0 * ANSWER)
+            ).result()
         return distributed.Client(address, timeout=CONNECT, set_as_default=False)
     except OSError as error:
         raise ClusterError(
-            f"scheduler {address}: does not answer ({said(error)}); start one with `dask scheduler` and workers with "
-            "`dask worker ADDRESS`, where kincheck and the engines are installed"
+            f"scheduler {address}: does not answer ({said(error)}); start one with `dask scheduler`"
+            " and workers with `dask worker ADDRESS`, where kincheck and the engines are installed"
         ) from error
     except (ValueError, TypeError) as error:
         raise ClusterError(
-            f"scheduler {address}: found no address ({said(error)}), expected HOST:PORT or tcp://HOST:PORT; write it as "
-            "`dask scheduler` prints it"
+            f"scheduler {address}: found no address ({said(error)}), expected HOST:PORT or"
+            " tcp://HOST:PORT; write it as `dask scheduler` prints it"
         ) from error
 
 
 async def _asked(distributed: Any, address: str) -> None:
     place = urlsplit(address if "://" in address else f"//{address}")
-    if not place.hostname or place.port == 0:  # a port out of range raises ValueError when it is asked for
+    # a port out of range raises ValueError when it is asked for
+    if not place.hostname or place.port == 0:
         raise ValueError("no host and port")
-    comm = await distributed.comm.connect(address, timeout=ANSWER, **distributed.Security().get_connection_args("client"))
+    comm = await distributed.comm.connect(
+        address, timeout=ANSWER, **distributed.Security().get_connection_args("client")
+    )
     await comm.close()
 
 
-def _gathered(distributed: Any, client: Any, address: str, pairs: Sequence[Pair], limits: Limits) -> Attempts:
-    name = f"kincheck-{uuid4().hex}"  # of tasks: the scheduler takes equal names for one and the same task
+def _gathered(
+    distributed: Any, client: Any, address: str, pairs: Sequence[Pair], limits: Limits
+) -> Attempts:
+    # of tasks: the scheduler takes equal names for one and the same task
+    name = f"kincheck-{uuid4().hex}"
     tasks = dict[Any, int]()
     for index, pair in enumerate(pairs):
         try:
             packed = pack(pair)
         except Exception as error:  # of the engine's own ways of being pickled
-            yield index, Attempt(None, Failure(Outcome.ERROR, f"cannot be sent to a cluster: {said(error)}; define it in a module"))
+            yield (
+                index,
+                Attempt(
+                    None,
+                    Failure(
+                        Outcome.ERROR,
+                        f"cannot be sent to a cluster: {said(error)}; define it in a module",
+                    ),
+                ),
+            )
             continue
         engine = f"{pair.engine.name} {pair.engine.mode}"
-        task = client.submit(solve_there, packed, engine, limits, VERSION, key=f"{name}-{index}", pure=False)
+        task = client.submit(
+            solve_there, packed, engine, limits, VERSION, key=f"{name}-{index}", pure=False
+        )
         tasks[task] = index
     for task in distributed.as_completed(tasks, loop=client.loop):
         try:
             found: Attempt = task.result()
         except distributed.scheduler.KilledWorker as error:
-            found = Attempt(None, Failure(Outcome.CRASHED, f"every worker that had it was lost: {said(error)}"))
+            found = Attempt(
+                None, Failure(Outcome.CRASHED, f"every worker that had it was lost: {said(error)}")
+            )
         except (OSError, distributed.CancelledError) as error:
-            raise ClusterError(f"scheduler {address}: has gone ({said(error)}); run again with --resume when it is back") from error
+            raise ClusterError(
+                f"scheduler {address}: has gone ({said(error)}); run again with --resume when it is"
+                " back"
+            ) from error
         except Exception as error:  # raised on the cluster around the worker process: no process can be started, for one
-            found = Attempt(None, Failure(Outcome.ERROR, f"the cluster's worker cannot solve: {said(error)}"))
+            found = Attempt(
+                None, Failure(Outcome.ERROR, f"the cluster's worker cannot solve: {said(error)}")
+            )
         task.release()
         yield tasks[task], found
 
@@ -112,7 +142,8 @@ def loaded() -> Any:
         distributed: Any = importlib.import_module("distributed")
     except ImportError as error:
         raise ClusterError(
-            "--scheduler needs dask.distributed, which is not installed; pip install 'kincheck[distributed]'"
+            "--scheduler needs dask.distributed, which is not installed; pip install"
+            " 'kincheck[distributed]'"
         ) from error
     return distributed
 
@@ -122,9 +153,14 @@ _lock = Lock()
 
 
 def solve_there(packed: bytes, engine: str, limits: Limits, version: str) -> Attempt:
-    """Solve a packed pair in a process beside this one, a cluster's worker, which keeps it for the engine's next pair."""
+    """Solve a packed pair in a process beside this one, a cluster's worker, which keeps it for the
+    engine's next pair.
+    """
     if version != VERSION:
-        message = f"kincheck {VERSION} on the cluster's worker, expected {version} as in the run; install the same there"
+        message = (
+            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the run; install"
+            " the same there"
+        )
         return Attempt(None, Failure(Outcome.ERROR, message))
     with _lock:
         idle = _idle.setdefault((engine, limits), [])

@@ -8,8 +8,8 @@ from typing import Any, BinaryIO
 
 LENGTH = struct.Struct("<Q")
 
-# Longer than any answer (a million samples of a thousand outputs are 24 GB, and no case): what looks so is not a length, but
-# something that was written into the channel by mistake.
+# Longer than any answer (a million samples of a thousand outputs are 24 GB, and no case): what
+# looks so is not a length, but something that was written into the channel by mistake.
 LONGEST = 1 << 34
 
 

@@ -15,7 +15,9 @@ from .worker import Seat
 
 
 def in_workers(jobs: int, limits: Limits) -> Solver:
-    """The solver with so many worker processes at a time, each for one engine until there are no more pairs of it."""
+    """The solver with so many worker processes at a time, each for one engine until there are no
+    more pairs of it.
+    """
 
     def solve(pairs: Sequence[Pair]) -> Attempts:
         waiting = _Waiting(pairs)
@@ -50,7 +52,9 @@ class _Waiting:
             self.queues.setdefault(f"{pair.engine.name} {pair.engine.mode}", deque()).append(index)
 
     def take(self, engine: str | None) -> tuple[str, int] | None:
-        """The next pair of that engine; if there is none, of the one that the fewest have turned to, the first come first."""
+        """The next pair of that engine; if there is none, of the one that the fewest have turned
+        to, the first come first.
+        """
         with self.lock:
             if engine is None or not self.queues.get(engine):
                 left = [name for name, queue in self.queues.items() if queue]
@@ -88,7 +92,9 @@ class _Slot(Thread):
                     self.seat.close()
                 engine, index = taken
                 self.through.put((index, solve_packed(self.pairs[index], self.seat)))
-        except BaseException as error:  # a defect of ours: the run must hear of it, for nobody looks at a thread's end
+        except (
+            BaseException
+        ) as error:  # a defect of ours: the run must hear of it, for nobody looks at a thread's end
             self.through.put(error)
         finally:
             self.seat.close()
@@ -103,6 +109,9 @@ def solve_packed(pair: Pair, seat: Seat) -> Attempt:
     try:
         packed = pack(pair)
     except Exception as error:  # of the engine's own ways of being pickled
-        message = f"cannot be sent to a worker process: {said(error)}; define it in a module, or solve in this process (--jobs 0)"
+        message = (
+            f"cannot be sent to a worker process: {said(error)}; define it in a module, or solve in"
+            " this process (--jobs 0)"
+        )
         return Attempt(None, Failure(Outcome.ERROR, message))
     return seat.solve(packed)

@@ -1,6 +1,8 @@
-"""A worker process from inside: it reads pairs from its standard input and answers on its standard output until that ends.
+"""A worker process from inside: it reads pairs from its standard input and answers on its standard
+output until that ends.
 
-What engines print, from Python or from C, goes to standard error, which the parent reads to its end at all times.
+What engines print, from Python or from C, goes to standard error, which the parent reads to its end
+at all times.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ READY = b"ready"
 
 @dataclass(frozen=True)
 class Setup:
-    """The first message to a worker: its parent, where that finds modules, and how much memory a pair may take [GB]."""
+    """The first message to a worker: its parent, where that finds modules, and how much memory a
+    pair may take [GB].
+    """
 
     parent: int
     path: list[str]
@@ -32,9 +36,12 @@ class Setup:
 
 
 def serve() -> None:
-    """Answer pairs until there is no parent any more. Ends the process, without the simulators' own ways of going down."""
+    """Answer pairs until there is no parent any more. Ends the process, without the simulators' own
+    ways of going down.
+    """
     requests, answers = _channel()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a parent in the background has it ignored; engines shall not differ
+    # a parent in the background has it ignored; engines shall not differ
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     faulthandler.enable()  # a crash then tells the line of Python it came from
     setup: Setup = pickle.loads(read(requests))
     sys.path[:] = setup.path
@@ -73,7 +80,11 @@ def _packed(found: Attempt) -> bytes:
     try:
         return pack(found)
     except Exception as error:
-        return pack(Attempt(found.facts, Failure(Outcome.ERROR, f"the answer cannot be sent: {said(error)}")))
+        return pack(
+            Attempt(
+                found.facts, Failure(Outcome.ERROR, f"the answer cannot be sent: {said(error)}")
+            )
+        )
 
 
 def _flush() -> None:
@@ -87,7 +98,9 @@ def _flush() -> None:
 
 
 def _end_with(parent: int) -> None:
-    """Be killed with the parent, even in the middle of a pair that will never end. Elsewhere than on Linux, only between pairs."""
+    """Be killed with the parent, even in the middle of a pair that will never end. Elsewhere than
+    on Linux, only between pairs.
+    """
     if sys.platform == "linux":
         library: Any = ctypes.CDLL(None)
         library.prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG

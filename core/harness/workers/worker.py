@@ -1,4 +1,6 @@
-"""A worker process from outside, and the seat that always has one: warm while all goes well, another after a failure."""
+"""A worker process from outside, and the seat that always has one: warm while all goes well,
+another after a failure.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ from .serve import READY, Setup
 
 COMMAND = "from kincheck.core.harness.workers.serve import serve; serve()"
 
-# Bytes of output kept: the stack of a crash and the lines before it. The rest is read, so that nobody waits, and dropped.
+# Bytes of output kept: the stack of a crash and the lines before it. The rest is read, so that
+# nobody waits, and dropped.
 TAIL = 8192
 
 # For a process that is as good as gone, and its output, to go [s].
@@ -60,11 +63,15 @@ class Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            # threads that wait for each other, and for those of other workers, would be the simulators' times
+            # threads that wait for each other, and for those of other workers, would be the
+            # simulators' times
             env={**dict.fromkeys(THREADS, "1"), **os.environ},
             start_new_session=True,  # the terminal's interrupt is for the parent; and its children can be killed with it
         )
-        self._in, self._out = cast(BinaryIO, self.process.stdin), cast(BinaryIO, self.process.stdout)
+        self._in, self._out = (
+            cast(BinaryIO, self.process.stdin),
+            cast(BinaryIO, self.process.stdout),
+        )
         self._tail = _Tail(cast(IO[bytes], self.process.stderr))
         self._tail.start()
 
@@ -90,7 +97,8 @@ class Worker:
         """Kill the process and what it has started, and give the last that they printed."""
         self.kill()
         self.process.wait()
-        self._tail.join(GOING)  # longer only where a process that has left the group keeps the pipe open
+        # longer only where a process that has left the group keeps the pipe open
+        self._tail.join(GOING)
         for stream in (self._in, self._out):
             with suppress(OSError):  # what is left unsent has nobody to go to
                 stream.close()
@@ -119,7 +127,8 @@ class Worker:
             timer.cancel()
 
     def _post_mortem(self) -> Failure:
-        with suppress(subprocess.TimeoutExpired):  # still there although it will not answer: close() ends it
+        # still there although it will not answer: close() ends it
+        with suppress(subprocess.TimeoutExpired):
             self.process.wait(GOING)
         status = self.process.returncode
         printed = self.close()
@@ -136,9 +145,11 @@ class Worker:
 
 
 class Seat:
-    """A place for a worker of one engine. A failure in a worker that was used before is tried once more in a new one.
+    """A place for a worker of one engine. A failure in a worker that was used before is tried once
+    more in a new one.
 
-    So no pair pays for what another has left behind, and which pairs came before does not show in the outcome.
+    So no pair pays for what another has left behind, and which pairs came before does not show in
+    the outcome.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -155,7 +166,9 @@ class Seat:
                 return Attempt(None, Failure(Outcome.ERROR, "stopped"))
             used = not worker.fresh
             found = worker.solve(packed)
-            failure = found.result if isinstance(found.result, Failure) and found.result.harmful else None
+            failure = (
+                found.result if isinstance(found.result, Failure) and found.result.harmful else None
+            )
             if failure is None and worker.late is None:
                 return found
             printed = self.close()
@@ -178,7 +191,9 @@ class Seat:
         return worker.close() if worker else ""
 
     def stop(self) -> None:
-        """Have no worker any more, from another thread: what is being solved fails, and the thread that solves it tidies up."""
+        """Have no worker any more, from another thread: what is being solved fails, and the thread
+        that solves it tidies up.
+        """
         with self._lock:
             self._stopped = True
             if self._worker is not None:
@@ -193,8 +208,12 @@ def _name(number: int) -> str:
 
 
 def _last(printed: str) -> str:
-    """The last that was said before the end, and the line of Python where that was, if faulthandler has told."""
+    """The last that was said before the end, and the line of Python where that was, if faulthandler
+    has told.
+    """
     before, _, stack = printed.partition("Fatal Python error:")
     lines = [line.strip() for line in before.splitlines() if line.strip()]
     at = re.search(r"^ *File (.+)$", stack, re.MULTILINE)
-    return (f" in {at[1]}" if at else "") + (f"; it last printed: {bounded(lines[-1])}" if lines else "")
+    return (f" in {at[1]}" if at else "") + (
+        f"; it last printed: {bounded(lines[-1])}" if lines else ""
+    )

@@ -1,4 +1,6 @@
-"""Steps: where a level changed in the history of a pair, the first run that has the new one, and what else changed there."""
+"""Steps: where a level changed in the history of a pair, the first run that has the new one, and
+what else changed there.
+"""
 
 from __future__ import annotations
 
@@ -25,18 +27,21 @@ LASTING = 3
 """Runs that make a level of times: one slow night is none, and two may be one busy afternoon."""
 
 PACE = 1.5
-"""Ratio of levels of times, at least. In 26 equal runs of 20 pairs, a quarter of a minute each, on a busy machine, the largest
-ratio of three or more successive runs to those before was 1.44; nights have less in common than minutes. One run: see `limits`."""
+"""Ratio of levels of times, at least. In 26 equal runs of 20 pairs, a quarter of a minute each, on
+a busy machine, the largest ratio of three or more successive runs to those before was 1.44; nights
+have less in common than minutes. One run: see `limits`."""
 
 _Series: TypeAlias = Sequence[tuple[Entry, float]]
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A change of level: indices into the series of the values before it and of those after it, and the levels.
+    """A change of level: indices into the series of the values before it and of those after it, and
+    the levels.
 
     Attributes:
-        repaired: index of the first value of a later level that is as low as the one before; None where there is none.
+        repaired: index of the first value of a later level that is as low as the one before; None
+            where there is none.
     """
 
     earlier: range
@@ -50,11 +55,15 @@ def steps(history: History, *, standing: bool = False) -> list[Step]:
     """The steps of all pairs, the latest first.
 
     Args:
-        standing: only the last step for the worse of a series, if no later run has repaired it: what still holds today.
+        standing: only the last step for the worse of a series, if no later run has repaired it:
+            what still holds today.
     """
     found: list[Step] = []
     for pair, entries in history.pairs.items():
-        by_quantity: list[list[Step]] = [_outcomes(pair, entries, history), _times(pair, entries, history)]
+        by_quantity: list[list[Step]] = [
+            _outcomes(pair, entries, history),
+            _times(pair, entries, history),
+        ]
         by_quantity += [_errors(pair, entries, history, motion) for motion in QUANTITIES]
         for each in by_quantity:
             lasting = {step.output: step for step in each if step.worse and step.repaired is None}
@@ -63,7 +72,9 @@ def steps(history: History, *, standing: bool = False) -> list[Step]:
 
 
 def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Return where a pair became bad, or good again. Runs that did not judge it say nothing about it."""
+    """Return where a pair became bad, or good again. Runs that did not judge it say nothing about
+    it.
+    """
     able = [entry for entry in entries if entry.outcome not in (*IDLE, Outcome.UNJUDGED)]
     turns = [(a, b) for a, b in pairwise(able) if a.outcome.bad is not b.outcome.bad]
     repairs = [b.run if b.outcome.bad is False else None for _, b in turns[1:]] + [None]
@@ -74,7 +85,9 @@ def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[St
 
 
 def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Where the time in calibration loops has changed; runs without a calibration have no place in it."""
+    """Where the time in calibration loops has changed; runs without a calibration have no place in
+    it.
+    """
     series: list[tuple[Entry, float]] = []
     for entry in entries:
         loop = calibration(history.runs[entry.run])
@@ -90,13 +103,21 @@ def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]
 
 
 def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str) -> list[Step]:
-    """Where the error of an output has changed; of several outputs that changed in the same run, the one that did most."""
+    """Where the error of an output has changed; of several outputs that changed in the same run,
+    the one that did most.
+    """
     largest: dict[tuple[int, bool, int | None], tuple[float, Step]] = {}
     for output in dict.fromkeys(output for entry in entries for output in entry.errors):
         errors = errors_of(entries, output, motion)
-        series = [(entry, math.log(size)) for (entry, _), size in zip(errors, above_floor(errors), strict=True)]
+        series = [
+            (entry, math.log(size))
+            for (entry, _), size in zip(errors, above_floor(errors), strict=True)
+        ]
         for each in _levels(series, math.log(DRIFT), 1):
-            before, now = (float(np.median([errors[k][1].max_abs for k in part])) for part in (each.earlier, each.later))
+            before, now = (
+                float(np.median([errors[k][1].max_abs for k in part]))
+                for part in (each.earlier, each.later)
+            )
             step = _levelled(pair, motion, output, series, each, before, now, history)
             key, size = (step.first, step.worse, step.repaired), abs(each.now - each.before)
             if key not in largest or size > largest[key][0]:
@@ -105,14 +126,24 @@ def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str)
 
 
 def errors_of(entries: Sequence[Entry], output: str, motion: str) -> list[tuple[Entry, Deviation]]:
-    """The errors of an output where they were found, but for those of nothing that is held to nothing."""
+    """The errors of an output where they were found, but for those of nothing that is held to
+    nothing.
+    """
     found = [(entry, getattr(entry.errors.get(output), motion, None)) for entry in entries]
-    return [(entry, each) for entry, each in found if each is not None and max(each.max_abs, each.tolerance) > 0.0]
+    return [
+        (entry, each)
+        for entry, each in found
+        if each is not None and max(each.max_abs, each.tolerance) > 0.0
+    ]
 
 
 def above_floor(errors: Sequence[tuple[Entry, Deviation]]) -> list[float]:
-    """Sizes of errors, none below one floor for all: there one is like another, whatever the tolerance was then."""
-    floor = DRIFT_FLOOR * min((each.tolerance for _, each in errors if each.tolerance > 0.0), default=0.0)
+    """Sizes of errors, none below one floor for all: there one is like another, whatever the
+    tolerance was then.
+    """
+    floor = DRIFT_FLOOR * min(
+        (each.tolerance for _, each in errors if each.tolerance > 0.0), default=0.0
+    )
     return [max(each.max_abs, floor) for _, each in errors]
 
 
@@ -123,18 +154,38 @@ def _levels(series: _Series, least: float, lasting: int) -> Iterator[_Found]:
         return
     parts = [range(*each) for each in pairwise([0, *places, len(values)])]
     levels = [float(np.median(values[part.start : part.stop])) for part in parts]
-    for k, ((earlier, later), (before, now)) in enumerate(zip(pairwise(parts), pairwise(levels), strict=True), 2):
+    for k, ((earlier, later), (before, now)) in enumerate(
+        zip(pairwise(parts), pairwise(levels), strict=True), 2
+    ):
         rest = zip(parts[k:], levels[k:], strict=True)
         repaired = next((part.start for part, level in rest if now > before > level - least), None)
         yield _Found(earlier, later, before, now, repaired)
 
 
 def _levelled(
-    pair: Pair, quantity: str, output: str | None, series: _Series, found: _Found, before: float, now: float, history: History
+    pair: Pair,
+    quantity: str,
+    output: str | None,
+    series: _Series,
+    found: _Found,
+    before: float,
+    now: float,
+    history: History,
 ) -> Step:
     a, b = series[found.earlier[-1]][0], series[found.later[0]][0]
     repaired = None if found.repaired is None else series[found.repaired][0].run
-    return _step(pair, quantity, output, a, b, history, worse=now > before, before=before, now=now, repaired=repaired)
+    return _step(
+        pair,
+        quantity,
+        output,
+        a,
+        b,
+        history,
+        worse=now > before,
+        before=before,
+        now=now,
+        repaired=repaired,
+    )
 
 
 def _step(
@@ -172,6 +223,11 @@ def _step(
 
 def _between(engine: str, a: Entry, b: Entry, history: History) -> list[Change]:
     """What else is not the same in two runs: the engine by what its own records say."""
-    versions = [Change(what=engine, before=a.version, now=b.version)] if a.version != b.version else []
-    rest = changes(history.runs[b.run].circumstances | {"engines": {}}, history.runs[a.run].circumstances | {"engines": {}})
+    versions = (
+        [Change(what=engine, before=a.version, now=b.version)] if a.version != b.version else []
+    )
+    rest = changes(
+        history.runs[b.run].circumstances | {"engines": {}},
+        history.runs[a.run].circumstances | {"engines": {}},
+    )
     return versions + rest

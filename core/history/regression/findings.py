@@ -52,20 +52,35 @@ REGRESSIONS = frozenset(
 )
 
 WHY: Mapping[Kind, str] = {
-    Kind.FAILURE: "these results were right, or at least not wrong, and are not to be relied on now",
-    Kind.LOST: "what is no longer reached or compared is no longer checked: a fault there would go unseen",
+    Kind.FAILURE: (
+        "these results were right, or at least not wrong, and are not to be relied on now"
+    ),
+    Kind.LOST: (
+        "what is no longer reached or compared is no longer checked: a fault there would go unseen"
+    ),
     Kind.UNJUDGED: "solved, but nothing is compared any more: a fault there would go unseen",
-    Kind.GONE: "values that were numbers are null now: whoever reads the results has less than before",
+    Kind.GONE: (
+        "values that were numbers are null now: whoever reads the results has less than before"
+    ),
     Kind.MOVED: "the case is another than it was, or its solution is of another assembly",
-    Kind.FREEDOM: "the mechanism can move in other ways than before: it is another, or it is counted wrongly",
+    Kind.FREEDOM: (
+        "the mechanism can move in other ways than before: it is another, or it is counted wrongly"
+    ),
     Kind.UNIT: "whoever reads the numbers takes them for something else",
-    Kind.DRIFTED: "within tolerance, but a decimal digit worse: something computes differently than it did",
-    Kind.RESIDUAL: "the constraints are met three digits worse: the solution is less converged than it was",
+    Kind.DRIFTED: (
+        "within tolerance, but a decimal digit worse: something computes differently than it did"
+    ),
+    Kind.RESIDUAL: (
+        "the constraints are met three digits worse: the solution is less converged than it was"
+    ),
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
     Kind.FIXED: "they failed in the run compared with",
     Kind.JUDGED: "nothing was compared in the run compared with",
     Kind.TOLERANCE: "what passes now need not have passed before, or the reverse",
-    Kind.REFERENCE: "what passes now is judged by other true values than it was: somebody has edited them, or the case",
+    Kind.REFERENCE: (
+        "what passes now is judged by other true values than it was: somebody has edited them, or"
+        " the case"
+    ),
     Kind.RANK: "the engine solves other rows than before; where dof is the same, so is the motion",
     Kind.ADDED: "nothing to compare with",
     Kind.ABSENT: "not asked for, or gone from the library: nothing is known of them",
@@ -78,8 +93,10 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         output, motion: what it is about; null where it is about the pair.
-        before, now: errors [SI], residuals, seconds, tolerances, dof or rank, by the kind; null where there is no number to it.
-        ratio: of now to before, for a time with the pace of the machine taken out; null where there is none.
+        before, now: errors [SI], residuals, seconds, tolerances, dof or rank, by the kind; null
+            where there is no number to it.
+        ratio: of now to before, for a time with the pace of the machine taken out; null where there
+            is none.
         limit: the ratio from which on it is a finding.
         since: the first run that has it, where the history knows it.
     """
@@ -125,7 +142,8 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
         first: number of the first run of the new level; `started` is when it began.
         last: number of the last run of the level before.
         before, now: the levels: errors [SI], seconds; null for an outcome.
-        repaired: number of the first later run that is as good as before; null for a change to the better, and while it stands.
+        repaired: number of the first later run that is as good as before; null for a change to the
+            better, and while it stands.
         changes: what else was not the same in these two runs.
     """
 
@@ -163,7 +181,9 @@ class Loose(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunName(msgspec.Struct, frozen=True, kw_only=True):
-    """Which run: its name for people, its number in the history where it is from one, and when it began."""
+    """Which run: its name for people, its number in the history where it is from one, and when it
+    began.
+    """
 
     name: str
     number: int | None
@@ -180,9 +200,11 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         pairs: how many records the run has.
         failing: case, engine and mode of all that is not within tolerance or broken, new or not.
         unjudged: the same of all that was solved and compared with nothing, new or not.
-        unread: cases that were asked for and make no sense; their pairs are among the findings, lost.
+        unread: cases that were asked for and make no sense; their pairs are among the findings,
+            lost.
         time_limit: the ratio from which on a time was called slower.
-        missing_is_failure: whether a pair that an earlier run had and this one does not is a regression.
+        missing_is_failure: whether a pair that an earlier run had and this one does not is a
+            regression.
     """
 
     schema: Literal["kincheck-regression/1"] = "kincheck-regression/1"
@@ -211,5 +233,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def regressed(self) -> bool:
-        """Whether something is worse than it was, or was not made; without a run to compare with, whether anything is bad."""
+        """Whether something is worse than it was, or was not made; without a run to compare with,
+        whether anything is bad.
+        """
         return bool(self.regressions) or (self.against is None and bool(self.failing))

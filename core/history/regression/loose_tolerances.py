@@ -14,7 +14,8 @@ def loose(history: History, cases: Mapping[str, Any]) -> list[Loose]:
     """Outputs whose errors stayed far below their tolerances in all runs, by case.
 
     Args:
-        cases: the facts of each case, as a run's circumstances have them, for the reasons that it gives.
+        cases: the facts of each case, as a run's circumstances have them, for the reasons that it
+            gives.
     """
     largest: dict[tuple[str, str], float] = {}
     runs: dict[tuple[str, str], set[int]] = {}

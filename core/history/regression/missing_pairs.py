@@ -1,4 +1,6 @@
-"""Pairs that the last run of the same command had, and a run has not: a case or an engine that went without a word."""
+"""Pairs that the last run of the same command had, and a run has not: a case or an engine that went
+without a word.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,8 @@ from .run_selection import Subject, pairs_of
 
 
 def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield the pairs, whatever the subject is compared with: the last run may have had more than the last green one.
+    """Yield the pairs, whatever the subject is compared with: the last run may have had more than
+    the last green one.
 
     A run of another command was asked for something else, and says nothing.
 
@@ -20,16 +23,26 @@ def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> I
     last = _last(subject, store) if store else None
     if last is None:
         return
-    known = pairs_of(subject) | {(each.case, each.engine, each.mode) for each in told if each.kind is Kind.ABSENT}
+    known = pairs_of(subject) | {
+        (each.case, each.engine, each.mode) for each in told if each.kind is Kind.ABSENT
+    }
     for case, engine, mode in last.plan:
         if (case, engine, mode) not in known:
-            yield Finding(kind=Kind.ABSENT, case=case, engine=engine, mode=mode, message=f"in run {last.id}, by the same command")
+            yield Finding(
+                kind=Kind.ABSENT,
+                case=case,
+                engine=engine,
+                mode=mode,
+                message=f"in run {last.id}, by the same command",
+            )
 
 
 def _last(subject: Subject, store: Store) -> RunRow | None:
     """Return the last earlier run of the subject's command that nobody is writing now."""
     query = "SELECT id FROM runs WHERE command = ? AND (? IS NULL OR id < ?) ORDER BY id DESC"
     with store.explained("read"):
-        numbers = store.connection.execute(query, (subject.facts.get("command"), subject.before, subject.before)).fetchall()
+        numbers = store.connection.execute(
+            query, (subject.facts.get("command"), subject.before, subject.before)
+        ).fetchall()
     rows = (store.run(number) for (number,) in numbers)
     return next((row for row in rows if row.status != "running"), None)

@@ -1,4 +1,6 @@
-"""The run that a report is about, and the one it is compared with: by number, by file, by a rule."""
+"""The run that a report is about, and the one it is compared with: by number, by file, by a
+rule.
+"""
 
 from __future__ import annotations
 
@@ -46,9 +48,11 @@ class Subject:
 
 
 def find(name: str | None, store: Store | None) -> Subject:
-    """The run of that number, or in that results.json; None: the latest of the history that nobody is writing now.
+    """The run of that number, or in that results.json; None: the latest of the history that nobody
+    is writing now.
 
-    That may be one without an end, which was killed: to judge the one before it would be to say that all is well.
+    That may be one without an end, which was killed: to judge the one before it would be to say
+    that all is well.
 
     Raises:
         KincheckError: there is none, or it cannot be read.
@@ -57,21 +61,28 @@ def find(name: str | None, store: Store | None) -> Subject:
         return _in_file(Path(name), store)
     if store is None:
         raise KincheckError(
-            f"report: {'no run' if name is None else f'run {name}'} without a history; give --history FILE, or a results.json"
+            f"report: {'no run' if name is None else f'run {name}'} without a history; give"
+            " --history FILE, or a results.json"
         )
     if name is not None:
         row = store.run(int(name))
         if row.status == "running":
-            raise KincheckError(f"report: run {row.id} is being made now; report it when it has ended")
+            raise KincheckError(
+                f"report: run {row.id} is being made now; report it when it has ended"
+            )
         return _kept(store, row)
     row = next((row for row in store.runs() if row.status != "running"), None)
     if row is None:
-        raise KincheckError(f"history {store.path}: no run to report; `kincheck run --history {store.path}` makes one")
+        raise KincheckError(
+            f"history {store.path}: no run to report; `kincheck run --history {store.path}`"
+            " makes one"
+        )
     return _kept(store, row)
 
 
 def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subject | None, str]:
-    """The run to compare with, or why there is none. One that is named must be there; one by a rule need not yet.
+    """The run to compare with, or why there is none. One that is named must be there; one by a rule
+    need not yet.
 
     Raises:
         KincheckError: the one named is not there, or it is the subject itself.
@@ -82,23 +93,39 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
         branch = name.removesuffix(BASELINE)
         if name == LAST_GREEN:
             # what is not compared any more would be told of once, and never again
-            row = _most(green(store, before=subject.before), lambda row: _compared(store, row, subject))
+            row = _most(
+                green(store, before=subject.before), lambda row: _compared(store, row, subject)
+            )
         else:
-            row = _most(_of_branch(store, branch, subject), lambda row: len(pairs_of(subject) & {*row.plan}))
+            row = _most(
+                _of_branch(store, branch, subject), lambda row: len(pairs_of(subject) & {*row.plan})
+            )
         if row is not None:
             with store.sparing():
                 return _kept(store, row, name.replace("-", " ")), ""
             return find_against(name, subject, store)  # the next best
         if name == LAST_GREEN:
             return None, "no earlier run in which nothing went wrong with any of its pairs"
-        known = sorted({str(git["branch"]) for row in store.runs() if (git := row.circumstances.get("git")) and git.get("branch")})
-        return None, (
-            f"no earlier run of branch {branch!r}, without changes to its files, with any of its pairs; "
-            f"the history has {'branches ' + ', '.join(known) if known else 'no branch'}"
+        known = sorted(
+            {
+                str(git["branch"])
+                for row in store.runs()
+                if (git := row.circumstances.get("git")) and git.get("branch")
+            }
+        )
+        return (
+            None,
+            (
+                f"no earlier run of branch {branch!r}, without changes to its files, with any of"
+                " its pairs; the history has"
+                f" {'branches ' + ', '.join(known) if known else 'no branch'}"
+            ),
         )
     against = find(name, store)
     if against.number is not None and against.number == subject.number:
-        raise KincheckError(f"report: {subject.name} cannot be compared with itself; give another --against")
+        raise KincheckError(
+            f"report: {subject.name} cannot be compared with itself; give another --against"
+        )
     return against, ""
 
 
@@ -108,14 +135,31 @@ def _in_file(file: Path, store: Store | None) -> Subject:
         raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
     results = read_results(file)
     rows, told = store.runs() if store else [], results.run
-    same = [row.id for row in rows if all(row.circumstances.get(key) == told.get(key) for key in ("started", "host", "command"))]
+    same = [
+        row.id
+        for row in rows
+        if all(
+            row.circumstances.get(key) == told.get(key) for key in ("started", "host", "command")
+        )
+    ]
     later = [row.id for row in rows if row.started > str(told.get("started", "~"))]
-    return Subject(str(file), max(same, default=None), results, max(same, default=min(later, default=None)))
+    return Subject(
+        str(file), max(same, default=None), results, max(same, default=min(later, default=None))
+    )
 
 
 def _kept(store: Store, row: RunRow, rule: str = "") -> Subject:
-    status = "" if row.status == "finished" else f", {'without an end' if row.status == 'killed' else row.status}"
-    return Subject(f"run {row.id}" + (f" ({rule})" if rule else "") + status, row.id, store.results(row.id), row.id)
+    status = (
+        ""
+        if row.status == "finished"
+        else f", {'without an end' if row.status == 'killed' else row.status}"
+    )
+    return Subject(
+        f"run {row.id}" + (f" ({rule})" if rule else "") + status,
+        row.id,
+        store.results(row.id),
+        row.id,
+    )
 
 
 def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
@@ -124,19 +168,31 @@ def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
     def fits(row: RunRow) -> bool:
         git: dict[str, Any] = row.circumstances.get("git") or {}
         earlier = subject.before is None or row.id < subject.before
-        return row.status == "finished" and earlier and git.get("branch") == branch and not git.get("changed")
+        return (
+            row.status == "finished"
+            and earlier
+            and git.get("branch") == branch
+            and not git.get("changed")
+        )
 
     return [row for row in store.runs() if fits(row)]
 
 
 def pairs_of(subject: Subject) -> set[Pair]:
     """Return the pairs that a run was to make."""
-    return {(record.case, record.engine, record.mode) for record in subject.results.records} | {*subject.results.missing}
+    return {(record.case, record.engine, record.mode) for record in subject.results.records} | {
+        *subject.results.missing
+    }
 
 
 def _compared(store: Store, row: RunRow, subject: Subject) -> int:
-    """How much of what the subject was to compare was compared in a run: outputs that a case has no more do not count."""
-    outputs = {(record.case, record.engine, record.mode): {*record.errors} for record in subject.results.records}
+    """How much of what the subject was to compare was compared in a run: outputs that a case has no
+    more do not count.
+    """
+    outputs = {
+        (record.case, record.engine, record.mode): {*record.errors}
+        for record in subject.results.records
+    }
     there = compared(store, row.id)
     shared = 0
     for pair in pairs_of(subject) & there.keys():

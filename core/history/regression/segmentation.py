@@ -15,8 +15,8 @@ from ...case.case import Array
 
 SURE = 6.0
 """Distance of two levels in standard errors of a median. In 24 runs whose times were not freed of
-waiting, where any level is chance, the largest was 4.4. A change of level must also bring the values
-closer to their medians by as many, in sum."""
+waiting, where any level is chance, the largest was 4.4. A change of level must also bring the
+values closer to their medians by as many, in sum."""
 
 # Of normal values with standard deviation 1: standard error of a median times the root of their
 # number, mean |difference| of two values, and distance of the quartiles.
@@ -79,7 +79,8 @@ def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
 
 
 def _deviation(values: Array) -> float:
-    """Return the standard deviation by the mean difference of successive values, without the largest two.
+    """Return the standard deviation by the mean difference of successive values, without the
+    largest two.
 
     A level that comes and goes makes two large differences. Single outliers make more: where there
     are many, three in a row are chance, and a median would not know of them.
@@ -90,10 +91,11 @@ def _deviation(values: Array) -> float:
 
 
 def _parts(values: Array, ends: list[int], lasting: int) -> Array:
-    """Return cost, median, lower and upper quartile, and distance of the quartiles of all parts from one end to another.
+    """Return cost, median, lower and upper quartile, and distance of the quartiles of all parts
+    from one end to another.
 
-    The quartiles are values of the part, the outer ones; their distance is interpolated. A part that
-    is too short costs infinity.
+    The quartiles are values of the part, the outer ones; their distance is interpolated. A part
+    that is too short costs infinity.
     """
     table = np.zeros((5, len(ends), len(ends)))
     table[0] = math.inf
@@ -106,5 +108,11 @@ def _parts(values: Array, ends: list[int], lasting: int) -> Array:
         low, high = part[k], part[-1 - k]
         inner = rest / 4 * (part[min(k + 1, count - 1)] - low + high - part[max(-2 - k, -count)])
         cost = sum(part[count - count // 2 :]) - sum(part[: count // 2])
-        table[:, i, j] = cost, (part[(count - 1) // 2] + part[count // 2]) / 2, low, high, high - low - inner
+        table[:, i, j] = (
+            cost,
+            (part[(count - 1) // 2] + part[count // 2]) / 2,
+            low,
+            high,
+            high - low - inner,
+        )
     return table

@@ -1,4 +1,6 @@
-"""Errors that grow by less than a digit a night, and by more than one over many: no step, and nothing against last night."""
+"""Errors that grow by less than a digit a night, and by more than one over many: no step, and
+nothing against last night.
+"""
 
 from __future__ import annotations
 
@@ -18,36 +20,57 @@ from .thresholds import DRIFT, drifted
 
 
 def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterator[Finding]:
-    """Errors of the subject that are a digit above the least since their last step, of the same tolerance and standard.
+    """Errors of the subject that are a digit above the least since their last step, of the same
+    tolerance and standard.
 
     Args:
         told: what is said of the subject already.
     """
-    known = {(each.case, each.engine, each.mode, each.output, each.motion) for each in told if each.kind is Kind.DRIFTED}
+    known = {
+        (each.case, each.engine, each.mode, each.output, each.motion)
+        for each in told
+        if each.kind is Kind.DRIFTED
+    }
     for record in subject.results.records:
         pair = record.case, record.engine, record.mode
         entries = [entry for entry in around.pairs.get(pair, ()) if entry.run != subject.number]
-        for output, motion in ((output, motion) for output in record.errors for motion in QUANTITIES):
+        for output, motion in (
+            (output, motion) for output in record.errors for motion in QUANTITIES
+        ):
             now = getattr(record.errors[output], motion)
             if now is None or not now.within or (*pair, output, motion) in known:
                 continue
-            errors = [(entry, each) for entry, each in errors_of(entries, output, motion) if each.tolerance == now.tolerance]
+            errors = [
+                (entry, each)
+                for entry, each in errors_of(entries, output, motion)
+                if each.tolerance == now.tolerance
+            ]
             errors = [(entry, each) for entry, each in errors if each.against == now.against]
-            places = change_points(np.log(above_floor(errors)), least=math.log(DRIFT), lasting=1) if errors else []
+            places = (
+                change_points(np.log(above_floor(errors)), least=math.log(DRIFT), lasting=1)
+                if errors
+                else []
+            )
             level = errors[places[-1] if places else 0 :]
             if not level:
                 continue
             entry, least = min(level, key=lambda each: (each[1].max_abs, -each[0].run))
             if drifted(least.max_abs, now.max_abs, now.tolerance):
-                unit = motion_unit(record.outputs[output].unit, motion) if output in record.outputs else ""
+                unit = (
+                    motion_unit(record.outputs[output].unit, motion)
+                    if output in record.outputs
+                    else ""
+                )
                 size = f"{number(least.max_abs)} → {number(now.max_abs)} {unit}".rstrip()
                 yield Finding(
                     kind=Kind.DRIFTED,
                     case=record.case,
                     engine=record.engine,
                     mode=record.mode,
-                    message=f"{output} {motion} error {size}, little by little since run {entry.run} "
-                    f"(tolerance {number(now.tolerance)})",
+                    message=(
+                        f"{output} {motion} error {size}, little by little since run {entry.run} "
+                        f"(tolerance {number(now.tolerance)})"
+                    ),
                     output=output,
                     motion=motion,
                     before=least.max_abs,

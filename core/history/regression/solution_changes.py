@@ -1,4 +1,6 @@
-"""What two runs say of a pair's solution besides errors and times: freedom, rank, residual, units, and values that are gone."""
+"""What two runs say of a pair's solution besides errors and times: freedom, rank, residual, units,
+and values that are gone.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,11 @@ def _numbers(now: Record, before: Record) -> Iterator[Finding]:
     for name in ("dof", "rank", "residual_max"):
         if getattr(before, name) is not None and getattr(now, name) is None:
             why = now.reasons.get(name) or "no reason is given"
-            yield finding_of(Kind.GONE, now, f"{name} has no value now, {number(getattr(before, name))} before: {why}")
+            yield finding_of(
+                Kind.GONE,
+                now,
+                f"{name} has no value now, {number(getattr(before, name))} before: {why}",
+            )
 
 
 def _residual(now: Record, before: Record) -> Iterator[Finding]:
@@ -48,17 +54,23 @@ def _residual(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _units(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield units of outputs that have another name, and positive senses that have another meaning."""
+    """Yield units of outputs that have another name, and positive senses that have another
+    meaning.
+    """
     for output, old in before.outputs.items():
         new = now.outputs.get(output)
         for what in ("unit", "sense"):
             a, b = getattr(old, what), getattr(new, what, None)
             if new is not None and a != b:
-                yield finding_of(Kind.UNIT, now, f"{output}: {what} {a or 'none'} → {b or 'none'}", output=output)
+                yield finding_of(
+                    Kind.UNIT, now, f"{output}: {what} {a or 'none'} → {b or 'none'}", output=output
+                )
 
 
 def _gone(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield motions of outputs with null where they had numbers, unless something lost says so already."""
+    """Yield motions of outputs with null where they had numbers, unless something lost says so
+    already.
+    """
     if not same_samples(now, before):
         return
     unsolved = _unsolved(now) if (now.solved or 0) < (before.solved or 0) else set[int]()
@@ -72,15 +84,28 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
             had = [k for k, value in enumerate(there) if value is not None]
             gone = [k for k in had if (k >= len(here) or here[k] is None) and k not in unsolved]
             if gone:
-                at = [f"{name} = {number(values[gone[0]])}" for name, values in now.driver.items() if gone[0] < len(values)]
+                at = [
+                    f"{name} = {number(values[gone[0]])}"
+                    for name, values in now.driver.items()
+                    if gone[0] < len(values)
+                ]
                 first = at[0] if at else f"sample {gone[0]}"
-                why = "the case has no such output now" if new is None else new.reason or "no reason is given"
-                told = f"{output} {motion} has no value at {len(gone)} of {len(had)} samples that had one, first at {first}: {why}"
+                why = (
+                    "the case has no such output now"
+                    if new is None
+                    else new.reason or "no reason is given"
+                )
+                told = (
+                    f"{output} {motion} has no value at {len(gone)} of {len(had)} samples that had"
+                    f" one, first at {first}: {why}"
+                )
                 yield finding_of(Kind.GONE, now, told, output=output, motion=motion)
 
 
 def _unsolved(record: Record) -> set[int]:
-    """Return the samples at which no output has a position: fewer samples solved are told by themselves."""
+    """Return the samples at which no output has a position: fewer samples solved are told by
+    themselves.
+    """
     count = max((len(output.position) for output in record.outputs.values()), default=0)
     series = [output.position for output in record.outputs.values()]
     return {k for k in range(count) if all(k >= len(each) or each[k] is None for each in series)}

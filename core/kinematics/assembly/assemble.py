@@ -1,13 +1,16 @@
 """Assembly from estimates: poses that close, from poses that do not, many estimates at once.
 
-The mixed rows are used, because their only zero is the intended one of every joint: simplified rows lead from any misalignment
-back to it, where exact rows end on spurious branches (formulation sections 3 and 4). They do not choose between the legitimate
-assemblies of a loop; the estimate does.
+The mixed rows are used, because their only zero is the intended one of every joint: simplified rows
+lead from any misalignment back to it, where exact rows end on spurious branches (formulation
+sections 3 and 4). They do not choose between the legitimate assemblies of a loop; the estimate
+does.
 
-Each step is a damped one, (J^T J + mu I) s = -J^T phi with mu growing as |phi|^2: far away, where the Jacobian may be singular and
-says little, it is short; near the solution it is Newton's. With every body of the strut turned by 0.8 rad and shifted by about
-0.2 m, damped steps reach the intended assembly from all of 200 estimates, undamped ones from 92 %; with 1 m, from 81 % and 21 %.
-A cap on the turn of a step (0.15 to 1.2 rad) was tried besides: it changes these shares by a percent and costs iterations.
+Each step is a damped one, (J^T J + mu I) s = -J^T phi with mu growing as |phi|^2: far away, where
+the Jacobian may be singular and says little, it is short; near the solution it is Newton's. With
+every body of the strut turned by 0.8 rad and shifted by about 0.2 m, damped steps reach the
+intended assembly from all of 200 estimates, undamped ones from 92 %; with 1 m, from 81 % and 21 %.
+A cap on the turn of a step (0.15 to 1.2 rad) was tried besides: it changes these shares by a
+percent and costs iterations.
 """
 
 from __future__ import annotations
@@ -31,11 +34,14 @@ from ..formulation.driver_inputs import standing_drives
 from ..formulation.state_vectors import displaced, state_of
 
 MAX_ITERATIONS = 100
-# mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies far, more takes twice the steps.
+# mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies
+# far, more takes twice the steps.
 DAMPING = 0.1
-# mu at most: the size of rows. Unlimited, bodies that are ten mechanism sizes away come home by a hundredth of the way each step.
+# mu at most: the size of rows. Unlimited, bodies that are ten mechanism sizes away come home by a
+# hundredth of the way each step.
 LARGEST_DAMPING = 1.0
-# Below this residual the redundant rows have done their work, which is to lead there; Newton's own steps end it, as in a sweep.
+# Below this residual the redundant rows have done their work, which is to lead there; Newton's own
+# steps end it, as in a sweep.
 NEAR = 1e-6
 
 
@@ -45,8 +51,10 @@ class Assembled:
 
     Attributes:
         bodies: poses of the moving bodies; those that did not converge are NaN.
-        converged: whether each estimate ended in an assembly, on the intended branch of every joint, shape (n,).
-        spurious: whether it ended where the rows are zero and yet no assembly is: axes turned over, or redundant rows contradicted.
+        converged: whether each estimate ended in an assembly, on the intended branch of every
+            joint, shape (n,).
+        spurious: whether it ended where the rows are zero and yet no assembly is: axes turned over,
+            or redundant rows contradicted.
         residual: largest constraint residual, relative to the mechanism's size, shape (n,).
         iterations: shape (n,).
     """
@@ -69,49 +77,71 @@ def assemble(
     """Close a mechanism from estimated poses.
 
     Args:
-        estimates: by body, origin r [m], shape (n, 3), and Euler parameters p [-], shape (n, 4); bodies left out start at design.
-            Where their poses are not known at all, `find_assemblies` tries many.
+        estimates: by body, origin r [m], shape (n, 3), and Euler parameters p [-], shape (n, 4);
+            bodies left out start at design. Where their poses are not known at all,
+            `find_assemblies` tries many.
         values: of the drivers, from their design values [m or rad]; those left out hold theirs.
         tol: largest accepted residual, relative to the mechanism's size.
         style: how the rows are written; "mixed" leads to the intended branch from farthest.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, there is no moving body or driver of a name, or an estimate has
-            another shape, or the tolerance is not positive and finite.
+        SolveError: drivers and degrees of freedom do not match, there is no moving body or driver
+            of a name, or an estimate has another shape, or the tolerance is not positive and
+            finite.
     """
     require_named("assemble", mechanism, estimates, values or {})
     require_positive("assemble", "tol", tol)
-    origins = (real("assemble", f"origin r of body {name!r}", r, "of shape (n, 3)") for name, (r, _) in estimates.items())
+    origins = (
+        real("assemble", f"origin r of body {name!r}", r, "of shape (n, 3)")
+        for name, (r, _) in estimates.items()
+    )
     n = next((len(np.atleast_2d(r)) for r in origins), 1)
     require_shapes("assemble", estimates, (n,))
     closing = Closing(mechanism, values or {}, style)
     return closing.run(displaced(mechanism, closing.tracer.frame, estimates), n, tol)
 
 
-def require_named(who: str, mechanism: Mechanism, bodies: Iterable[str], drivers: Iterable[str]) -> None:
+def require_named(
+    who: str, mechanism: Mechanism, bodies: Iterable[str], drivers: Iterable[str]
+) -> None:
     """Raise SolveError unless there are moving bodies and drivers of these names."""
-    for what, names, known in (("moving body", bodies, mechanism.moving), ("driver", drivers, mechanism.drivers)):
+    for what, names, known in (
+        ("moving body", bodies, mechanism.moving),
+        ("driver", drivers, mechanism.drivers),
+    ):
         there = [each.name for each in known]
         for name in names:
             if name not in there:
                 raise no_such(who, what, name, there)
 
 
-def require_shapes(who: str, estimates: Mapping[str, tuple[Array, Array]], lanes: tuple[int, ...]) -> None:
+def require_shapes(
+    who: str, estimates: Mapping[str, tuple[Array, Array]], lanes: tuple[int, ...]
+) -> None:
     """Raise SolveError unless all origins and Euler parameters are given for these lanes."""
     for name, pose in estimates.items():
-        for what, numbers, count in zip(("origin r", "Euler parameters p"), pose, (3, 4), strict=True):
-            shape = real(who, f"{what} of body {name!r}", numbers, f"of shape {(*lanes, count)}").shape
+        for what, numbers, count in zip(
+            ("origin r", "Euler parameters p"), pose, (3, 4), strict=True
+        ):
+            shape = real(
+                who, f"{what} of body {name!r}", numbers, f"of shape {(*lanes, count)}"
+            ).shape
             if shape != (*lanes, count):
-                raise SolveError(f"{who}: {what} of body {name!r}: shape {shape}, expected {(*lanes, count)}")
+                raise SolveError(
+                    f"{who}: {what} of body {name!r}: shape {shape}, expected {(*lanes, count)}"
+                )
 
 
 class Closing:
     """The programs that close a mechanism at values of its drivers."""
 
-    def __init__(self, mechanism: Mechanism, values: Mapping[str, float], style: str = "mixed") -> None:
+    def __init__(
+        self, mechanism: Mechanism, values: Mapping[str, float], style: str = "mixed"
+    ) -> None:
         self.values, self.moving = values, tuple(body.name for body in mechanism.moving)
-        self.tracer = tracer = Tracer(mechanism, Request(tuple(values), (), self.moving, order=0, style=Style(style)))
+        self.tracer = tracer = Tracer(
+            mechanism, Request(tuple(values), (), self.moving, order=0, style=Style(style))
+        )
         self.kept = list(tracer.selection.chosen)
         phi, rows = tracer.formulation.phi(tracer.at), tracer.formulation.rows(tracer.at)
         slot, vector = tracer.layout.scalar, tracer.layout.vector
@@ -121,19 +151,35 @@ class Closing:
         entries = [x for row in rows for x in row.values()]
         step = [tracer.tape.input(each) for each in self._step]
         after = tracer.formulation.retract(tracer.at, step)
-        state = {slot: x for name, value in after.items() for slot, x in zip(vector(name, len(value)), value, strict=True)}
+        state = {
+            slot: x
+            for name, value in after.items()
+            for slot, x in zip(vector(name, len(value)), value, strict=True)
+        }
         self._programs: list[Program] = [
-            program("rows", tracer.tape, dict(zip([*self._phi, *self._rows], [*phi, *entries], strict=True))),
+            program(
+                "rows",
+                tracer.tape,
+                dict(zip([*self._phi, *self._rows], [*phi, *entries], strict=True)),
+            ),
             program("retract", tracer.tape, state),
             tracer.outputs(),
         ]
 
     def run(self, poses: Mapping[str, Pose], n: int, tol: float) -> Assembled:
-        """Close from n poses of each body, scalars of shape (n,); bodies left out start at design."""
-        slots, vectors, frame = self.tracer.layout.slots, self.tracer.layout.vectors, self.tracer.frame
+        """Close from n poses of each body, scalars of shape (n,); bodies left out start at
+        design.
+        """
+        slots, vectors, frame = (
+            self.tracer.layout.slots,
+            self.tracer.layout.vectors,
+            self.tracer.frame,
+        )
         executor = NumpyExecutor(Plan({each.name: each for each in self._programs}, slots), n)
         mechanism = self.tracer.mechanism
-        for name, value in state_of(self.tracer.formulation, mechanism, frame, poses, self.values).items():
+        for name, value in state_of(
+            self.tracer.formulation, mechanism, frame, poses, self.values
+        ).items():
             executor.put(vectors[name], np.array([np.broadcast_to(x, (n,)) for x in value]))
         for name, drive in standing_drives(mechanism, frame.unit, self.values).items():
             executor.put(vectors[f"drive {name}"], np.array([astuple(drive)]).T)
@@ -145,7 +191,8 @@ class Closing:
             if not len(active):
                 break
             iterations[active] += 1
-            done |= np.abs(phi[:, self.kept]).max(axis=1) < tol  # and this step, still taken, makes it round-off
+            # and this step, still taken, makes it round-off
+            done |= np.abs(phi[:, self.kept]).max(axis=1) < tol
             matrix = np.zeros((len(active), phi.shape[1], self.tracer.unknowns))
             matrix[:, self._entries[:, 0], self._entries[:, 1]] = executor.get(self._rows).T[active]
             step = np.zeros((n, self.tracer.unknowns))
@@ -158,12 +205,19 @@ class Closing:
         sound = (block[slots["branch"]] > 0.0) & (block[slots["leftover"]] <= max(CONSISTENT, tol))
         found = np.where(closes & sound, block, np.nan)
         bodies = {
-            name: BodyMotion(found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None) for name in self.moving
+            name: BodyMotion(
+                found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None
+            )
+            for name in self.moving
         }
-        return Assembled(bodies, closes & sound, closes & ~sound, block[slots["closure"]].copy(), iterations)
+        return Assembled(
+            bodies, closes & sound, closes & ~sound, block[slots["closure"]].copy(), iterations
+        )
 
     def _steps(self, phi: Array, matrix: Array) -> Array:
-        """Steps of lanes, shape (n, unknowns), from their residuals, shape (n, rows), and Jacobians."""
+        """Steps of lanes, shape (n, unknowns), from their residuals, shape (n, rows), and
+        Jacobians.
+        """
         step = np.empty((len(phi), matrix.shape[2]))
         near = np.abs(phi).max(axis=1) < NEAR
         far, identity = ~near, np.eye(matrix.shape[2])
@@ -172,9 +226,13 @@ class Closing:
             mu = np.minimum(DAMPING * (f * f).sum(axis=1), LARGEST_DAMPING)
             damped = rows.swapaxes(1, 2) @ rows + mu[:, None, None] * identity
             step[far] = -np.linalg.solve(damped, rows.swapaxes(1, 2) @ f[:, :, None])[:, :, 0]
-        if near.any():  # normal equations would square the condition; a damping at round-off keeps R regular at singular poses
+        # normal equations would square the condition; a damping at round-off keeps R regular at
+        # singular poses
+        if near.any():
             rows, f = matrix[near][:, self.kept], phi[near][:, self.kept]
-            floor = np.broadcast_to(np.finfo(np.float64).eps * identity, (len(rows), *identity.shape))
+            floor = np.broadcast_to(
+                np.finfo(np.float64).eps * identity, (len(rows), *identity.shape)
+            )
             Q, R = np.linalg.qr(np.concatenate([rows, floor], axis=1))
             rotated = Q[:, : rows.shape[1]].swapaxes(1, 2) @ f[:, :, None]
             step[near] = -np.linalg.solve(R, rotated)[:, :, 0]

@@ -1,4 +1,6 @@
-"""All assemblies of a mechanism that many starts lead to, told apart by their poses and named by their branch."""
+"""All assemblies of a mechanism that many starts lead to, told apart by their poses and named by
+their branch.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +22,16 @@ from ..formulation.state_vectors import displaced
 from .assemble import Closing, require_named, require_shapes
 from .branch_signature import Branches
 
-# Starts around an estimate: turned by up to this [rad], and shifted by about this part of the mechanism's size. Bodies that are
-# farther from the estimate than this lead to other assemblies than its own more often than not.
+# Starts around an estimate: turned by up to this [rad], and shifted by about this part of the
+# mechanism's size. Bodies that are farther from the estimate than this lead to other assemblies
+# than its own more often than not.
 SPREAD = 0.8, 0.2
-# Poses nearer than this [rad, mechanism sizes] are one assembly. Where two assemblies meet, a residual grows with the square of the
-# way from them: 1e-12 is 1e-6 away, and ten times as much for the mechanism's own lever.
+# Poses nearer than this [rad, mechanism sizes] are one assembly. Where two assemblies meet, a
+# residual grows with the square of the way from them: 1e-12 is 1e-6 away, and ten times as much for
+# the mechanism's own lever.
 SAME = 1e-5
-# How far a body that may be anywhere starts from where a joint wants it [mechanism sizes]; one that no joint carries, a whole size.
+# How far a body that may be anywhere starts from where a joint wants it [mechanism sizes]; one that
+# no joint carries, a whole size.
 ANYWHERE = 0.3
 
 
@@ -35,13 +40,18 @@ class Assembly:
     """One way to put the mechanism together.
 
     Attributes:
-        poses: of every moving body, origin r [m], shape (3,), and Euler parameters p [-], shape (4,).
-        distance: from the estimate: rms over its bodies of turn [rad] and displacement [mechanism sizes].
+        poses: of every moving body, origin r [m], shape (3,), and Euler parameters p [-], shape
+            (4,).
+        distance: from the estimate: rms over its bodies of turn [rad] and displacement [mechanism
+            sizes].
         starts: how many of the starts led there.
         residual: largest constraint residual, relative to the mechanism's size.
-        smallest: smallest singular value of all rows, lengths in mechanism sizes; zero where assemblies meet.
-        orientation: sign of the determinant of the rows, against that at design; 0 where it is singular.
-        signs: by joint, the sign of a triple product of its neighbours against that at design; see `Branches`.
+        smallest: smallest singular value of all rows, lengths in mechanism sizes; zero where
+            assemblies meet.
+        orientation: sign of the determinant of the rows, against that at design; 0 where it is
+            singular.
+        signs: by joint, the sign of a triple product of its neighbours against that at design; see
+            `Branches`.
     """
 
     poses: Mapping[str, tuple[Array, Array]]
@@ -61,7 +71,8 @@ class Assemblies:
         found: the assemblies, nearest to the estimate first.
         starts: how many starts there were.
         lost: how many of them did not close.
-        spurious: how many ended where the rows vanish and yet no assembly is: axes turned over, redundant rows contradicted.
+        spurious: how many ended where the rows vanish and yet no assembly is: axes turned over,
+            redundant rows contradicted.
     """
 
     found: tuple[Assembly, ...]
@@ -80,20 +91,24 @@ def find_assemblies(
     spread: tuple[float, float] | None = SPREAD,
     tol: float = 1e-12,
 ) -> Assemblies:
-    """Close a mechanism from many starts, and tell the assemblies apart. There may be more than are found.
+    """Close a mechanism from many starts, and tell the assemblies apart. There may be more than are
+    found.
 
     Args:
-        estimate: by body, origin r [m], shape (3,), and Euler parameters p [-], shape (4,): the first start, and what assemblies
-            are ranked by (the design, where it is empty). Bodies left out may be anywhere.
+        estimate: by body, origin r [m], shape (3,), and Euler parameters p [-], shape (4,): the
+            first start, and what assemblies are ranked by (the design, where it is empty). Bodies
+            left out may be anywhere.
         values: of the drivers, from their design values [m or rad]; those left out hold theirs.
         samples: number of starts.
         seed: of the random starts.
-        spread: how far the other starts are from the estimate [rad, mechanism sizes]; None for anywhere.
+        spread: how far the other starts are from the estimate [rad, mechanism sizes]; None for
+            anywhere.
         tol: largest accepted residual, relative to the mechanism's size.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, there is no moving body or driver of a name, or an estimate has
-            another shape, or tolerance or samples are not positive and finite.
+        SolveError: drivers and degrees of freedom do not match, there is no moving body or driver
+            of a name, or an estimate has another shape, or tolerance or samples are not positive
+            and finite.
     """
     require_named("find_assemblies", mechanism, estimate, values or {})
     require_shapes("find_assemblies", estimate, ())
@@ -124,14 +139,21 @@ def find_assemblies(
 
 
 def _apart(poses: Mapping[str, Pose], others: Mapping[str, Pose]) -> Array:
-    """Displacements [mechanism sizes] and turns [rad] between poses of the same bodies, shape (n, bodies, 2)."""
+    """Displacements [mechanism sizes] and turns [rad] between poses of the same bodies, shape (n,
+    bodies, 2).
+    """
     (u, q), (u0, q0) = map(_numbers, (poses, others))
-    turn = np.minimum(np.linalg.norm(q - q0, axis=-1), np.linalg.norm(q + q0, axis=-1))  # q and -q are one rotation
-    return np.stack([np.linalg.norm(u - u0, axis=-1), 4.0 * np.arcsin(np.minimum(0.5 * turn, 1.0))], axis=-1)
+    # q and -q are one rotation
+    turn = np.minimum(np.linalg.norm(q - q0, axis=-1), np.linalg.norm(q + q0, axis=-1))
+    return np.stack(
+        [np.linalg.norm(u - u0, axis=-1), 4.0 * np.arcsin(np.minimum(0.5 * turn, 1.0))], axis=-1
+    )
 
 
 def _numbers(poses: Mapping[str, Pose]) -> tuple[Array, Array]:
-    """Displacements and quaternions, shapes (n, bodies, 3) and (n, bodies, 4), or without n for a single configuration."""
+    """Displacements and quaternions, shapes (n, bodies, 3) and (n, bodies, 4), or without n for a
+    single configuration.
+    """
     u = [np.stack(np.broadcast_arrays(*pose.u), axis=-1) for pose in poses.values()]
     q = [np.stack(np.broadcast_arrays(pose.q.e0, *pose.q.e), axis=-1) for pose in poses.values()]
     return np.stack(u, axis=-2), np.stack(q, axis=-2)
@@ -164,8 +186,9 @@ def _starts(
 ) -> dict[str, Pose]:
     """Poses to start from, scalars of shape (n,); the first is the estimate.
 
-    A body without an estimate has any attitude, and is near where the spanning tree's joint with its parent wants it. Moving it as
-    that joint lets it, so that only the loops are open, was tried: 200 such starts find 8 assemblies of the delta robot, these 16.
+    A body without an estimate has any attitude, and is near where the spanning tree's joint with
+    its parent wants it. Moving it as that joint lets it, so that only the loops are open, was
+    tried: 200 such starts find 8 assemblies of the delta robot, these 16.
     """
     first = np.arange(n) == 0
     found: dict[str, Pose] = {}
@@ -173,12 +196,18 @@ def _starts(
         known = near.get(branch.child)
         if known is not None and spread is not None:
             turn, shift = spread
-            found[branch.child] = _where(first, known, _shaken(known, turn * rng.uniform(size=n), shift, n, rng))
+            found[branch.child] = _where(
+                first, known, _shaken(known, turn * rng.uniform(size=n), shift, n, rng)
+            )
             continue
         parent = found.get(branch.parent, GROUND_POSE)
         origin = tuple(frame.unit * frame.origins[branch.child])
         carried = parent.u + parent.swing(frame.arm(branch.parent, origin))
-        apart = ANYWHERE * rng.normal(size=(3, n)) if branch.joint is not None else rng.normal(size=(3, n))
+        apart = (
+            ANYWHERE * rng.normal(size=(3, n))
+            if branch.joint is not None
+            else rng.normal(size=(3, n))
+        )
         pose = Pose.of(carried + vec([*apart]), _any_rotation(n, rng))
         found[branch.child] = pose if known is None else _where(first, known, pose)
     return found

@@ -1,8 +1,9 @@
 """Which branch of its motion a configuration is on, as signs against the design position.
 
-The sign of the determinant of the rows changes only where the mechanism is singular. It is one sign for the whole mechanism; where
-it does not tell two assemblies apart, a triple product at every joint does: of the direction to the far joints of its two bodies
-and its axis (an elbow that bends one way or the other, a rod that winds around its neighbours one way or the other).
+The sign of the determinant of the rows changes only where the mechanism is singular. It is one sign
+for the whole mechanism; where it does not tell two assemblies apart, a triple product at every
+joint does: of the direction to the far joints of its two bodies and its axis (an elbow that bends
+one way or the other, a rod that winds around its neighbours one way or the other).
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from ..formulation.constraints import Frames
 from ..formulation.state_vectors import jacobian, state_of
 from ..structure.redundancy import independent_rows
 
-# A normalised triple product below this at design (half a degree) has no sign that rounding of a table would not change.
+# A normalised triple product below this at design (half a degree) has no sign that rounding of a
+# table would not change.
 FLAT = 1e-2
 # Below this part of the largest singular value, the sign of the determinant is round-off.
 SINGULAR = 1e-12
@@ -49,7 +51,10 @@ class Triple:
         """The triple product of unit vectors [-]."""
         i, j = poses.get(self.i, GROUND_POSE), poses.get(self.j, GROUND_POSE)
         if self.n is None:
-            points = (o + pose.u + pose.turn(end) for o, pose, end in zip(self.origins, (i, j), self.ends, strict=True))
+            points = (
+                o + pose.u + pose.turn(end)
+                for o, pose, end in zip(self.origins, (i, j), self.ends, strict=True)
+            )
             first, second = points
             n = second - first
         else:
@@ -63,7 +68,8 @@ class Branches:
     """What the branch of a configuration is told by.
 
     Attributes:
-        triples: by joint; joints whose neighbours lie in one line or plane with it at design have none.
+        triples: by joint; joints whose neighbours lie in one line or plane with it at design have
+            none.
     """
 
     mechanism: Mechanism
@@ -80,14 +86,23 @@ class Branches:
         formulation = Cartesian.of(mechanism, frame)
         matrix = jacobian(formulation)
         kept = independent_rows(matrix, len(mechanism.drivers), formulation.conditions)
-        triples = {joint.name: triple for joint in mechanism.joints if (triple := _triple(mechanism, frame, joint)) is not None}
-        return Branches(mechanism, frame, formulation, values, kept, _orientation(matrix[kept]), triples)
+        triples = {
+            joint.name: triple
+            for joint in mechanism.joints
+            if (triple := _triple(mechanism, frame, joint)) is not None
+        }
+        return Branches(
+            mechanism, frame, formulation, values, kept, _orientation(matrix[kept]), triples
+        )
 
     def at(self, poses: Mapping[str, Pose]) -> tuple[float, int, dict[str, int]]:
         """Smallest singular value of all rows, orientation, and signs by joint; see `Assembly`."""
         state = state_of(self.formulation, self.mechanism, self.frame, poses, self.values)
         matrix = jacobian(self.formulation, self.formulation.configuration(state))
-        signs = {name: int(np.sign(each.value(poses) * each.value({}))) for name, each in self.triples.items()}
+        signs = {
+            name: int(np.sign(each.value(poses) * each.value({})))
+            for name, each in self.triples.items()
+        }
         smallest = float(np.linalg.svd(matrix, compute_uv=False).min())
         return smallest, int(_orientation(matrix[self.kept]) * self.orientation), signs
 
@@ -118,7 +133,9 @@ def _triple(mechanism: Mechanism, frame: Frames, joint: Joint) -> Triple | None:
                     continue
                 n = unit([*normal])
             arms = frame.arm(joint.i, first), frame.arm(joint.j, last)
-            found = Triple(joint.i, joint.j, a, b, n, arms, (frame.origins[joint.i], frame.origins[joint.j]))
+            found = Triple(
+                joint.i, joint.j, a, b, n, arms, (frame.origins[joint.i], frame.origins[joint.j])
+            )
             if abs(found.value({})) > max(FLAT, abs(best.value({})) if best else 0.0):
                 best = found
     return best

@@ -1,7 +1,9 @@
-"""A large mechanism solved component by component: one program for all components that are built alike, samples as lanes.
+"""A large mechanism solved component by component: one program for all components that are built
+alike, samples as lanes.
 
-Every component takes how the bodies before it move from a table of all that is solved (the world), and adds its own. What it is
-predicted from is one pose for all lanes: the last sample that every component accepted.
+Every component takes how the bodies before it move from a table of all that is solved (the world),
+and adds its own. What it is predicted from is one pose for all lanes: the last sample that every
+component accepted.
 """
 
 from __future__ import annotations
@@ -19,15 +21,32 @@ from ...mechanism.motions import Path
 from ...program import MARGIN, Parts, Plan
 from ...program.memory import aligned
 from ...trajectory import Array
-from ..compiled.compiled_model import CLOSED, LARGEST_OF_PARTS, SMALLEST_OF_PARTS, Model, compile_model
-from ..compiled.request import ACCEPT, EARLIER, FROM, LARGEST_SIGMA, RATE, RATE_T, SIGMA, TIME, Request
+from ..compiled.compiled_model import (
+    CLOSED,
+    LARGEST_OF_PARTS,
+    SMALLEST_OF_PARTS,
+    Model,
+    compile_model,
+)
+from ..compiled.request import (
+    ACCEPT,
+    EARLIER,
+    FROM,
+    LARGEST_SIGMA,
+    RATE,
+    RATE_T,
+    SIGMA,
+    TIME,
+    Request,
+)
 from ..formulation.constraints import frames
 from ..formulation.parameters import places
 from ..structure.components import Component, Section, components, section
 
 WORST = (*LARGEST_OF_PARTS, *SMALLEST_OF_PARTS)
 """Tests of which the worst of all components is known."""
-# A pose with smallest singular values above this part of their largest is sound enough to look over a singular pose from.
+# A pose with smallest singular values above this part of their largest is sound enough to look over
+# a singular pose from.
 SOUND = 0.1
 
 
@@ -37,7 +56,8 @@ class ComponentType:
 
     Attributes:
         members: which components they are.
-        fixed: what is the same in all lanes (`Plan.fixed`), at the design position, shape (members, fixed).
+        fixed: what is the same in all lanes (`Plan.fixed`), at the design position, shape (members,
+            fixed).
         base: first row of the first member in the world; each has `model.kept` rows.
     """
 
@@ -48,7 +68,9 @@ class ComponentType:
 
     @cached_property
     def column(self) -> Mapping[str, int]:
-        """Where in what is fixed stands what tests go by: what they are told, and what was there before; and the times of that."""
+        """Where in what is fixed stands what tests go by: what they are told, and what was there
+        before; and the times of that.
+        """
         names = (*ACCEPT, EARLIER + TIME, *(FROM + name for name in (TIME, SIGMA, LARGEST_SIGMA)))
         return {name: list(self.model.plan.fixed).index(self.model.slots[name]) for name in names}
 
@@ -63,25 +85,33 @@ class Cascade:
     """The components of a mechanism with their programs, ready to be solved along paths.
 
     Args:
-        request: as for `compile_model`; accelerations are computed whatever its order, to predict from.
+        request: as for `compile_model`; accelerations are computed whatever its order, to predict
+            from.
         parts: its components, where they are known already.
 
     Raises:
-        SolveError: the mechanism has couplers, is not driven enough, or does not close at the design position.
+        SolveError: the mechanism has couplers, is not driven enough, or does not close at the
+            design position.
     """
 
-    def __init__(self, mechanism: Mechanism, request: Request, parts: Sequence[Component] | None = None) -> None:
+    def __init__(
+        self, mechanism: Mechanism, request: Request, parts: Sequence[Component] | None = None
+    ) -> None:
         self.mechanism, self.request = mechanism, request
         frame = frames(mechanism)
         self.parts = components(mechanism, frame) if parts is None else parts
         self.unit = max(part.extent for part in self.parts) or frame.unit
         metres = {name: frame.unit * origin for name, origin in frame.origins.items()}
-        origins: dict[str, Vector] = {name: (origin.x, origin.y, origin.z) for name, origin in metres.items()}
+        origins: dict[str, Vector] = {
+            name: (origin.x, origin.y, origin.z) for name, origin in metres.items()
+        }
         driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
         self.points: list[list[str]] = [[] for _ in self.parts]
         self.part_of = {name: k for k, part in enumerate(self.parts) for name in part.bodies}
         for point in mechanism.points:
-            if (point.name in request.points or point.name in driven) and point.body in self.part_of:
+            if (
+                point.name in request.points or point.name in driven
+            ) and point.body in self.part_of:
                 self.points[self.part_of[point.body]].append(point.name)
         sections = [self._section(k, part, origins) for k, part in enumerate(self.parts)]
         alike: dict[object, list[int]] = {}
@@ -107,7 +137,11 @@ class Cascade:
 
     def _kind(self, sections: Sequence[Section], members: Sequence[int]) -> ComponentType:
         first, values = sections[0], [places(each.mechanism) for each in sections]
-        varied = tuple(place for place, value in values[0].items() if any(each[place] != value for each in values))
+        varied = tuple(
+            place
+            for place, value in values[0].items()
+            if any(each[place] != value for each in values)
+        )
         m, part = first.mechanism, self.parts[members[0]]
         request = Request(
             tuple(driver.name for driver in m.drivers),
@@ -119,17 +153,22 @@ class Cascade:
             varied=varied,
         )
         model = compile_model(m, request, first)
-        numbers = np.array([[x for place in varied for x in each[place]] for each in values]).reshape(len(members), -1)
+        numbers = np.array(
+            [[x for place in varied for x in each[place]] for each in values]
+        ).reshape(len(members), -1)
         lanes = model.standing(numbers.T)
         if np.isnan(lanes).any():
             worst = self.parts[members[int(np.isnan(lanes).any(axis=0).argmax())]]
             raise SolveError(
-                f"mechanism {self.mechanism.name!r}: the component of {', '.join(worst.bodies)} does not close at the design "
-                f"position to {CLOSED:g} of its size; check points, axes and lengths"
+                f"mechanism {self.mechanism.name!r}: the component of {', '.join(worst.bodies)}"
+                f" does not close at the design position to {CLOSED:g} of its size; check points,"
+                " axes and lengths"
             )
         source, target = np.array(model.plan.carried).T
         lanes[target] = lanes[source]
-        return ComponentType(model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), self.rows)
+        return ComponentType(
+            model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), self.rows
+        )
 
     def body_rows(self, name: str) -> list[int]:
         """Rows of the world that tell how a body moves, in the order of `GIVEN`."""
@@ -140,7 +179,8 @@ class Cascade:
 
 
 class Lanes:
-    """A cascade bound to lanes: the world, and calls for its components in order, one for those alike that follow each other.
+    """A cascade bound to lanes: the world, and calls for its components in order, one for those
+    alike that follow each other.
 
     Attributes:
         world: all that is solved, shape (rows, room); see `Cascade`.
@@ -151,26 +191,50 @@ class Lanes:
     def __init__(self, cascade: Cascade, lanes: int) -> None:
         self.cascade, self.lanes, self.last = cascade, lanes, 0
         executors = {id(kind): kind.model.executor(lanes) for kind in cascade.kinds}
-        room, self._groups = max(each.room for each in executors.values()), next(iter(executors.values())).groups
+        room, self._groups = (
+            max(each.room for each in executors.values()),
+            next(iter(executors.values())).groups,
+        )
         self.world = aligned(cascade.rows * room).reshape(-1, room)
         self.world[:] = 0.0
         self.worst = aligned(len(WORST) * room).reshape(-1, room)
         self._best = cascade.kinds[0].model.plan.best
         self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
         self._ahead = [kind.fixed.copy() for kind in cascade.kinds]
-        self._samples = [aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in cascade.kinds]
+        self._samples = [
+            aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in cascade.kinds
+        ]
         self._carried = [_carried(kind.model.plan) for kind in cascade.kinds]
-        self._calls: list[list[Callable[[int], object]]] = [[], []]  # from what is fixed now, and from what is ahead
+        # from what is fixed now, and from what is ahead
+        self._calls: list[list[Callable[[int], object]]] = [[], []]
         self._parts: list[Parts] = []  # calls know addresses, not arrays
         number = {id(kind): k for k, kind in enumerate(cascade.kinds)}
-        for k, run in groupby(range(len(cascade.parts)), key=lambda part: number[id(cascade.place[part][0])]):
+        for k, run in groupby(
+            range(len(cascade.parts)), key=lambda part: number[id(cascade.place[part][0])]
+        ):
             kind, parts = cascade.kinds[k], [*run]
             members = np.array([cascade.place[part][1] for part in parts], dtype=np.int64)
-            rows = [[row for body in cascade.parts[part].given for row in cascade.body_rows(body)] for part in parts]
+            rows = [
+                [row for body in cascade.parts[part].given for row in cascade.body_rows(body)]
+                for part in parts
+            ]
             taken = np.array(rows, dtype=np.int64).reshape(len(parts), -1)
             now, ahead = self._fixed[k], self._ahead[k]
-            for calls, (fixed, other) in zip(self._calls, ((now, ahead), (ahead, now)), strict=True):
-                self._parts.append(Parts(members, fixed, other, self._samples[k], taken, self.world, kind.base, self.worst))
+            for calls, (fixed, other) in zip(
+                self._calls, ((now, ahead), (ahead, now)), strict=True
+            ):
+                self._parts.append(
+                    Parts(
+                        members,
+                        fixed,
+                        other,
+                        self._samples[k],
+                        taken,
+                        self.world,
+                        kind.base,
+                        self.worst,
+                    )
+                )
                 calls.append(executors[id(kind)].parts(self._parts[-1]))
 
     def accept_by(self, tolerances: Mapping[str, float]) -> None:
@@ -180,7 +244,9 @@ class Lanes:
                 fixed[:, kind.column[name]] = value
 
     def stand_at(self, time: float) -> None:
-        """Have what the lanes are predicted from stand at another time, with no step behind it: so it does on another path."""
+        """Have what the lanes are predicted from stand at another time, with no step behind it: so
+        it does on another path.
+        """
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             fixed[:, [kind.column[FROM + TIME], kind.column[EARLIER + TIME]]] = time
 
@@ -195,17 +261,26 @@ class Lanes:
             fixed[:] = kept
 
     def attempt(self, times: Array, path: Path) -> Array:
-        """Solve all components at as many times as there are lanes, or fewer; the margin of each, positive where accepted."""
+        """Solve all components at as many times as there are lanes, or fewer; the margin of each,
+        positive where accepted.
+        """
         return self.attempt_at(self.sampled(times, path))
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
-        """What is given at times, by kind, shape (sampled, times): of those that no driver moves one table for all."""
+        """What is given at times, by kind, shape (sampled, times): of those that no driver moves
+        one table for all.
+        """
         models, alone = [kind.model for kind in self.cascade.kinds], times[None]
         driven = [(model, model.request.drivers) for model in models]
-        return [model.samples(times, path.drive(names, times)) if names else alone for model, names in driven]
+        return [
+            model.samples(times, path.drive(names, times)) if names else alone
+            for model, names in driven
+        ]
 
     def attempt_at(self, tables: Sequence[Array]) -> Array:
-        """Attempt all components as `attempt` does, from the tables that `sampled` gives of the times."""
+        """Attempt all components as `attempt` does, from the tables that `sampled` gives of the
+        times.
+        """
         count = tables[0].shape[1]
         self.last = count - 1
         for table, samples in zip(tables, self._samples, strict=True):
@@ -226,11 +301,15 @@ class Lanes:
         return np.concatenate(found)
 
     def kept(self, *, rates: bool = False) -> Array:
-        """States of all components, or their rates and the rates of those, shape (numbers, room)."""
+        """States of all components, or their rates and the rates of those, shape (numbers,
+        room).
+        """
         found: list[Array] = []
         for kind in self.cascade.kinds:
             names = (RATE, RATE_T) if rates else kind.model.state
-            rows = np.concatenate([np.arange(kind.model.kept)[kind.model.rows[name]] for name in names])
+            rows = np.concatenate(
+                [np.arange(kind.model.kept)[kind.model.rows[name]] for name in names]
+            )
             first = kind.base + kind.model.kept * np.arange(len(kind.members))
             found.append(self.world[(first[:, None] + rows).ravel()])
         return np.concatenate(found)
@@ -239,8 +318,13 @@ class Lanes:
         """The same of what the lanes are predicted from, shape (numbers,)."""
         found: list[Array] = []
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
-            names, slots = (RATE, RATE_T) if rates else kind.model.state, list(kind.model.plan.fixed)
-            columns = [slots.index(slot) for name in names for slot in kind.model.vectors[FROM + name]]
+            names, slots = (
+                (RATE, RATE_T) if rates else kind.model.state,
+                list(kind.model.plan.fixed),
+            )
+            columns = [
+                slots.index(slot) for name in names for slot in kind.model.vectors[FROM + name]
+            ]
             found.append(fixed[:, columns].ravel())
         return np.concatenate(found)
 
@@ -260,18 +344,26 @@ class Lanes:
 
     def carry(self, lane: int) -> None:
         """Predict from a solved lane from now on, whichever it is."""
-        for kind, fixed, samples, carried in zip(self.cascade.kinds, self._fixed, self._samples, self._carried, strict=True):
+        for kind, fixed, samples, carried in zip(
+            self.cascade.kinds, self._fixed, self._samples, self._carried, strict=True
+        ):
             size, count = kind.model.kept, len(kind.members)
             solved = self.world[kind.base : kind.base + size * count, lane].reshape(count, size)
             tables = solved, samples[None, :, lane], fixed
-            values = [table[:, sources] for table, (sources, _) in zip(tables, carried, strict=True)]
+            values = [
+                table[:, sources] for table, (sources, _) in zip(tables, carried, strict=True)
+            ]
             for (_, targets), each in zip(carried, values, strict=True):
                 fixed[:, targets] = each
 
 
 def _carried(plan: Plan) -> list[tuple[list[int], list[int]]]:
-    """Columns of what is kept, sampled and fixed that are carried, and the columns of what is fixed that they are carried to."""
-    column = [{slot: k for k, slot in enumerate(slots)} for slots in (plan.kept, plan.sampled, plan.fixed)]
+    """Columns of what is kept, sampled and fixed that are carried, and the columns of what is fixed
+    that they are carried to.
+    """
+    column = [
+        {slot: k for k, slot in enumerate(slots)} for slots in (plan.kept, plan.sampled, plan.fixed)
+    ]
     found: list[tuple[list[int], list[int]]] = [([], []) for _ in column]
     for source, target in plan.carried:
         k = next(k for k, each in enumerate(column) if source in each)

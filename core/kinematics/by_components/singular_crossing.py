@@ -1,5 +1,5 @@
-"""Over a singular pose of a cascade, as `bridge` does it for one program: eight poses beside it and the last one before it are on
-one smooth curve, or the motion is not known to go on."""
+"""Over a singular pose of a cascade, as `bridge` does it for one program: eight poses beside it and
+the last one before it are on one smooth curve, or the motion is not known to go on."""
 
 from __future__ import annotations
 
@@ -14,16 +14,28 @@ from ..continuation.singular_crossing import COVERED, EIGHT, NODES, PLACES, SIX
 from ..continuation.step_halving import longest
 from .block_solver import Lanes
 
-# Nothing is interpolated here: it is enough to see that there is one curve, and other assemblies are farther off.
+# Nothing is interpolated here: it is enough to see that there is one curve, and other assemblies
+# are farther off.
 SMOOTH = 1e-7
-# Number of the first of the eight that is beyond, halvings of a step to one of them, and how many parts it is gone in at most.
+# Number of the first of the eight that is beyond, halvings of a step to one of them, and how many
+# parts it is gone in at most.
 BEYOND, HALVED, MOST = 4, 8, 64
-# The last pose before is followed to where rounding leaves rates uncertain by a hundredth: itself by this.
+# The last pose before is followed to where rounding leaves rates uncertain by a hundredth: itself
+# by this.
 NEARLY = 1e-7
 
 
-def cross(lanes: Lanes, path: Path, sound: Sequence[Array], start: float, here: float, aim: float, tol: float) -> float | None:
-    """Take what the lanes are predicted from over a singular pose; where it stands beyond, or None: then it is as it was.
+def cross(
+    lanes: Lanes,
+    path: Path,
+    sound: Sequence[Array],
+    start: float,
+    here: float,
+    aim: float,
+    tol: float,
+) -> float | None:
+    """Take what the lanes are predicted from over a singular pose; where it stands beyond, or None:
+    then it is as it was.
 
     Args:
         lanes: predicted from the last pose before the singular one.
@@ -45,8 +57,12 @@ def cross(lanes: Lanes, path: Path, sound: Sequence[Array], start: float, here: 
     return None
 
 
-def _eight(lanes: Lanes, path: Path, start: float, times: Array, tol: float) -> tuple[Array, Array] | None:
-    """States and rates at eight times, a singular pose between the fourth and the fifth; then it goes on there."""
+def _eight(
+    lanes: Lanes, path: Path, start: float, times: Array, tol: float
+) -> tuple[Array, Array] | None:
+    """States and rates at eight times, a singular pose between the fourth and the fifth; then it
+    goes on there.
+    """
     found, here = list[tuple[Array, Array]](), start
     for k, time in enumerate(times.tolist()):
         lanes.accept_by(accept_by(tol, crossing=k == BEYOND))
@@ -74,6 +90,8 @@ def _reach(lanes: Lanes, path: Path, here: float, time: float) -> bool:
 
 
 def _smooth(state: Array, rates: Array, near: Array) -> bool:
-    off = [float(np.abs(x @ (EIGHT - SIX)).max() / max(1.0, np.abs(x).max())) for x in (state, rates)]
+    off = [
+        float(np.abs(x @ (EIGHT - SIX)).max() / max(1.0, np.abs(x).max())) for x in (state, rates)
+    ]
     known = COVERED * np.abs(state @ (EIGHT - SIX)) + NEARLY
     return max(off) <= SMOOTH and bool((np.abs(state @ EIGHT - near) <= known).all())

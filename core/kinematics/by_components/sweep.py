@@ -1,4 +1,6 @@
-"""Sweep a cascade: outwards from the design position, many samples as lanes, on from the last one that every component accepts."""
+"""Sweep a cascade: outwards from the design position, many samples as lanes, on from the last one
+that every component accepts.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,10 @@ from ..structure.degrees_of_freedom import counted
 from .block_solver import WORST, Cascade, Lanes
 from .singular_crossing import cross
 
-# Samples at once: all are predicted from one pose, and the farther they are from it the more iterations they take, and the more are
-# tried in vain; and what a large chain takes its time for is memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8
-# one of 16 loops takes 1.3 times as long.
+# Samples at once: all are predicted from one pose, and the farther they are from it the more
+# iterations they take, and the more are tried in vain; and what a large chain takes its time for is
+# memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8 one of 16 loops takes 1.3
+# times as long.
 LANES = 16
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
 STILL = 0.0, 0.0, 0.0
@@ -69,11 +72,15 @@ class CascadeSweep:
         for name in cascade.request.points:
             point = m.point(name)
             if point.body not in cascade.part_of:
-                still |= {f"{label} {name}": STILL for label in QUANTITIES} | {f"position {name}": point.position}
+                still |= {f"{label} {name}": STILL for label in QUANTITIES} | {
+                    f"position {name}": point.position
+                }
                 continue
             kind, member = cascade.place[cascade.part_of[point.body]]
             own = f"p{cascade.points[cascade.part_of[point.body]].index(name)}"
-            found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in QUANTITIES}
+            found |= {
+                f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in QUANTITIES
+            }
         for name in cascade.request.bodies:
             if name not in cascade.part_of:
                 body = m.body(name)
@@ -89,7 +96,9 @@ class CascadeSweep:
         """The motion at all samples; see `solve.solve`."""
 
         def by(start: Start) -> Trajectory:
-            return (self if start is self.start else CascadeSweep(self.cascade, self.path, start))._solve(tol)
+            return (
+                self if start is self.start else CascadeSweep(self.cascade, self.path, start)
+            )._solve(tol)
 
         return by_ways(self.start, self.cascade.mechanism, self.path, by, compare=np.isfinite(tol))
 
@@ -122,18 +131,28 @@ class CascadeSweep:
     def _sides(self) -> list[tuple[Indices, list[Array]]]:
         """Of each side of the start the samples outwards, and what is given there."""
         times = self.path.times
-        return [(side, self._lanes.sampled(times[side], self.path)) for side in outwards(times, self.start.time)]
+        return [
+            (side, self._lanes.sampled(times[side], self.path))
+            for side in outwards(times, self.start.time)
+        ]
 
     @cached_property
     def _details(self) -> dict[str, Any]:
         """What the record of every solution says of the cascade."""
-        cascade, unknowns, rows, redundant, sizes = self.cascade, 0, 0, list[str](), dict[str, dict[str, int]]()
+        cascade, unknowns, rows, redundant, sizes = (
+            self.cascade,
+            0,
+            0,
+            list[str](),
+            dict[str, dict[str, int]](),
+        )
         for kind in cascade.kinds:
             account, like = kind.model.selection.account, cascade.parts[kind.members[0]].bodies[0]
             unknowns += account.moving_coordinates * len(kind.members)
             rows += account.rows * len(kind.members)
             for part in (cascade.parts[k] for k in kind.members):
-                joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}  # as they are called in a section
+                # as they are called in a section
+                joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}
                 named = (name.partition(":") for name in account.redundant_rows)
                 redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
             which = f"components like that of {like} ({len(kind.members)})"
@@ -147,7 +166,9 @@ class CascadeSweep:
 
     @cached_property
     def _departure(self) -> tuple[list[Array], str, Sequence[str]]:
-        """Where the sweep starts: what is predicted from, why it cannot be reached if it cannot, and notes of the way."""
+        """Where the sweep starts: what is predicted from, why it cannot be reached if it cannot,
+        and notes of the way.
+        """
         lanes, path, begin, message = self._lanes, self.path, self.start, ""
         lanes.accept_by(accept_by(CLOSED))
         self._notes = list[str]()
@@ -156,12 +177,17 @@ class CascadeSweep:
             message = self._follow(times, lanes.sampled(times, way), 0.0, way, _nothing, CLOSED)
             message = f"on the way to {begin.name}: {message}" if message else ""
         lanes.stand_at(begin.time)
-        lanes.attempt(np.array([begin.time]), path)  # the rates of the path where the mechanism stands
+        # the rates of the path where the mechanism stands
+        lanes.attempt(np.array([begin.time]), path)
         lanes.carry(0)
         return lanes.anchor, message, tuple(self._notes)
 
-    def _follow(self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float) -> str:
-        """Follow the samples outwards, with what is given there, over singular poses too; empty, or why they end."""
+    def _follow(
+        self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float
+    ) -> str:
+        """Follow the samples outwards, with what is given there, over singular poses too; empty, or
+        why they end.
+        """
         lanes, left, refused = self._lanes, np.arange(len(times)), list[int]()
         while len(left):
             halt = self._along(left, times, given, here, path, keep)
@@ -171,7 +197,11 @@ class CascadeSweep:
             at = int(left[0])
             wanted, last = float(times[at]), float(times[at - 1]) if at else None
             message = path.ended(halt.here, wanted, last, halt.reason or self._why_ended(tol))
-            beyond = None if halt.reason else cross(lanes, path, halt.sound, halt.start, halt.here, wanted, tol)
+            beyond = (
+                None
+                if halt.reason
+                else cross(lanes, path, halt.sound, halt.start, halt.here, wanted, tol)
+            )
             if beyond is None:
                 return message
             self._notes.append(f"crosses a singular pose near {path.where(halt.here)}; {CONTINUED}")
@@ -182,11 +212,24 @@ class CascadeSweep:
             lanes.anchor = anchor
         if refused:
             places = listed([path.where(float(times[k])) for k in refused])
-            return f"refused at {places}: so near a singular pose that neither side reaches it; keep away from it"
+            return (
+                f"refused at {places}: so near a singular pose that neither side reaches it; keep"
+                " away from it"
+            )
         return ""
 
-    def _along(self, samples: Indices, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep) -> Halt:
-        """Follow samples in their order, in parts of steps where need be, to the last or to where no part is accepted."""
+    def _along(
+        self,
+        samples: Indices,
+        times: Array,
+        given: Sequence[Array],
+        here: float,
+        path: Path,
+        keep: Keep,
+    ) -> Halt:
+        """Follow samples in their order, in parts of steps where need be, to the last or to where
+        no part is accepted.
+        """
         lanes, at, parts = self._lanes, 0, 0
         sound, start = lanes.anchor, here
         while at < len(samples):
@@ -205,7 +248,9 @@ class CascadeSweep:
                 sound, start = lanes.anchor, here
             if parts == MOST_PARTS:
                 return Halt(at, here, sound, start, TOO_MANY)
-            reached = part_of_step(here, float(times[samples[at]]), lambda parts: lanes.attempt(parts, path), LANES)
+            reached = part_of_step(
+                here, float(times[samples[at]]), lambda parts: lanes.attempt(parts, path), LANES
+            )
             if reached is None:
                 break
             lane, here = reached
@@ -214,29 +259,50 @@ class CascadeSweep:
         return Halt(at, here, sound, start)
 
     def _why_ended(self, tol: float) -> str:
-        """Which component could not be solved at the shortest part of a step, and how singular it is."""
+        """Which component could not be solved at the shortest part of a step, and how singular it
+        is.
+        """
         lane = self._lanes.last
         closure, sigma = (self._lanes.each(name)[:, lane] for name in ("closure", SIGMA))
         closes = bool((closure <= tol).all())
         worst = int(np.nanargmin(sigma) if closes else np.nan_to_num(closure, nan=np.inf).argmax())
         order = [part for kind in self.cascade.kinds for part in kind.members]
         bodies = ", ".join(self.cascade.parts[order[worst]].bodies)
-        what = "is the nearest to singular" if closes else f"is left with residual {closure[worst]:.3g} of its size"
-        told = f"smallest singular value there about {sigma[worst]:.3g} (zero at a lock-up or dead centre)"
+        what = (
+            "is the nearest to singular"
+            if closes
+            else f"is left with residual {closure[worst]:.3g} of its size"
+        )
+        told = (
+            f"smallest singular value there about {sigma[worst]:.3g} (zero at a lock-up or dead"
+            " centre)"
+        )
         return f"the component of {bodies} {what}; {told}"
 
-    def _trajectory(self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]) -> Trajectory:
+    def _trajectory(
+        self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]
+    ) -> Trajectory:
         request, solved = self.cascade.request, ~np.isnan(tests["closure"])
         order, unit = request.order + 1, self.cascade.unit
-        found |= {name: np.where(solved[:, None], value, np.nan) for name, value in self._still.items()}
+        found |= {
+            name: np.where(solved[:, None], value, np.nan) for name, value in self._still.items()
+        }
 
         def motion(name: str) -> PointMotion:
             series = [found[f"{label} {name}"] for label in QUANTITIES[:order]]
             return PointMotion(*series, *[None] * (3 - len(series)))
 
         def body(name: str) -> BodyMotion:
-            v, a = (np.hstack([found[f"{label} {name}"] for label in pair]) for pair in (("rdot", "omega"), ("rddot", "omega_t")))
-            return BodyMotion(found[f"r {name}"], found[f"p {name}"], v if order > 1 else None, a if order > 2 else None)
+            v, a = (
+                np.hstack([found[f"{label} {name}"] for label in pair])
+                for pair in (("rdot", "omega"), ("rddot", "omega_t"))
+            )
+            return BodyMotion(
+                found[f"r {name}"],
+                found[f"p {name}"],
+                v if order > 1 else None,
+                a if order > 2 else None,
+            )
 
         return Trajectory(
             points={name: motion(name) for name in request.points},

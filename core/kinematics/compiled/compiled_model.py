@@ -1,4 +1,6 @@
-"""A mechanism made ready to be swept: its rows selected, its programs traced, its lanes laid out."""
+"""A mechanism made ready to be swept: its rows selected, its programs traced, its lanes laid
+out.
+"""
 
 from __future__ import annotations
 
@@ -20,21 +22,38 @@ from ..formulation.driver_inputs import drive_numbers
 from ..structure.components import Section
 from . import acceptance, predictor
 from .program_cache import Tracing, ours, traced
-from .request import EARLIER, FROM, LARGEST_SIGMA, ORIENTATION, PREDICTED, RATE, RATE_T, SIGMA, TIME, Request, remembered
+from .request import (
+    EARLIER,
+    FROM,
+    LARGEST_SIGMA,
+    ORIENTATION,
+    PREDICTED,
+    RATE,
+    RATE_T,
+    SIGMA,
+    TIME,
+    Request,
+    remembered,
+)
 from .thread_cache import ThreadCache
 
 MAX_ITERATIONS = 12
-# Models that are kept for whoever solves one mechanism again and again: to fetch one from disk takes longer than many sweeps.
+# Models that are kept for whoever solves one mechanism again and again: to fetch one from disk
+# takes longer than many sweeps.
 RECENT = 8
-# A design position closes to this part of the mechanism's size: hardpoints in double precision do, to a thousand round-offs.
+# A design position closes to this part of the mechanism's size: hardpoints in double precision do,
+# to a thousand round-offs.
 CLOSED = 1e-12
-# Iterations from the design position at most: a rod given longer or shorter than its design distance is taken up by them.
+# Iterations from the design position at most: a rod given longer or shorter than its design
+# distance is taken up by them.
 ASSEMBLING = 50
 NONE_VARIED = np.empty((0, 1))
 TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
 """Scalars that are kept of every sample, after the motions."""
 TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
-"""Those kept of variants: where there is a solution, how sure, and what it took. Few, because variants are many."""
+"""Those kept of variants: where there is a solution, how sure, and what it took. Few, because
+variants are many.
+"""
 LARGEST, SMALLEST = ("closure", "leftover"), (SIGMA,)
 """Tests of which the worst is found over all samples."""
 LARGEST_OF_PARTS, SMALLEST_OF_PARTS = (*LARGEST, ITERATIONS), (*SMALLEST, MARGIN)
@@ -45,7 +64,8 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
     """Select the rows and trace the programs that the request needs.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
+        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
+            the design position.
     """
     if request.compiled and available():
         make_loops_ready()
@@ -58,7 +78,8 @@ def _recent(mechanism: Mechanism, request: Request) -> Model:
 
 
 def recent_model(mechanism: Mechanism, request: Request) -> Model:
-    """As `compile_model`, and the same for the same mechanism and request as long as it is among the last few asked for.
+    """As `compile_model`, and the same for the same mechanism and request as long as it is among
+    the last few asked for.
 
     Threads that ask for it at the same time may each make one.
     """
@@ -72,11 +93,13 @@ class Model:
         slots: name of a scalar -> its place in a lane.
         vectors: name of a vector -> the places of its components.
         state: name of a vector of the state -> its value at design.
-        sampled: the places of what is given at every sample: the time, and five numbers of each moving driver.
+        sampled: the places of what is given at every sample: the time, and five numbers of each
+            moving driver.
         geometry: the places of the numbers of all varied places.
         given: name of a vector that tells how a given body moves -> its value at rest at design.
         blocks: of the rows (`Elimination.sigmas`).
-        design: all slots of a lane that stands at the design position; NaN where the rows were chosen elsewhere.
+        design: all slots of a lane that stands at the design position; NaN where the rows were
+            chosen elsewhere.
         bound: what is made of it for a thread.
         rows: name of a motion or test -> its rows among what is kept of a sample.
         kept: how many rows there are.
@@ -86,13 +109,17 @@ class Model:
     def __init__(self, mechanism: Mechanism, request: Request, tracing: Tracing) -> None:
         self.mechanism, self.request = mechanism, request
         self.selection, self.frame, self.blocks = tracing.selection, tracing.frame, tracing.blocks
-        self.programs: Mapping[str, Program] = {program.name: program for program in tracing.programs}
+        self.programs: Mapping[str, Program] = {
+            program.name: program for program in tracing.programs
+        }
         self.slots, self.vectors = tracing.slots, tracing.vectors
         self.state, self.given = tracing.state, tracing.given
         self._geometry = tracing.geometry
         self.geometry = [slot for place in tracing.geometry for slot in self.vectors[place]]
         self.sampled = [self.slots[TIME]]
-        self.sampled += [slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]]
+        self.sampled += [
+            slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]
+        ]
         self._tangent = "outputs" if self.request.order == 2 else "tangent"
         kept = [slot for name in self._wanted() for slot in self.vectors[name]]
         self.rows = self._rows()
@@ -106,13 +133,19 @@ class Model:
             onward=(self._tangent,),
             sampled=[*self.sampled, *self.vectors.get(predictor.WEIGHT, ())],
             behind=tracing.behind,
-            remembered=[slot for name in self.state for slot in self.vectors[name]] if predictor.PAST in self.vectors else (),
+            remembered=(
+                [slot for name in self.state for slot in self.vectors[name]]
+                if predictor.PAST in self.vectors
+                else ()
+            ),
             past=self.vectors.get(predictor.PAST, (0,))[0],
             carried=tracing.carried,
             continued=tracing.continued,
             kept=[*kept, *(self.slots[name] for name in self._tests)],
             largest=[self.slots[name] for name in (LARGEST_OF_PARTS if request.state else LARGEST)],
-            smallest=[self.slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)],
+            smallest=[
+                self.slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)
+            ],
             fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
             taken=[slot for name in self.given for slot in self.vectors[name]],
             tolerance=self.request.last_iteration,
@@ -126,14 +159,21 @@ class Model:
     def _wanted(self) -> list[str]:
         """Names of the vectors asked for, those of one motion side by side."""
         order = self.request.order + 1
-        found = [*self.state, *(PREDICTED + name for name in self.state), RATE, RATE_T] if self.request.state else []
+        found = (
+            [*self.state, *(PREDICTED + name for name in self.state), RATE, RATE_T]
+            if self.request.state
+            else []
+        )
         found += [f"{label} {name}" for name in self.request.points for label in QUANTITIES[:order]]
         labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
-        return found + [f"{label} {name}" for name in self.request.bodies for group in labels for label in group]
+        return found + [
+            f"{label} {name}" for name in self.request.bodies for group in labels for label in group
+        ]
 
     @property
     def _tests(self) -> Sequence[str]:
-        if self.request.state:  # a part of a large mechanism: whose fault it is, and what the next sample is accepted by
+        # a part of a large mechanism: whose fault it is, and what the next sample is accepted by
+        if self.request.state:
             return ("closure", *remembered(self.blocks))
         return TESTS_OF_VARIANTS if self.request.varied else TESTS
 
@@ -148,18 +188,30 @@ class Model:
 
     @cached_property
     def of_points(self) -> Mapping[str, list[slice | None]]:
-        """By point: rows of its position, velocity and acceleration; None where one is not wanted."""
-        return {name: [self.rows.get(f"{label} {name}") for label in QUANTITIES] for name in self.request.points}
+        """By point: rows of its position, velocity and acceleration; None where one is not
+        wanted.
+        """
+        return {
+            name: [self.rows.get(f"{label} {name}") for label in QUANTITIES]
+            for name in self.request.points
+        }
 
     @cached_property
     def of_bodies(self) -> Mapping[str, list[slice | None]]:
-        """By body: rows of its r, p, v and a, None where not wanted; rates of place and of rotation stand side by side."""
+        """By body: rows of its r, p, v and a, None where not wanted; rates of place and of rotation
+        stand side by side.
+        """
         pairs = (("r", "r"), ("p", "p"), ("rdot", "omega"), ("rddot", "omega_t"))
 
         def rows(first: str, last: str) -> slice | None:
-            return slice(self.rows[first].start, self.rows[last].stop) if first in self.rows else None
+            return (
+                slice(self.rows[first].start, self.rows[last].stop) if first in self.rows else None
+            )
 
-        return {name: [rows(f"{first} {name}", f"{last} {name}") for first, last in pairs] for name in self.request.bodies}
+        return {
+            name: [rows(f"{first} {name}", f"{last} {name}") for first, last in pairs]
+            for name in self.request.bodies
+        }
 
     @property
     def orders(self) -> int:
@@ -177,23 +229,32 @@ class Model:
         return {name: each.size for name, each in self.programs.items()}
 
     def executor(self, lanes: int) -> Executor:
-        """The programs bound to that many lanes of this thread; kept, because binding costs as much as running.
+        """The programs bound to that many lanes of this thread; kept, because binding costs as much
+        as running.
 
         Whoever asks for as many gets the same memory, and sets all that it reads.
         """
-        return self.bound(lanes, lambda: LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self.plan, lanes))
+        return self.bound(
+            lanes,
+            lambda: (
+                LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self.plan, lanes)
+            ),
+        )
 
     def samples(self, times: Array, drive: Array) -> Array:
         """What `sampled` holds at the times, shape (sampled, n).
 
         Args:
-            drive: value from the design, velocity and acceleration of every moving driver [SI], shape (3, drivers, n).
+            drive: value from the design, velocity and acceleration of every moving driver [SI],
+                shape (3, drivers, n).
         """
         drivers = [self.mechanism.driver(name) for name in self.request.drivers]
         return np.concatenate([times[None], drive_numbers(drivers, drive, self.frame.unit)])
 
     def departing(self, lane: Array, sample: Array) -> Array:
-        """A lane that goes on from where a solved lane stands, with the rates that a sample of the drives gives it there."""
+        """A lane that goes on from where a solved lane stands, with the rates that a sample of the
+        drives gives it there.
+        """
         executor = self.executor(1)
         every = range(len(self.slots))
         executor.put(every, lane[:, None])
@@ -206,16 +267,21 @@ class Model:
         return [target for _, target in self.plan.carried]
 
     def depart(self, executor: Executor, sample: Array) -> None:
-        """Make solved lanes those that go on from where they stand, with the rates that a sample of the drives gives them."""
+        """Make solved lanes those that go on from where they stand, with the rates that a sample of
+        the drives gives them.
+        """
         executor.put(self.sampled, sample[:, None])
         executor.run(self._tangent)
         executor.carry()
-        executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))  # there is no step behind it
+        # there is no step behind it
+        executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))
 
     def standing(self, geometry: Array) -> Array:
-        """All slots of lanes that stand at the design position of variants, all drivers at their design value.
+        """All slots of lanes that stand at the design position of variants, all drivers at their
+        design value.
 
-        Normally that is the design itself. Lanes that do not close there, or are on a wrong branch, are NaN.
+        Normally that is the design itself. Lanes that do not close there, or are on a wrong branch,
+        are NaN.
 
         Args:
             geometry: the numbers of all varied places, shape (numbers, variants).
@@ -229,12 +295,23 @@ class Model:
 
     def stand(self, executor: Executor, geometry: Array) -> NDArray[np.bool_]:
         """Put the lanes of an executor where `standing` says; which of them close there."""
-        return self.stand_at(executor, self.state, self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))), geometry)
+        return self.stand_at(
+            executor,
+            self.state,
+            self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))),
+            geometry,
+        )
 
     def stand_at(
-        self, executor: Executor, state: Mapping[str, Sequence[float] | Array], sample: Array, geometry: Array = NONE_VARIED
+        self,
+        executor: Executor,
+        state: Mapping[str, Sequence[float] | Array],
+        sample: Array,
+        geometry: Array = NONE_VARIED,
     ) -> NDArray[np.bool_]:
-        """Put the lanes of an executor where a sample of the drives has them, near a state; which of them close there."""
+        """Put the lanes of an executor where a sample of the drives has them, near a state; which
+        of them close there.
+        """
         executor.clear()
         for name, value in (*state.items(), *self.given.items()):
             executor.put(self.vectors[name], np.array(value)[:, None])
@@ -257,7 +334,8 @@ class Model:
         if np.isnan(found).any():
             closure = float(self.executor(1).get([self.slots["closure"]])[0, 0])
             raise SolveError(
-                f"mechanism {self.mechanism.name!r} does not close at the design position: residual "
-                f"{closure * self.frame.unit:.3g} m after Newton's iteration, expected 0; check points, axes and lengths"
+                f"mechanism {self.mechanism.name!r} does not close at the design position: residual"
+                f" {closure * self.frame.unit:.3g} m after Newton's iteration, expected 0; check"
+                " points, axes and lengths"
             )
         return found

@@ -1,6 +1,8 @@
-"""The equations of a model at poses of any kind, outside the march: residuals, Jacobian and right-hand sides as plain matrices.
+"""The equations of a model at poses of any kind, outside the march: residuals, Jacobian and
+right-hand sides as plain matrices.
 
-For what is rare: a pose that is nearly singular, a curve that turns back. Many poses at once are lanes, run by numpy.
+For what is rare: a pose that is nearly singular, a curve that turns back. Many poses at once are
+lanes, run by numpy.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ class Equations:
     Attributes:
         phi: residuals, shape (m, n).
         jacobian: by the unknowns, shape (m, n, n).
-        nu: right-hand sides of the velocity equations: the residuals' loss by time where the pose stands, shape (m, n).
+        nu: right-hand sides of the velocity equations: the residuals' loss by time where the pose
+            stands, shape (m, n).
         redundant: Jacobian of the rows that are left out, shape (m, dropped, n).
     """
 
@@ -44,14 +47,17 @@ class Equations:
 
 
 def system_of(model: Model) -> System:
-    """The equations of a model; kept with it, because to trace them anew takes longer than what they are for."""
+    """The equations of a model; kept with it, because to trace them anew takes longer than what
+    they are for.
+    """
     return model.bound("system", lambda: System(model))
 
 
 class System:
     """The equations of a model whose geometry is given in numbers.
 
-    A state is one column of numbers [units, rad, -]; what moves the drivers is a sample, as `Model.samples` gives it.
+    A state is one column of numbers [units, rad, -]; what moves the drivers is a sample, as
+    `Model.samples` gives it.
 
     Attributes:
         owners: joint or driver of every kept row.
@@ -61,7 +67,10 @@ class System:
     """
 
     def __init__(self, model: Model) -> None:
-        self.model, self._tracer = model, Tracer(model.mechanism, replace(model.request, compiled=False))
+        self.model, self._tracer = (
+            model,
+            Tracer(model.mechanism, replace(model.request, compiled=False)),
+        )
         tracer, kept = self._tracer, self._tracer.selection.chosen
         formulation, at, vector = tracer.formulation, tracer.at, tracer.layout.vector
         self.unknowns = tracer.unknowns
@@ -71,7 +80,9 @@ class System:
         self.driven: NDArray[np.bool_] = np.array(kept) >= joint_rows
         self._names = {name: vector(name, len(value)) for name, value in formulation.design.items()}
         self._state = [slot for slots in self._names.values() for slot in slots]
-        self._phi, self._nu, self._gamma, self._step = (vector(name, self.unknowns) for name in ("phi", "nu", "gamma", "step"))
+        self._phi, self._nu, self._gamma, self._step = (
+            vector(name, self.unknowns) for name in ("phi", "nu", "gamma", "step")
+        )
         every, phi, nu = formulation.rows(at), formulation.phi(at), formulation.nu(at)
         rows = [every[k] for k in (*kept, *tracer.selection.dropped)]
         self._rows = len(rows)
@@ -82,19 +93,33 @@ class System:
         wanted: dict[str, tuple[Sequence[int], list[Scalar]]] = {
             "rows": (
                 [*self._phi, *self._nu, *self._values],
-                [*(phi[k] for k in kept), *(nu[k] for k in kept), *(x for row in rows for x in row.values())],
+                [
+                    *(phi[k] for k in kept),
+                    *(nu[k] for k in kept),
+                    *(x for row in rows for x in row.values()),
+                ],
             ),
             "gamma": (self._gamma, [gamma[k] for k in kept]),
             "retract": (self._state, [x for name in self._names for x in after[name]]),
         }
-        programs = [program(name, tracer.tape, dict(zip(*each, strict=True))) for name, each in wanted.items()]
+        programs = [
+            program(name, tracer.tape, dict(zip(*each, strict=True)))
+            for name, each in wanted.items()
+        ]
         self._vectors, slots = tracer.layout.vectors, tracer.layout.slots
-        self._plan = Plan({each.name: each for each in [*programs, tracer.outputs_of_rates()]}, slots)
-        self._sampled = [tracer.layout.scalar(TIME), *(k for name in model.request.drivers for k in self._vectors[f"drive {name}"])]
+        self._plan = Plan(
+            {each.name: each for each in [*programs, tracer.outputs_of_rates()]}, slots
+        )
+        self._sampled = [
+            tracer.layout.scalar(TIME),
+            *(k for name in model.request.drivers for k in self._vectors[f"drive {name}"]),
+        ]
         self._executors: dict[int, NumpyExecutor] = {}
 
     def state(self, lanes: Array, ahead: str = FROM) -> Array:
-        """States of lanes of the model, where they are predicted from unless said otherwise; shape (numbers, lanes)."""
+        """States of lanes of the model, where they are predicted from unless said otherwise; shape
+        (numbers, lanes).
+        """
         return np.concatenate([lanes[self.model.vectors[f"{ahead}{name}"]] for name in self._names])
 
     def equations(self, state: Array, sample: Array) -> Equations:
@@ -123,7 +148,9 @@ class System:
         return executor.get(self._state)
 
     def outputs(self, state: Array, sample: Array, rate: Array, rate_t: Array) -> dict[str, Array]:
-        """The wanted motions by name, shape (components, m) each, and the tests "closure", "leftover" and "branch"."""
+        """The wanted motions by name, shape (components, m) each, and the tests "closure",
+        "leftover" and "branch".
+        """
         executor = self._at(state, sample)
         executor.put(self._vectors[RATE], rate.T)
         executor.put(self._vectors[RATE_T], rate_t.T)
@@ -133,15 +160,19 @@ class System:
         return {name: executor.get(each) for name, each in slots.items()}
 
     def poses(self, state: Array) -> Array:
-        """Return the poses of all bodies in one state, shape (numbers, 1): displacements [units] and Euler parameters, (bodies, 7).
+        """Return the poses of all bodies in one state, shape (numbers, 1): displacements [units]
+        and Euler parameters, (bodies, 7).
 
-        Two states mean the same pose also where an angle among their numbers differs by whole turns.
+        Two states mean the same pose also where an angle among their numbers differs by whole
+        turns.
         """
         found = self._configuration(state[:, 0]).poses.values()
         return np.array([[*pose.u, *pose.q] for pose in found], dtype=np.float64)
 
     def twists(self, state: Array, rate: Array) -> Mapping[str, Twist]:
-        """How the bodies move in one state, shape (numbers,), at rates of the unknowns, shape (n,)."""
+        """How the bodies move in one state, shape (numbers,), at rates of the unknowns, shape
+        (n,).
+        """
         return self._tracer.formulation.twists(self._configuration(state), rate.tolist())
 
     def _configuration(self, state: Array) -> Configuration:

@@ -1,4 +1,6 @@
-"""Weights of the polynomial through earlier samples, by Lagrange's formula: what the next samples are predicted by."""
+"""Weights of the polynomial through earlier samples, by Lagrange's formula: what the next samples
+are predicted by.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ from ...trajectory import Array
 
 
 def weights_of_groups(times: Array, lanes: int) -> Array:
-    """Weights of `NODES` lanes of the group before, or several, for samples in groups of so many lanes.
+    """Weights of `NODES` lanes of the group before, or several, for samples in groups of so many
+    lanes.
 
     Args:
         times: of samples in the order in which they are gone through, shape (n,).
@@ -25,15 +28,20 @@ def weights_of_groups(times: Array, lanes: int) -> Array:
 
 
 def weights_of_samples(times: Array) -> Array:
-    """Weights of the `NODES` samples before each, by the places at which they are kept (`Plan.past`); otherwise as above."""
+    """Weights of the `NODES` samples before each, by the places at which they are kept
+    (`Plan.past`); otherwise as above.
+    """
     found, wanted = np.zeros((NODES, len(times))), np.arange(NODES, len(times))
-    nodes = wanted - 1 - (wanted - 1 - np.arange(NODES)[:, None]) % NODES  # the last sample that was kept at each place
+    # the last sample that was kept at each place
+    nodes = wanted - 1 - (wanted - 1 - np.arange(NODES)[:, None]) % NODES
     found[:, wanted] = lagrange(times[wanted], times[nodes])
     return found
 
 
 def lagrange(times: Array, nodes: Array) -> Array:
-    """Lagrange's weights for the times, shape (n,), of nodes for each; nodes and weights have shape (nodes, n)."""
+    """Lagrange's weights for the times, shape (n,), of nodes for each; nodes and weights have shape
+    (nodes, n).
+    """
     found, ahead = np.empty_like(nodes), times - nodes
     with np.errstate(all="ignore"):
         for k, node in enumerate(nodes):  # one after the other: there may be millions of samples

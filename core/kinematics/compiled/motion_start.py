@@ -1,8 +1,10 @@
-"""Where the samples of a path are followed from, and how the drivers come there from the design position.
+"""Where the samples of a path are followed from, and how the drivers come there from the design
+position.
 
-The design position belongs to the path where the drivers' values are those of the design, up to what six typed digits leave: at
-time zero, or else at a sample. Elsewhere a straight way of all drivers is assumed. Every engine takes the same start. What is left
-between the design and the path is travelled, never ignored.
+The design position belongs to the path where the drivers' values are those of the design, up to
+what six typed digits leave: at time zero, or else at a sample. Elsewhere a straight way of all
+drivers is assumed. Every engine takes the same start. What is left between the design and the path
+is travelled, never ignored.
 """
 
 from __future__ import annotations
@@ -20,13 +22,14 @@ from ...trajectory import Array, Trajectory
 from ..formulation.constraints import size_of
 from .compiled_model import CLOSED
 
-# Six digits leave a number uncertain by up to 5e-6 of it. A driver's value and its design value are made of some six such numbers:
-# amplitude, phase, three coordinates and a direction.
+# Six digits leave a number uncertain by up to 5e-6 of it. A driver's value and its design value are
+# made of some six such numbers: amplitude, phase, three coordinates and a direction.
 TYPED = 3e-5
-# Times that differ by less than this part of the largest are one: more than rounding, less than anyone writes.
+# Times that differ by less than this part of the largest are one: more than rounding, less than
+# anyone writes.
 SAME_TIME = 1e-12
-# Two ways end in one motion if its points differ by less than this part of the size: more than round-off beside a singular pose,
-# less than the distance of two assemblies.
+# Two ways end in one motion if its points differ by less than this part of the size: more than
+# round-off beside a singular pose, less than the distance of two assemblies.
 APART = 1e-6
 
 
@@ -37,7 +40,8 @@ class Start:
     Attributes:
         time: the samples are followed from here, both ways [s].
         name: of that time, to read.
-        lead: the straight way to there, which ends at its time one; None where the design position is there up to rounding.
+        lead: the straight way to there, which ends at its time one; None where the design position
+            is there up to rounding.
         stands: whether the design position is there up to typed digits.
         other: another start; None where there is none.
         ambiguous: whether nothing but a rule prefers this start to the other.
@@ -55,7 +59,9 @@ class Start:
         """Return the time, and how far the drivers go straight to there [SI], for the record."""
         way = dict[str, float]()
         if self.lead:
-            way = dict(zip(self.lead.motions, self.lead.values(np.ones(1))[:, 0].tolist(), strict=True))
+            way = dict(
+                zip(self.lead.motions, self.lead.values(np.ones(1))[:, 0].tolist(), strict=True)
+            )
         return {"time": self.time, "lead": way}
 
 
@@ -65,9 +71,10 @@ AT_DESIGN = Start()
 def start_of(mechanism: Mechanism, path: Path) -> Start:
     """Return where the samples of a path are followed from.
 
-    The design position decides if it belongs to the path, at time zero or else at the sample nearest to that. If it does not, all
-    drivers go straight to their values at time zero if the samples lie around it, else to those at the first sample: a sample's
-    pose must not depend on where the sweep begins.
+    The design position decides if it belongs to the path, at time zero or else at the sample
+    nearest to that. If it does not, all drivers go straight to their values at time zero if the
+    samples lie around it, else to those at the first sample: a sample's pose must not depend on
+    where the sweep begins.
     """
     times = path.times
     known = path.covers(0.0)
@@ -80,13 +87,25 @@ def start_of(mechanism: Mechanism, path: Path) -> Start:
     same = SAME_TIME * float(np.abs(times).max())
     here = [k for k in nearest.tolist() if off[k] <= TYPED]
     first = _start(path, float(times[0]), float(off[-len(times)]))
-    zero = _start(path, 0.0, float(off[0])) if known and np.isfinite(off[0]) and abs(first.time) > same else None
+    zero = (
+        _start(path, 0.0, float(off[0]))
+        if known and np.isfinite(off[0]) and abs(first.time) > same
+        else None
+    )
     if here:
         found = _start(path, float(places[here[0]]), float(off[here[0]]))
         again = [k for k in here if abs(float(places[k]) - found.time) > same]
         if abs(found.time) > same and again:
-            return replace(found, other=_start(path, float(places[again[0]]), float(off[again[0]])), ambiguous=True)
-        others = [each for each in (first, zero) if each is not None and abs(each.time - found.time) > same]
+            return replace(
+                found,
+                other=_start(path, float(places[again[0]]), float(off[again[0]])),
+                ambiguous=True,
+            )
+        others = [
+            each
+            for each in (first, zero)
+            if each is not None and abs(each.time - found.time) > same
+        ]
         return replace(found, other=others[0] if others else None)
     if zero is None:
         return first
@@ -100,21 +119,38 @@ def _scales(mechanism: Mechanism, path: Path, values: Array) -> Array:
 
     It is a radian or the mechanism's size, or the largest number that the values are made of.
     """
-    size, given = size_of(mechanism), np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=1, initial=0.0)
+    size, given = (
+        size_of(mechanism),
+        np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=1, initial=0.0),
+    )
     own = [1.0 if mechanism.driver(name).turns else size for name in path.motions]
-    return np.maximum(np.maximum(own, given), [abs(path.design.get(name, 0.0)) for name in path.motions])
+    return np.maximum(
+        np.maximum(own, given), [abs(path.design.get(name, 0.0)) for name in path.motions]
+    )
 
 
 def _start(path: Path, time: float, off: float) -> Start:
     first = float(path.times[0])
-    name = "the first sample" if time == first else "time zero" if time == 0.0 else f"the sample at {time:.9g} s"
+    name = (
+        "the first sample"
+        if time == first
+        else "time zero"
+        if time == 0.0
+        else f"the sample at {time:.9g} s"
+    )
     return Start(time, name, None if off <= CLOSED else path.lead_in(time), off <= TYPED)
 
 
 def by_ways(
-    start: Start, mechanism: Mechanism, path: Path, solve: Callable[[Start], Trajectory], *, compare: bool = True
+    start: Start,
+    mechanism: Mechanism,
+    path: Path,
+    solve: Callable[[Start], Trajectory],
+    *,
+    compare: bool = True,
 ) -> Trajectory:
-    """Solve from a start, or from the other one if nothing can be reached from it; say what was assumed.
+    """Solve from a start, or from the other one if nothing can be reached from it; say what was
+    assumed.
 
     Args:
         solve: solves all samples from a start.
@@ -129,30 +165,47 @@ def by_ways(
             found, taken = second, other
     elif other is not None and start.ambiguous and compare:
         notes += _differ(start, other, found, solve(other), size_of(mechanism))
-    notes = [*found.details.get("notes", ()), *notes, *(assumed(taken, path) if found.solved.any() else ())]
-    return replace(found, details={**found.details, "start": taken.facts, **({"notes": notes} if notes else {})})
+    notes = [
+        *found.details.get("notes", ()),
+        *notes,
+        *(assumed(taken, path) if found.solved.any() else ()),
+    ]
+    return replace(
+        found,
+        details={**found.details, "start": taken.facts, **({"notes": notes} if notes else {})},
+    )
 
 
 def assumed(start: Start, path: Path) -> list[str]:
-    """Say what way was assumed from the design position to the path; empty where the design position is on it."""
+    """Say what way was assumed from the design position to the path; empty where the design
+    position is on it.
+    """
     if start.stands:
         return []
-    way = f"all drivers go straight from it to {start.name} ({path.where(start.time)}), and are followed from there"
+    way = (
+        f"all drivers go straight from it to {start.name} ({path.where(start.time)}), and are"
+        " followed from there"
+    )
     return [f"the design position is not on the path: {way}"]
 
 
-def _differ(start: Start, other: Start, found: Trajectory, second: Trajectory, size: float) -> list[str]:
+def _differ(
+    start: Start, other: Start, found: Trajectory, second: Trajectory, size: float
+) -> list[str]:
     """Say by how much the motions from two starts differ; empty where they are one."""
     both = found.solved & second.solved
-    apart = [motion.position - second.points[name].position for name, motion in found.points.items()]
+    apart = [
+        motion.position - second.points[name].position for name, motion in found.points.items()
+    ]
     for name, body in found.bodies.items():
         apart += [body.r - second.bodies[name].r, size * _turned(body.p, second.bodies[name].p)]
     worst = max((float(np.abs(each[both]).max(initial=0.0)) for each in apart), default=0.0)
     if worst <= APART * size:
         return []
     return [
-        f"AMBIGUOUS: by way of {other.name} the results differ by up to {worst:.6g} m (another assembly, or another number of "
-        f"turns); {start.name} is taken; make the design position the pose at time zero, or begin the sweep there"
+        f"AMBIGUOUS: by way of {other.name} the results differ by up to {worst:.6g} m (another"
+        f" assembly, or another number of turns); {start.name} is taken; make the design position"
+        " the pose at time zero, or begin the sweep there"
     ]
 
 

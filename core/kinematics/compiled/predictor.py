@@ -1,4 +1,5 @@
-"""Programs that predict lanes from those before them on a motion, and what is carried for that (see `programs`).
+"""Programs that predict lanes from those before them on a motion, and what is carried for that (see
+`programs`).
 
 predict   from state, v, a and time; time    -> state        Taylor step of second order
 extrapolate   states of the groups of lanes before, weights   -> state       through `NODES` of them, without v and a; and what is
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from .programs import Tracer
 
 WEIGHT, PAST = "weight", "past"
-"""The vectors of the samples that a state is continued through: their weights, and where they are remembered their states."""
+"""The vectors of the samples that a state is continued through: their weights, and where they are
+remembered their states.
+"""
 ABOUT = 1.5
 """A step may be this much longer than the one it learns from."""
 
@@ -36,18 +39,28 @@ def carried(tracer: Tracer) -> list[tuple[int, int]]:
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in told]
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(name)) for name in ACCEPT]
     for name, count in sizes.items():
-        pairs += zip(tracer.layout.vector(name, count), tracer.layout.vector(FROM + name, count), strict=True)
+        pairs += zip(
+            tracer.layout.vector(name, count), tracer.layout.vector(FROM + name, count), strict=True
+        )
     return pairs
 
 
 def continued(tracer: Tracer) -> list[tuple[int, int]]:
-    """What of that is carried where the lanes after are continued through those before: tests need it, predictions do not.
+    """What of that is carried where the lanes after are continued through those before: tests need
+    it, predictions do not.
 
-    Where they are predicted after all there is no step behind, and nothing is made of what it lacked.
+    Where they are predicted after all there is no step behind, and nothing is made of what it
+    lacked.
     """
     time, unknowns = tracer.layout.scalar(TIME), tracer.unknowns
-    ahead = [slot for name in tracer.formulation.design for slot in tracer.layout.vectors[FROM + PREDICTED + name]]
-    ahead += [slot for name in (RATE, RATE_T) for slot in tracer.layout.vector(FROM + name, unknowns)]
+    ahead = [
+        slot
+        for name in tracer.formulation.design
+        for slot in tracer.layout.vectors[FROM + PREDICTED + name]
+    ]
+    ahead += [
+        slot for name in (RATE, RATE_T) for slot in tracer.layout.vector(FROM + name, unknowns)
+    ]
     (_, earlier), *pairs = carried(tracer)
     return [(time, earlier), *(pair for pair in pairs if pair[1] not in ahead)]
 
@@ -55,15 +68,17 @@ def continued(tracer: Tracer) -> list[tuple[int, int]]:
 def predict(tracer: Tracer) -> Program:
     """The state at the time by a Taylor step of second order, and what the last such step lacked.
 
-    That is of third order, whatever the coordinates: it grows by the cube of the step. It is known where the step before was
-    about as long as this one, or longer.
+    That is of third order, whatever the coordinates: it grows by the cube of the step. It is known
+    where the step before was about as long as this one, or longer.
     """
     read, vector = tracer.read, tracer.vector
     time, here, earlier = (read(label + TIME) for label in ("", FROM, EARLIER))
     h, h_before = time - here, here - earlier
     v, a = vector(FROM + RATE, tracer.unknowns), vector(FROM + RATE_T, tracer.unknowns)
     step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
-    start = {name: vector(FROM + name, len(value)) for name, value in tracer.formulation.design.items()}
+    start = {
+        name: vector(FROM + name, len(value)) for name, value in tracer.formulation.design.items()
+    }
     taylor = tracer.formulation.retract(tracer.formulation.configuration(start), step)
     part = h / h_before
     lack = where_larger(ABOUT * h_before, h, part * part * part, 0.0)
@@ -72,20 +87,31 @@ def predict(tracer: Tracer) -> Program:
     for name, value in taylor.items():
         tracer.store(out, PREDICTED + name, value)  # kept, to see what the iteration makes of it
         solved, predicted = start[name], vector(FROM + PREDICTED + name, len(value))
-        corrected[name] = [x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)]
+        corrected[name] = [
+            x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)
+        ]
         corrected[name] = _of_length_one(corrected[name])
     tracer.store_state(out, corrected)
     return program("predict", tracer.tape, out, tracer.prepared)
 
 
 def extrapolate(tracer: Tracer, lanes: int) -> Program:
-    """The state from what it is in the group of so many lanes before, or several, by the weights of those: `weights_of_groups`."""
-    # and what is carried of the last of them, which is at hand here; but its time and drives are no longer there
+    """The state from what it is in the group of so many lanes before, or several, by the weights of
+    those: `weights_of_groups`.
+    """
+    # and what is carried of the last of them, which is at hand here; but its time and drives are no
+    # longer there
     last, given = NODES - 1, {tracer.layout.scalar(name) for name in (TIME, *tracer.turns)}
-    stood = {target: tracer.tape.at(last, source) for source, target in continued(tracer) if source not in (*given, target)}
+    stood = {
+        target: tracer.tape.at(last, source)
+        for source, target in continued(tracer)
+        if source not in (*given, target)
+    }
     state, behind = _state_slots(tracer), groups_behind(lanes)
     past = _past_slots(tracer) if behind > 1 else state
-    stood |= {target: tracer.tape.input(source) for source, target in shifted(past[0], state, behind)}
+    stood |= {
+        target: tracer.tape.input(source) for source, target in shifted(past[0], state, behind)
+    }
     groups = [*(past[k * len(state) :][: len(state)] for k in range(behind - 1)), state]
     place = {slot: k for k, slot in enumerate(state)}
 
@@ -97,10 +123,14 @@ def extrapolate(tracer: Tracer, lanes: int) -> Program:
 
 
 def extend(tracer: Tracer) -> Program:
-    """The state from what it was at the last `NODES` samples, by the weights of those; see `weights_of_samples`."""
+    """The state from what it was at the last `NODES` samples, by the weights of those; see
+    `weights_of_samples`.
+    """
     state, past = _state_slots(tracer), _past_slots(tracer)
     place = {slot: k for k, slot in enumerate(state)}
-    return _continued(tracer, "extend", lambda k, slot: tracer.tape.input(past[k * len(state) + place[slot]]), {})
+    return _continued(
+        tracer, "extend", lambda k, slot: tracer.tape.input(past[k * len(state) + place[slot]]), {}
+    )
 
 
 def _state_slots(tracer: Tracer) -> list[int]:
@@ -109,12 +139,18 @@ def _state_slots(tracer: Tracer) -> list[int]:
 
 
 def _past_slots(tracer: Tracer) -> list[int]:
-    """The slots in which what was there at up to `NODES` samples, or in groups of lanes, is remembered."""
+    """The slots in which what was there at up to `NODES` samples, or in groups of lanes, is
+    remembered.
+    """
     return tracer.layout.vector(PAST, NODES * len(_state_slots(tracer)))
 
 
-def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]) -> Program:
-    """The state by Lagrange's formula, without v and a; at(k, slot) is what a slot was at node k. And what else is put out."""
+def _continued(
+    tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]
+) -> Program:
+    """The state by Lagrange's formula, without v and a; at(k, slot) is what a slot was at node k.
+    And what else is put out.
+    """
     weights = tracer.vector(WEIGHT, NODES)
     out = dict(further)
     for part, value in tracer.formulation.design.items():
@@ -126,7 +162,9 @@ def _continued(tracer: Tracer, name: str, at: Callable[[int, int], Scalar], furt
 
 
 def _of_length_one(value: list[Scalar]) -> list[Scalar]:
-    """Euler parameters of length one, up to the square of what they lack; any other vector as it is."""
+    """Euler parameters of length one, up to the square of what they lack; any other vector as it
+    is.
+    """
     if len(value) != EULER_PARAMETERS:
         return value
     k = 1.5 - 0.5 * sum((x * x for x in value), 0.0)

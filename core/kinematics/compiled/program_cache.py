@@ -1,7 +1,9 @@
-"""A mechanism traced: its programs and how they are laid out, kept on disk beside the machine code that is made of them.
+"""A mechanism traced: its programs and how they are laid out, kept on disk beside the machine code
+that is made of them.
 
-What is kept is found again by the mechanism, the request and the source of all that traces: where any of it differs, it is traced
-anew. Joints of the user's own are traced every time, for their source may be anywhere.
+What is kept is found again by the mechanism, the request and the source of all that traces: where
+any of it differs, it is traced anew. Joints of the user's own are traced every time, for their
+source may be anywhere.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ class Tracing:
         state: name of a vector of the state -> its value at design.
         geometry: the values of all varied places at design.
         given: name of a vector that tells how a given body moves -> its value at rest at design.
-        carried, continued: slots of a solved lane, and of what the lanes after it are predicted from, or continued.
+        carried, continued: slots of a solved lane, and of what the lanes after it are predicted
+            from, or continued.
         prepared: slots of what depends on the geometry alone.
         behind: by how many groups of lanes those after them are extrapolated.
         blocks: of the rows (`Elimination.sigmas`).
@@ -59,7 +62,8 @@ class Tracing:
 
 
 def traced(mechanism: Mechanism, request: Request, section: Section | None = None) -> Tracing:
-    """Select the rows and trace the programs that the request needs, or take what is known of an earlier time.
+    """Select the rows and trace the programs that the request needs, or take what is known of an
+    earlier time.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match.
@@ -69,7 +73,9 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     if section or request.varied or not (ours(mechanism) and compiled):
         return _trace(mechanism, request, section, lanes)
     content = _source() + pickle.dumps((mechanism, request, lanes))
-    found: Tracing = pickle.loads(kept(content, lambda: pickle.dumps(_trace(mechanism, request, None, lanes))))
+    found: Tracing = pickle.loads(
+        kept(content, lambda: pickle.dumps(_trace(mechanism, request, None, lanes)))
+    )
     return found
 
 
@@ -83,7 +89,10 @@ def ours(mechanism: Mechanism) -> bool:
 def _source() -> bytes:
     """A digest of the source that tracing runs through, and whatever stands beside it."""
     digest = hashlib.sha256()
-    for folder in (CORE, *(CORE / name for name in ("primitives", "joints", "program", "analysis"))):
+    for folder in (
+        CORE,
+        *(CORE / name for name in ("primitives", "joints", "program", "analysis")),
+    ):
         for file in sorted(folder.glob("*.py" if folder is CORE else "**/*.py")):
             digest.update(file.read_bytes())
     return digest.digest()
@@ -94,7 +103,8 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None, lane
 
     tracer = Tracer(mechanism, request, section)
     programs = [tracer.newton(), predictor.predict(tracer)]
-    if request.order < 2:  # a lane needs v and a where the march goes on from it, whatever is asked for
+    # a lane needs v and a where the march goes on from it, whatever is asked for
+    if request.order < 2:
         programs.append(tracer.tangent())
     if not request.state:
         programs.append(predictor.extrapolate(tracer, lanes))

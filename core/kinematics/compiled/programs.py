@@ -6,8 +6,8 @@
                                                     converged pose, solved for nu and gamma
     tangent   state, drives' rates               -> v, a         where a march begins, if not all of it is put out
 
-Those that follow a motion are in `prediction` and `acceptance`. Each is traced for what is asked: no acceleration, no gamma; no
-velocity, no factorisation after the last iteration.
+Those that follow a motion are in `prediction` and `acceptance`. Each is traced for what is asked:
+no acceleration, no gamma; no velocity, no factorisation after the last iteration.
 """
 
 from __future__ import annotations
@@ -31,7 +31,18 @@ from ..formulation.parameters import placed, places
 from ..formulation.relative import Relative
 from ..structure.components import Section, select_section
 from ..structure.degrees_of_freedom import select_rows
-from .request import BLOCKS, FIRM, GIVEN, ORIENTATION, RATE, RATE_T, SIGMA, Layout, Request, by_block
+from .request import (
+    BLOCKS,
+    FIRM,
+    GIVEN,
+    ORIENTATION,
+    RATE,
+    RATE_T,
+    SIGMA,
+    Layout,
+    Request,
+    by_block,
+)
 
 
 class Tracer:
@@ -41,11 +52,15 @@ class Tracer:
         SolveError: the mechanism cannot be solved as described (see `select_rows`).
     """
 
-    def __init__(self, mechanism: Mechanism, request: Request, section: Section | None = None) -> None:
+    def __init__(
+        self, mechanism: Mechanism, request: Request, section: Section | None = None
+    ) -> None:
         self.request, self.tape, self.layout = request, Tape(), Layout()
         self.mechanism, self._section = mechanism, section
         self.frame = section.frame(mechanism) if section else frames(mechanism)
-        self.given: Mapping[str, Given] = {name: Given() for name in section.given} if section else {}
+        self.given: Mapping[str, Given] = (
+            {name: Given() for name in section.given} if section else {}
+        )
         formulation = self._formulate({})
         if section:
             self.selection = select_section(mechanism, self.frame, formulation)
@@ -57,14 +72,22 @@ class Tracer:
         self.prepared = Prepared(self.tape, slots, self.layout.scalar)
         if given:
             self.mechanism = placed(mechanism, given)
-            self.frame = section.frame(self.mechanism) if section else frames(self.mechanism, self.frame.unit)
+            self.frame = (
+                section.frame(self.mechanism)
+                if section
+                else frames(self.mechanism, self.frame.unit)
+            )
         self.given = {name: self._moved(name) for name in self.given}
-        self.formulation = self._formulate({name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers})
+        self.formulation = self._formulate(
+            {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
+        )
         design = self.formulation.design
         for label in BLOCKS:
             for name, value in design.items():
                 self.layout.vector(label + name, len(value))
-        self.at = self.formulation.configuration({name: self.vector(name, len(value)) for name, value in design.items()})
+        self.at = self.formulation.configuration(
+            {name: self.vector(name, len(value)) for name, value in design.items()}
+        )
         self.unknowns = self.formulation.unknowns
 
     def _formulate(self, drives: Mapping[str, Drive]) -> Formulation:
@@ -75,8 +98,12 @@ class Tracer:
 
     def _moved(self, name: str) -> Given:
         """A given body, its motion read from slots."""
-        u, q, v, w, v_t, w_t = (self.vector(f"given {label} {name}", count) for label, count in GIVEN.items())
-        return Given(Pose.of(vec(u), quat(q)), Twist(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t)))
+        u, q, v, w, v_t, w_t = (
+            self.vector(f"given {label} {name}", count) for label, count in GIVEN.items()
+        )
+        return Given(
+            Pose.of(vec(u), quat(q)), Twist(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t))
+        )
 
     def read(self, name: str) -> Scalar:
         """A scalar of the lanes."""
@@ -101,7 +128,9 @@ class Tracer:
 
     @cached_property
     def _factor(self) -> Elimination:
-        """The rows at the state, factored: to iterate, and where the iteration ends for the rates."""
+        """The rows at the state, factored: to iterate, and where the iteration ends for the
+        rates.
+        """
         return Elimination(self._kept(self.formulation.rows(self.at)))
 
     @property
@@ -118,12 +147,18 @@ class Tracer:
         """One Newton-Raphson iteration of (28), Phi = 0: (29) Phi_Pi dPi = -Phi."""
         phi = self._kept(self.formulation.phi(self.at))
         out: dict[int, Scalar] = {
-            # iterations end by this: a pose is off by the residual over sigma, and the next one by the square of that
-            self.layout.scalar("residual"): largest(phi) * maximum(1.0, FIRM / maximum(self._factor.sigma, EPSILON)),
+            # iterations end by this: a pose is off by the residual over sigma, and the next one by
+            # the square of that
+            self.layout.scalar("residual"): (
+                largest(phi) * maximum(1.0, FIRM / maximum(self._factor.sigma, EPSILON))
+            ),
             self.layout.scalar(SIGMA): self._factor.sigma,
             self.layout.scalar(ORIENTATION): self._factor.orientation,
         }
-        out |= {self.layout.scalar(name): x for name, x in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)}
+        out |= {
+            self.layout.scalar(name): x
+            for name, x in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)
+        }
         step = self._factor.solve(phi)
         self.store_state(out, self.formulation.retract(self.at, [-x for x in step]))
         return program("newton", self.tape, out, self.prepared)
@@ -133,10 +168,13 @@ class Tracer:
         return program("tangent", self.tape, self._solve_rates(2)[-1], self.prepared)
 
     def _solve_rates(self, order: int) -> tuple[list[Scalar], list[Scalar], dict[int, Scalar]]:
-        """v and a as far as an order wants them, else zero, and by slot: one factorisation for both."""
+        """v and a as far as an order wants them, else zero, and by slot: one factorisation for
+        both.
+        """
         out: dict[int, Scalar] = {}
         v = a = list[Scalar]([0.0] * self.unknowns)
-        # (30) Phi_Pi v = nu and (32) Phi_Pi a = gamma are linear: one factor at the pose serves both; the paper iterates, (31)
+        # (30) Phi_Pi v = nu and (32) Phi_Pi a = gamma are linear: one factor at the pose serves
+        # both; the paper iterates, (31)
         if order:
             v = self._factor.solve(self._kept(self.formulation.nu(self.at)))
             self.store(out, RATE, v)
@@ -148,22 +186,34 @@ class Tracer:
     @property
     def at_rest(self) -> Mapping[str, Sequence[float]]:
         """The vectors that tell how given bodies move, at rest at the design position."""
-        values = {label: (1.0, 0.0, 0.0, 0.0) if label == "q" else (0.0, 0.0, 0.0) for label in GIVEN}
-        return {f"given {label} {name}": value for name in self.given for label, value in values.items()}
+        values = {
+            label: (1.0, 0.0, 0.0, 0.0) if label == "q" else (0.0, 0.0, 0.0) for label in GIVEN
+        }
+        return {
+            f"given {label} {name}": value for name in self.given for label, value in values.items()
+        }
 
     def outputs(self) -> Program:
-        """The wanted motions with the rates they need, and the tests of a solution: closure, redundant rows, branch.
+        """The wanted motions with the rates they need, and the tests of a solution: closure,
+        redundant rows, branch.
 
-        All in one: what follows from the pose is computed once, and beside the elimination, whose pivots wait for one another.
+        All in one: what follows from the pose is computed once, and beside the elimination, whose
+        pivots wait for one another.
         """
         v, a, rates = self._solve_rates(self.request.order)
         return self._outputs(v, a, rates)
 
     def outputs_of_rates(self) -> Program:
-        """Return the program of `outputs` for rates that are given, instead of those that solve the mechanism's equations."""
-        return self._outputs(self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns), {})
+        """Return the program of `outputs` for rates that are given, instead of those that solve the
+        mechanism's equations.
+        """
+        return self._outputs(
+            self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns), {}
+        )
 
-    def _outputs(self, v: Sequence[Scalar], a: Sequence[Scalar], rates: Mapping[int, Scalar]) -> Program:
+    def _outputs(
+        self, v: Sequence[Scalar], a: Sequence[Scalar], rates: Mapping[int, Scalar]
+    ) -> Program:
         phi = self.formulation.phi(self.at)
         out: dict[int, Scalar] = {
             **rates,
@@ -179,7 +229,9 @@ class Tracer:
             return pose, twist, accelerations.get(body, GROUND_ACCELERATION)
 
         def of_point(body: str, position: Vector) -> tuple[Vec3, Vec3, Vec3]:
-            return motion_of_point(position, self.frame.arm(body, position), self.frame.unit, *moving(body))
+            return motion_of_point(
+                position, self.frame.arm(body, position), self.frame.unit, *moving(body)
+            )
 
         for name in self.request.points:
             point = self.mechanism.point(name)
@@ -187,10 +239,21 @@ class Tracer:
         for name in self.request.bodies:
             body = self.mechanism.body(name)
             self._store_motion(out, ("r", "rdot", "rddot"), name, of_point(name, body.origin))
-            self._store_motion(out, ("p", "omega", "omega_t"), name, motion_of_frame(quat(body.euler_parameters), *moving(name)))
+            self._store_motion(
+                out,
+                ("p", "omega", "omega_t"),
+                name,
+                motion_of_frame(quat(body.euler_parameters), *moving(name)),
+            )
         return program("outputs", self.tape, out, self.prepared)
 
-    def _store_motion(self, out: dict[int, Scalar], labels: Sequence[str], name: str, found: Iterable[Iterable[Scalar]]) -> None:
+    def _store_motion(
+        self,
+        out: dict[int, Scalar],
+        labels: Sequence[str],
+        name: str,
+        found: Iterable[Iterable[Scalar]],
+    ) -> None:
         """Add a motion as far as an order wants it."""
         for label, value in zip(labels[: self.request.order + 1], found, strict=False):
             self.store(out, f"{label} {name}", value)

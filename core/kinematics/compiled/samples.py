@@ -21,9 +21,11 @@ from .program_cache import ours
 from .request import Request
 from .thread_cache import ThreadCache
 
-# Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of few bodies stays below a megabyte.
+# Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of
+# few bodies stays below a megabyte.
 LANES = 256
-# Routes of more samples are not kept: to make them takes a small part of what solving them does, and megabytes.
+# Routes of more samples are not kept: to make them takes a small part of what solving them does,
+# and megabytes.
 LONGEST_KEPT = 10_000
 # Samples that are in the order of their times.
 AS_THEY_ARE = slice(None)
@@ -31,11 +33,14 @@ AS_THEY_ARE = slice(None)
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A path made ready for a model: everything about the samples that does not depend on the motion.
+    """A path made ready for a model: everything about the samples that does not depend on the
+    motion.
 
     Attributes:
-        design: all slots of a lane at the design position of a variant; the model's own unless given.
-        since: the time at which that lane stands on the path, where that is not at the design position but on the way.
+        design: all slots of a lane at the design position of a variant; the model's own unless
+            given.
+        since: the time at which that lane stands on the path, where that is not at the design
+            position but on the way.
         given: where the samples are followed from, where that is not `start_of` the path.
     """
 
@@ -52,7 +57,9 @@ class Route:
 
     @cached_property
     def stands(self) -> bool:
-        """Whether the lane it starts from stands on the path: at the design position, or on the way."""
+        """Whether the lane it starts from stands on the path: at the design position, or on the
+        way.
+        """
         return self.since is not None or self.begin.lead is None
 
     @cached_property
@@ -72,7 +79,9 @@ class Route:
 
     def by(self, start: Start) -> Route:
         """Return the route from another start; kept with this one."""
-        return self if start is self.begin else self.bound(start, lambda: replace(self, given=start))
+        return (
+            self if start is self.begin else self.bound(start, lambda: replace(self, given=start))
+        )
 
     @cached_property
     def by_time(self) -> NDArray[np.intp]:
@@ -96,7 +105,9 @@ class Route:
     @cached_property
     def departure(self) -> Array:
         """All slots of a lane that stands at the design position and moves as the start says."""
-        return self.model.departing(self.model.design if self.design is None else self.design, self.origin)
+        return self.model.departing(
+            self.model.design if self.design is None else self.design, self.origin
+        )
 
     @cached_property
     def below(self) -> int:
@@ -109,15 +120,21 @@ class Route:
         return self.divided(1)
 
     def divided(self, parts: int) -> tuple[Side, ...]:
-        """The sides with every step in equal parts, the last of which ends at the sample; see `ends`."""
+        """The sides with every step in equal parts, the last of which ends at the sample; see
+        `ends`.
+        """
         times = self.path.times[self.by_time]
         n, below, executor = len(times), self.below, self.model.executor(self.lanes)
         found: list[Side] = []
         for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
             if len(columns):
                 given = _in_parts(self.start, times[columns], parts)
-                samples = np.concatenate([self.sampled(given), weights_of_groups(given, executor.group)])
-                padded = np.concatenate([samples, np.repeat(samples[:, -1:], executor.margin, axis=1)], axis=1)
+                samples = np.concatenate(
+                    [self.sampled(given), weights_of_groups(given, executor.group)]
+                )
+                padded = np.concatenate(
+                    [samples, np.repeat(samples[:, -1:], executor.margin, axis=1)], axis=1
+                )
                 found.append(Side(padded, len(given), parts * below - (step < 0), step))
         return tuple(found)
 
@@ -146,7 +163,9 @@ class Route:
 
     @cached_property
     def settled(self) -> set[float]:
-        """The tolerances at which its samples were found to be as good as any rows make them: that need not be asked again."""
+        """The tolerances at which its samples were found to be as good as any rows make them: that
+        need not be asked again.
+        """
         return set()
 
     def sampled(self, times: Array) -> Array:
@@ -163,12 +182,15 @@ def _in_parts(start: float, times: Array, parts: int) -> Array:
 
 
 def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
-    """A route, and the same for the same mechanism, request and path as long as it is among the last few asked for.
+    """A route, and the same for the same mechanism, request and path as long as it is among the
+    last few asked for.
 
     To make one and bind it to lanes takes twenty times as long as to solve it.
     """
     kept = len(path.times) <= LONGEST_KEPT and path.ours and ours(mechanism)
-    return _recent(mechanism, request, path) if kept else Route(recent_model(mechanism, request), path)
+    return (
+        _recent(mechanism, request, path) if kept else Route(recent_model(mechanism, request), path)
+    )
 
 
 @lru_cache(maxsize=RECENT)

@@ -1,4 +1,6 @@
-"""A cache with a store for each thread: what is made of something is kept with it, and solved in place by one thread only."""
+"""A cache with a store for each thread: what is made of something is kept with it, and solved in
+place by one thread only.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ Made = TypeVar("Made")
 
 
 class ThreadCache(local):
-    """What is made of something, by key: once for each thread. It lives as long as the thread and the cache do."""
+    """What is made of something, by key: once for each thread. It lives as long as the thread and
+    the cache do.
+    """
 
     def __init__(self) -> None:
         self._found: dict[Hashable, Any] = {}

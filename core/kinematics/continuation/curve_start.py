@@ -1,4 +1,6 @@
-"""The beginning of a curve of poses: where the curve passes it again, going the same way, the curve is closed."""
+"""The beginning of a curve of poses: where the curve passes it again, going the same way, the curve
+is closed.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,11 @@ from .pseudo_arclength import ArclengthWalk, Spot
 
 # The cosine of two directions above which they are the same way: below it the curve crosses itself.
 SAME_WAY = 0.9
-# Two poses are one if no number differs by more than this part of the longest step: far above rounding.
+# Two poses are one if no number differs by more than this part of the longest step: far above
+# rounding.
 SAME_POSE = 0.02
-# Length over which the direction of the beginning is measured, and rounds of the secant rule that look for it.
+# Length over which the direction of the beginning is measured, and rounds of the secant rule that
+# look for it.
 SMALL, ROUNDS = 1e-6, 8
 
 
@@ -27,7 +31,9 @@ class Beginning:
         self._way = (after - self._poses) / SMALL
 
     def passed(self, before: Spot, after: Spot) -> Spot | None:
-        """Return the beginning as a spot at its length on the curve where the step between two spots passes it, else None."""
+        """Return the beginning as a spot at its length on the curve where the step between two
+        spots passes it, else None.
+        """
         if float(self.first.dq @ after.dq) < SAME_WAY:
             return None
         change, change_after = self._change(before), self._change(after)
@@ -36,10 +42,14 @@ class Beginning:
             return None
         share = ahead / (ahead + beyond)
         spot: Spot | None = None
-        h, apart = share * (after.arc - before.arc), np.abs((1.0 - share) * change + share * change_after).max()
+        h, apart = (
+            share * (after.arc - before.arc),
+            np.abs((1.0 - share) * change + share * change_after).max(),
+        )
         for _ in range(ROUNDS):
             spot = self.walk.advance(before, h)
-            if spot is None:  # beside a branch point: where it is between the two spots is known well enough
+            # beside a branch point: where it is between the two spots is known well enough
+            if spot is None:
                 break
             change = self._change(spot)
             gap, apart = self._along(change), np.abs(change).max()
@@ -52,9 +62,13 @@ class Beginning:
         return replace(self.first, arc=before.arc + h, time=turned)
 
     def _change(self, spot: Spot) -> Array:
-        """Return the change from the pose of a spot to that of the beginning; Euler parameters p and -p are the same."""
+        """Return the change from the pose of a spot to that of the beginning; Euler parameters p
+        and -p are the same.
+        """
         there = self.walk.system.poses(spot.state)
-        there[:, 3:] *= np.where((there[:, 3:] * self._poses[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+        there[:, 3:] *= np.where(
+            (there[:, 3:] * self._poses[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0
+        )
         return self._poses - there
 
     def _along(self, change: Array) -> float:

@@ -28,15 +28,29 @@ def why_refused(model: Model, lane: Array) -> str:
         return float(lane[model.slots[name]])
 
     names = zip(by_block(SIGMA, model.blocks), by_block(SLOPE, model.blocks), strict=True)
-    blocks = [(read(name), read(FROM + name), max(steepness(read, label), read(label))) for name, label in names]
+    blocks = [
+        (read(name), read(FROM + name), max(steepness(read, label), read(label)))
+        for name, label in names
+    ]
     angles = turns(model.mechanism, model.request.drivers)
-    found = margins(read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), blocks, angles)
+    found = margins(
+        read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), blocks, angles
+    )
     failed = [name for name, margin in found.items() if not margin > 0.0]
-    closure, leftover, branch, tol = (read(name) for name in ("closure", "leftover", "branch", "tolerance"))
+    closure, leftover, branch, tol = (
+        read(name) for name in ("closure", "leftover", "branch", "tolerance")
+    )
     return in_words(failed, closure, leftover, branch, tol, model.selection.account.redundant_rows)
 
 
-def in_words(failed: Sequence[str], closure: float, leftover: float, branch: float, tol: float, redundant: Sequence[str]) -> str:
+def in_words(
+    failed: Sequence[str],
+    closure: float,
+    leftover: float,
+    branch: float,
+    tol: float,
+    redundant: Sequence[str],
+) -> str:
     """Why a pose was refused that failed so many tests.
 
     Args:
@@ -48,11 +62,16 @@ def in_words(failed: Sequence[str], closure: float, leftover: float, branch: flo
     if "on the branch" in failed:
         return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
     if "closed" in failed and closure <= ROUNDING:
-        return f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance {tol:.3g} is less; allow more"
+        return (
+            f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance"
+            f" {tol:.3g} is less; allow more"
+        )
     if "closed" in failed:
         return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
     if "consistent" in failed:
-        return f"the redundant rows ({', '.join(redundant)}) contradict the others by {leftover:.3g}"
+        return (
+            f"the redundant rows ({', '.join(redundant)}) contradict the others by {leftover:.3g}"
+        )
     if any(name in failed for name in SINGULAR):
         return "there is a singular pose ahead"
     if failed == ["converged"]:

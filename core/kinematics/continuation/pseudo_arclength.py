@@ -1,12 +1,15 @@
-"""Follow the curve of poses by its length, not by a driver: beyond lock-ups, where the driver turns back, and over bifurcations.
+"""Follow the curve of poses by its length, not by a driver: beyond lock-ups, where the driver turns
+back, and over bifurcations.
 
-Pseudo-arclength continuation. The unknowns are the pose q and the path's time t; a step of length h along the tangent (dq, dt),
+Pseudo-arclength continuation. The unknowns are the pose q and the path's time t; a step of length h
+along the tangent (dq, dt),
 |dq| = 1 [units of the mechanism's size, rad], is corrected across the tangent by Newton's iteration on
 
     phi(q, t) = 0,   dq . (q - q_predicted) = 0        Jacobian  B = [ J  -nu ; dq^T  0 ]
 
-B is regular at limit points, where J is not. Limit points are zeros of dt along the curve. At bifurcations [J -nu] loses rank, and
-the determinant of B changes its sign where an odd number of branches cross.
+B is regular at limit points, where J is not. Limit points are zeros of dt along the curve. At
+bifurcations [J -nu] loses rank, and the determinant of B changes its sign where an odd number of
+branches cross.
 """
 
 from __future__ import annotations
@@ -23,20 +26,22 @@ from ..compiled.dense_equations import System
 from ..compiled.request import CONSISTENT
 from ..formulation.acceptance_criteria import LARGEST_DEVIATION
 
-# The tangent turns by less than this [rad] in a step, so that the correction is a tenth of it: another branch is farther away.
+# The tangent turns by less than this [rad] in a step, so that the correction is a tenth of it:
+# another branch is farther away.
 LARGEST_TURN = 0.2
 # A step below this is round-off beside the residuals that are corrected.
 SHORTEST = 1e-9
 CORRECTIONS = 10
-# False position gains a digit and more each time. The driver is stationary at a limit point: where dt is this, by the motion per
-# length, the driver's value is off by the square of it.
+# False position gains a digit and more each time. The driver is stationary at a limit point: where
+# dt is this, by the motion per length, the driver's value is off by the square of it.
 REFINEMENTS, ROUNDING = 40, 1e-12
 # Where no such spot is found because the curve branches there too, it is off by more than this.
 STATIONARY = 1e-9
-# Beside a bifurcation, poses are taken at multiples of this: there sigma, about as large, costs two digits, and a polynomial
-# through eight of them is exact to about 1e-16.
+# Beside a bifurcation, poses are taken at multiples of this: there sigma, about as large, costs two
+# digits, and a polynomial through eight of them is exact to about 1e-16.
 NODE = 0.01
-# Cubics through the four nodes on either side are off by about NODE ** 4 where the nodes begin: their zeros meet at a bifurcation.
+# Cubics through the four nodes on either side are off by about NODE ** 4 where the nodes begin:
+# their zeros meet at a bifurcation.
 MEETS = 1e-6
 
 
@@ -64,7 +69,9 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """A singular pose on the curve: its length and time, and the spot nearest to it that corrections lead to."""
+    """A singular pose on the curve: its length and time, and the spot nearest to it that
+    corrections lead to.
+    """
 
     spot: Spot
     arc: float
@@ -94,7 +101,8 @@ class ArclengthWalk:
         return self._spot(state, time, dq / np.linalg.norm(dq), 0.0)
 
     def advance(self, spot: Spot, h: float) -> Spot | None:
-        """The pose at about the length h from a spot; None where corrections do not converge nearby, or it is no solution.
+        """The pose at about the length h from a spot; None where corrections do not converge
+        nearby, or it is no solution.
 
         Corrections are across the tangent of the spot: h is measured along it.
         """
@@ -132,11 +140,17 @@ class ArclengthWalk:
     def _solved(self, spot: Spot) -> bool:
         zero = np.zeros((1, self.system.unknowns))
         tests = self.system.outputs(spot.state, self.sample(spot.time), zero, zero)
-        closure, leftover, branch = (float(tests[name][0, 0]) for name in ("closure", "leftover", "branch"))
+        closure, leftover, branch = (
+            float(tests[name][0, 0]) for name in ("closure", "leftover", "branch")
+        )
         return closure <= self.tol and leftover <= max(CONSISTENT, self.tol) and branch > 0.0
 
-    def along(self, spot: Spot, length: float, longest: float, attempts: int | None = None) -> Iterator[Spot]:
-        """Spots after one, up to a length from where the walk began; ends before it where steps get too short, or are too many."""
+    def along(
+        self, spot: Spot, length: float, longest: float, attempts: int | None = None
+    ) -> Iterator[Spot]:
+        """Spots after one, up to a length from where the walk began; ends before it where steps get
+        too short, or are too many.
+        """
         h = 0.1 * longest
         for _ in count() if attempts is None else range(attempts):
             if spot.arc >= length:
@@ -153,12 +167,14 @@ class ArclengthWalk:
             yield spot
 
     def limit(self, before: Spot, after: Spot) -> Beside:
-        """Where the driver turns back between two spots: the zero of dt, by false position (Illinois), to round-off.
+        """Where the driver turns back between two spots: the zero of dt, by false position
+        (Illinois), to round-off.
 
         Where the curve also branches there, corrections do not converge: the zero is interpolated.
         """
         a, b, f_a, f_b = 0.0, after.arc - before.arc, before.dt, after.dt
-        last_b: bool | None = None  # which end the last spot replaced: an end that stays twice weighs half
+        # which end the last spot replaced: an end that stays twice weighs half
+        last_b: bool | None = None
         best = min(before, after, key=lambda spot: abs(spot.dt))
         for _ in range(REFINEMENTS):
             h = (a * f_b - b * f_a) / (f_b - f_a)
@@ -170,9 +186,14 @@ class ArclengthWalk:
                 break
             is_b = (spot.dt > 0.0) == (f_b > 0.0)
             weight = 0.5 if is_b is last_b else 1.0
-            a, f_a, b, f_b = (a, weight * f_a, h, spot.dt) if is_b else (h, spot.dt, b, weight * f_b)
+            a, f_a, b, f_b = (
+                (a, weight * f_a, h, spot.dt) if is_b else (h, spot.dt, b, weight * f_b)
+            )
             last_b = is_b
-        if abs(best.dt) > STATIONARY and (nodes := self._nodes(before, after, best.arc - before.arc)) is not None:
+        if (
+            abs(best.dt) > STATIONARY
+            and (nodes := self._nodes(before, after, best.arc - before.arc)) is not None
+        ):
             offsets, spots = nodes
             root = _root(offsets, np.array([spot.dt for spot in spots]))
             if np.isfinite(root):
@@ -182,8 +203,9 @@ class ArclengthWalk:
     def branching(self, before: Spot, after: Spot) -> Beside | None:
         """Where the curve branches between two spots, if it does.
 
-        Corrections do not converge there, but on both sides sigma falls to zero like a line: with its sign turned on one side it
-        is smooth, and its zero is interpolated. Where sigma has a least value other than zero there is no such line.
+        Corrections do not converge there, but on both sides sigma falls to zero like a line: with
+        its sign turned on one side it is smooth, and its zero is interpolated. Where sigma has a
+        least value other than zero there is no such line.
         """
         centre = self._least(before, after.arc - before.arc)
         nodes = self._nodes(before, after, centre)
@@ -191,20 +213,28 @@ class ArclengthWalk:
             return None
         offsets, spots = nodes
         signed = np.sign(offsets) * np.array([spot.sigma for spot in spots])
-        from_left, from_right, root = (_root(offsets[kept], signed[kept]) for kept in (slice(4), slice(4, 8), slice(8)))
+        from_left, from_right, root = (
+            _root(offsets[kept], signed[kept]) for kept in (slice(4), slice(4, 8), slice(8))
+        )
         if not abs(from_left - from_right) <= MEETS:
             return None
         return Beside(spots[3], before.arc + centre + root, _between(offsets, spots, root))
 
     def _nodes(self, before: Spot, after: Spot, centre: float) -> tuple[Array, list[Spot]] | None:
-        """Spots on both sides of a length from the first, and where they are; None where any is not reached."""
-        offsets = min(NODE, 0.125 * (after.arc - before.arc)) * np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
+        """Spots on both sides of a length from the first, and where they are; None where any is not
+        reached.
+        """
+        offsets = min(NODE, 0.125 * (after.arc - before.arc)) * np.array(
+            [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]
+        )
         found = [self.advance(before, centre + offset) for offset in offsets.tolist()]
         spots = [spot for spot in found if spot is not None]
         return (offsets, spots) if len(spots) == len(found) else None
 
     def _least(self, before: Spot, length: float) -> float:
-        """The length from a spot at which sigma is least, by golden section; where no correction converges, sigma is zero."""
+        """The length from a spot at which sigma is least, by golden section; where no correction
+        converges, sigma is zero.
+        """
         part = 0.5 * (np.sqrt(5.0) - 1.0)
         a, b = 0.0, length
         while b - a > 0.01 * length:
@@ -225,7 +255,9 @@ def _solution(matrix: Array, b: Array) -> Array:
 
 def _between(offsets: Array, spots: Sequence[Spot], at: float) -> float:
     """The time at an offset among spots, interpolated."""
-    return float(np.polynomial.Polynomial.fit(offsets, [spot.time for spot in spots], len(spots) - 1)(at))
+    return float(
+        np.polynomial.Polynomial.fit(offsets, [spot.time for spot in spots], len(spots) - 1)(at)
+    )
 
 
 def _root(x: Array, y: Array) -> float:

@@ -1,8 +1,10 @@
-"""Which rows a motion is followed by: those chosen at the design position, and where they depend on each other later, others.
+"""Which rows a motion is followed by: those chosen at the design position, and where they depend on
+each other later, others.
 
-A mechanism with more rows than it needs has many choices of as many as are independent, and none may be good everywhere: the rods
-of a locomotive, a Bennett loop. Where the rows that were chosen become singular, though all rows together do not, the mechanism
-knows nothing of it, and the motion goes on by rows that are chosen there.
+A mechanism with more rows than it needs has many choices of as many as are independent, and none
+may be good everywhere: the rods of a locomotive, a Bennett loop. Where the rows that were chosen
+become singular, though all rows together do not, the mechanism knows nothing of it, and the motion
+goes on by rows that are chosen there.
 """
 
 from __future__ import annotations
@@ -25,15 +27,17 @@ from ..formulation.formulation import Condition
 from ..formulation.state_vectors import jacobian
 from ..structure.redundancy import independent_rows
 
-# A motion that ends with a smallest singular value above this part of the largest that it has had does not end at a singular pose.
+# A motion that ends with a smallest singular value above this part of the largest that it has had
+# does not end at a singular pose.
 NEAR = 1e-2
-# Rows are chosen anew where all together have a smallest singular value above this part of the largest that there was, thirty times
-# what rounding can turn (TURNED); with NEAR kites off by 0.002 to 0.008 of their size were refused beside their corner.
+# Rows are chosen anew where all together have a smallest singular value above this part of the
+# largest that there was, thirty times what rounding can turn (TURNED); with NEAR kites off by 0.002
+# to 0.008 of their size were refused beside their corner.
 SEEN = 1e-4
 # Rows are chosen anew where that makes the smallest singular value as many times larger.
 BETTER = 3.0
-# Rows of before are taken again where their smallest singular value is this part of that of all rows: of those that are chosen at a
-# pose it is 0.5 to 0.95, and to choose takes up to 0.1 s.
+# Rows of before are taken again where their smallest singular value is this part of that of all
+# rows: of those that are chosen at a pose it is 0.5 to 0.95, and to choose takes up to 0.1 s.
 AS_GOOD = 0.3
 
 
@@ -56,14 +60,21 @@ class Choice:
         self.models = [model]
 
     def anew(self, route: Route, lane: Array) -> Standing | None:
-        """Rows chosen where a lane stands on a route, and a lane that stands there by them; None where none are better."""
+        """Rows chosen where a lane stands on a route, and a lane that stands there by them; None
+        where none are better.
+        """
         model, slots = route.model, route.model.slots
         if not model.selection.dropped:
             return None
         system, sample = system_of(model), route.sampled(lane[[slots[FROM + TIME]]])
         found = system.equations(system.state(lane[:, None]), sample)
-        matrix = np.empty((len(model.selection.chosen) + len(model.selection.dropped), system.unknowns))
-        matrix[[*model.selection.chosen]], matrix[[*model.selection.dropped]] = found.jacobian[0], found.redundant[0]
+        matrix = np.empty(
+            (len(model.selection.chosen) + len(model.selection.dropped), system.unknowns)
+        )
+        matrix[[*model.selection.chosen]], matrix[[*model.selection.dropped]] = (
+            found.jacobian[0],
+            found.redundant[0],
+        )
         if not np.isfinite(matrix).all():
             return None
         largest = float(lane[slots[FROM + LARGEST_SIGMA]])
@@ -79,17 +90,26 @@ class Choice:
         if best is None:
             best = recent_model(model.mechanism, replace(model.request, rows=rows))
             self.models.append(best)
-        stands = _standing(best, {name: lane[model.vectors[FROM + name]] for name in model.state}, sample, NEAR * sigma)
+        stands = _standing(
+            best,
+            {name: lane[model.vectors[FROM + name]] for name in model.state},
+            sample,
+            NEAR * sigma,
+        )
         if stands is None:
             return None
-        # beside a corner all rows are nearly singular: the scale is that of the motion, not of what it is there
+        # beside a corner all rows are nearly singular: the scale is that of the motion, not of what
+        # it is there
         for name in (LARGEST_SIGMA, FROM + LARGEST_SIGMA):
             stands[best.slots[name]] = max(stands[best.slots[name]], largest)
         return Standing(best, stands)
 
 
-def chosen(matrix: Array, known: Sequence[tuple[int, ...]], drivers: int, conditions: Sequence[Condition]) -> tuple[int, ...]:
-    """The rows to solve at a pose: the best of those known where others are hardly better, else those that are chosen there.
+def chosen(
+    matrix: Array, known: Sequence[tuple[int, ...]], drivers: int, conditions: Sequence[Condition]
+) -> tuple[int, ...]:
+    """The rows to solve at a pose: the best of those known where others are hardly better, else
+    those that are chosen there.
 
     Args:
         matrix: the Jacobian of all rows, those of the drivers last.
@@ -99,10 +119,13 @@ def chosen(matrix: Array, known: Sequence[tuple[int, ...]], drivers: int, condit
     if _sigma(matrix, best) >= AS_GOOD * _sigma(matrix, range(len(matrix))):
         return best
     rows = tuple(independent_rows(matrix, drivers, conditions))
-    return rows if len(rows) == len(best) else best  # where the mechanism is singular there are fewer
+    # where the mechanism is singular there are fewer
+    return rows if len(rows) == len(best) else best
 
 
-def chosen_at(mechanism: Mechanism, change: Mapping[str, float], state: Array, known: tuple[int, ...]) -> tuple[int, ...]:
+def chosen_at(
+    mechanism: Mechanism, change: Mapping[str, float], state: Array, known: tuple[int, ...]
+) -> tuple[int, ...]:
     """As `chosen`, at a pose of the native formulation.
 
     Args:
@@ -112,8 +135,12 @@ def chosen_at(mechanism: Mechanism, change: Mapping[str, float], state: Array, k
     frame = frames(mechanism)
     formulation = Cartesian.of(mechanism, frame, standing_drives(mechanism, frame.unit, change))
     numbers = iter(state.tolist())
-    at = formulation.configuration({name: [next(numbers) for _ in value] for name, value in formulation.design.items()})
-    return chosen(jacobian(formulation, at), [known], len(mechanism.drivers), formulation.conditions)
+    at = formulation.configuration(
+        {name: [next(numbers) for _ in value] for name, value in formulation.design.items()}
+    )
+    return chosen(
+        jacobian(formulation, at), [known], len(mechanism.drivers), formulation.conditions
+    )
 
 
 def _sigma(matrix: Array, rows: Sequence[int]) -> float:
@@ -122,12 +149,17 @@ def _sigma(matrix: Array, rows: Sequence[int]) -> float:
 
 
 def _standing(model: Model, state: dict[str, Array], sample: Array, nearby: float) -> Array | None:
-    """A lane of a model that stands at a sample, no farther from a state than so; None where there is none.
+    """A lane of a model that stands at a sample, no farther from a state than so; None where there
+    is none.
 
     Another solution is as far away as the smallest singular value is large, or farther.
     """
     executor = model.executor(1)
     (closes,) = model.stand_at(executor, state, sample)
     lane = executor.get(range(len(model.slots)))[:, 0]
-    moved = max(float(np.abs(lane[model.vectors[name]] - value).max()) for name, value in state.items())
-    return lane if closes and lane[model.slots["leftover"]] <= CONSISTENT and moved <= nearby else None
+    moved = max(
+        float(np.abs(lane[model.vectors[name]] - value).max()) for name, value in state.items()
+    )
+    return (
+        lane if closes and lane[model.slots["leftover"]] <= CONSISTENT and moved <= nearby else None
+    )

@@ -1,5 +1,5 @@
-"""What was followed of a motion, part by part: a singular pose that the motion passes ends one part, and begins the next; so does
-one where only the rows are singular that it was followed by."""
+"""What was followed of a motion, part by part: a singular pose that the motion passes ends one
+part, and begins the next; so does one where only the rows are singular that it was followed by."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from .walk import End, March, arrived, led, march
 
 # Each takes some milliseconds to be passed. A motion that has so many is one of thousands of turns.
 MOST = 1000
-# A sample takes a millisecond to find that no rows are better there; where so many have none it is the mechanism that is singular.
+# A sample takes a millisecond to find that no rows are better there; where so many have none it is
+# the mechanism that is singular.
 WITHOUT = 64
 
 
@@ -79,7 +80,9 @@ class Followed:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
         self.choice = Choice(route.model)
         stands = led(route, tol)
-        self.parts = [Part(stands if isinstance(stands, Route) else route, np.arange(len(self.times)))]
+        self.parts = [
+            Part(stands if isinstance(stands, Route) else route, np.arange(len(self.times)))
+        ]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []
         self.passages: list[Passage] = []
@@ -96,12 +99,18 @@ class Followed:
     def in_question(self) -> NDArray[np.bool_]:
         """Those, and samples that may be better by other rows, shape (n,)."""
         model = self.route.model
-        largest = np.fmax.reduce(self.found.kept[model.rows[LARGEST_SIGMA].start], initial=0.0) if model.selection.dropped else None
+        largest = (
+            np.fmax.reduce(self.found.kept[model.rows[LARGEST_SIGMA].start], initial=0.0)
+            if model.selection.dropped
+            else None
+        )
         return self.found.solved & in_question(*self._tests, self.tol, largest)
 
     @property
     def _tests(self) -> tuple[Array, Array]:
-        sigma, closure = (self.found.kept[self.route.model.rows[name].start] for name in (SIGMA, "closure"))
+        sigma, closure = (
+            self.found.kept[self.route.model.rows[name].start] for name in (SIGMA, "closure")
+        )
         return sigma, closure
 
     def go_on(self) -> None:
@@ -128,14 +137,22 @@ class Followed:
                 left = left[1:]
             else:
                 samples = np.array(left)
-                self._follow(Route(standing.model, self._path(samples), standing.lane, float(self.times[here])), samples)
+                self._follow(
+                    Route(
+                        standing.model, self._path(samples), standing.lane, float(self.times[here])
+                    ),
+                    samples,
+                )
                 self.renewed += 1
                 left = [k for k in left[1:] if self.in_question[k]]
 
     def _beyond(self, end: End) -> list[End] | None:
         """What ends the motion beyond an end; None where it does not go on."""
         slots = end.route.model.slots
-        if not end.early and end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]:
+        if (
+            not end.early
+            and end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]
+        ):
             return None
         here, number = _time(end.route, end.lane), self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0
@@ -145,14 +162,20 @@ class Followed:
             if number is None:
                 return self._arrive(Route(standing.model, end.route.path, standing.lane, here))
             missing = self._missing(number, side, end.wanted)
-            ends = self._follow(Route(standing.model, self._path(missing), standing.lane, here), missing)
+            ends = self._follow(
+                Route(standing.model, self._path(missing), standing.lane, here), missing
+            )
             return [each for each in ends if side * (each.wanted - here) >= 0.0]
         if end.early and number is not None:  # the way to the start is gone to its end
             return self._further(end, number, side)
         if len(self.passages) == MOST:
             return None
         lane = self.before(here, side, number) if number is not None else end.route.departure
-        passed = bridge(end.route, lane, here, self.tol, end.lane, rates=False) if lane is not None else None
+        passed = (
+            bridge(end.route, lane, here, self.tol, end.lane, rates=False)
+            if lane is not None
+            else None
+        )
         if passed is None:
             return None
         self.passages.append(Passage(end.lane, here, end.route))
@@ -162,10 +185,17 @@ class Followed:
         ends = self._follow(onward(end.route, passed.beyond, self.times[missing]), missing)
         beyond = _time(end.route, passed.beyond)
         back = [each for each in ends if side * (each.wanted - beyond) < 0.0]
-        while back and back[0].early:  # a sample right beyond the pose is not given up for want of better rows
+        # a sample right beyond the pose is not given up for want of better rows
+        while back and back[0].early:
             back = self._further(back[0], len(self.parts) - 1, -side)
-        short = {k for k in missing.tolist() if not self.found.solved[k] and side * (self.times[k] - beyond) < 0.0}
-        self.stuck += [Stuck(k, end.route, lane, end.lane) for k in sorted(short)] if lane is not None else []
+        short = {
+            k
+            for k in missing.tolist()
+            if not self.found.solved[k] and side * (self.times[k] - beyond) < 0.0
+        }
+        self.stuck += (
+            [Stuck(k, end.route, lane, end.lane) for k in sorted(short)] if lane is not None else []
+        )
         return [each for each in ends if side * (each.wanted - beyond) >= 0.0]
 
     def _further(self, end: End, number: int, side: float) -> list[End]:
@@ -175,13 +205,19 @@ class Followed:
         found = march(end.route, self.tol, low=low)
         further = found.solved & ~self.found.solved[samples]
         taken = samples[further]
-        self.found.kept[:, taken], self.found.solved[taken], self.part_of[taken] = found.kept[:, further], True, number
+        self.found.kept[:, taken], self.found.solved[taken], self.part_of[taken] = (
+            found.kept[:, further],
+            True,
+            number,
+        )
         return [each for each in found.ends if side * (each.wanted - end.route.start) >= 0.0]
 
     def _missing(self, number: int, side: float, wanted: float) -> NDArray[np.intp]:
         """The samples that a part did not reach on a side, from the first that was wanted on."""
         start = self.parts[number].route.start
-        return np.flatnonzero(~self.found.solved & (side * (self.times - start) >= side * (wanted - start)))
+        return np.flatnonzero(
+            ~self.found.solved & (side * (self.times - start) >= side * (wanted - start))
+        )
 
     def _path(self, samples: NDArray[np.intp]) -> Path:
         """The path at samples."""
@@ -195,10 +231,14 @@ class Followed:
         if not found.solved.all():
             return list(found.ends)
         lane = arrived(way.model, found.visited[last])
-        return self._follow(Route(way.model, self.route.path, lane, self.route.start), np.arange(len(self.times)))
+        return self._follow(
+            Route(way.model, self.route.path, lane, self.route.start), np.arange(len(self.times))
+        )
 
     def _follow(self, route: Route, samples: NDArray[np.intp]) -> list[End]:
-        """Put what a route reaches of samples in their place, where there was nothing or it was much nearer to singular."""
+        """Put what a route reaches of samples in their place, where there was nothing or it was
+        much nearer to singular.
+        """
         found, sigma = march(route, self.tol, low=LOW), self.route.model.rows[SIGMA].start
         nearer = BETTER * self.found.kept[sigma, samples] < found.kept[sigma]
         reached = found.solved & (nearer | ~self.found.solved[samples])
@@ -212,13 +252,22 @@ class Followed:
         """Lanes that stand at samples; those that are not reached again are missing."""
         found: dict[int, Array] = {}
         for number, part in enumerate(self.parts):
-            wanted = {at for at, k in enumerate(part.samples.tolist()) if k in samples and self.part_of[k] == number}
+            wanted = {
+                at
+                for at, k in enumerate(part.samples.tolist())
+                if k in samples and self.part_of[k] == number
+            }
             if wanted:
-                found |= {int(part.samples[at]): lane for at, lane in march(part.route, self.tol, visit=wanted).visited.items()}
+                found |= {
+                    int(part.samples[at]): lane
+                    for at, lane in march(part.route, self.tol, visit=wanted).visited.items()
+                }
         return found
 
     def before(self, time: float, side: float, number: int) -> Array | None:
-        """The lane of the last sample of a part before a time, going outwards, that is not in doubt; or of its start, if known."""
+        """The lane of the last sample of a part before a time, going outwards, that is not in
+        doubt; or of its start, if known.
+        """
         route = self.parts[number].route
         away = side * (self.times - route.start)
         mine = (self.part_of == number) & self.found.solved & ~self.doubtful
@@ -231,7 +280,9 @@ class Followed:
         return self._stood.get(nearest)
 
     def _number(self, route: Route) -> int | None:
-        """Return the number of the part that is followed on a route; None on the way to the start."""
+        """Return the number of the part that is followed on a route; None on the way to the
+        start.
+        """
         return next((k for k, part in enumerate(self.parts) if part.route is route), None)
 
 

@@ -1,9 +1,11 @@
-"""Over a singular pose: the motion on both sides of it, and by interpolation the pose itself, where the motion goes on.
+"""Over a singular pose: the motion on both sides of it, and by interpolation the pose itself, where
+the motion goes on.
 
-At the pose its own equations say too little, but the motion is smooth there. Eight poses beside it, followed from before to beyond,
-give it by Lagrange's formula. If they are of two different motions, or the motion turns back, the formula does not hold or there
-are no eight. If the motion turns round a corner that is too narrow to be seen from there, or there is a gap as narrow, a pose that
-the motion was followed to right before it is not where the formula has it.
+At the pose its own equations say too little, but the motion is smooth there. Eight poses beside it,
+followed from before to beyond, give it by Lagrange's formula. If they are of two different motions,
+or the motion turns back, the formula does not hold or there are no eight. If the motion turns round
+a corner that is too narrow to be seen from there, or there is a gap as narrow, a pose that the
+motion was followed to right before it is not where the formula has it.
 """
 
 from __future__ import annotations
@@ -23,12 +25,14 @@ from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
 from .singularity import solve_closely
 from .walk import arrived, march
 
-# The motion from each of the eight to the next [units of the mechanism's size, rad]. Long ways cost accuracy by the motion's
-# curvature, short ones by the poses' own nearness to the singular one; the first that is accurate enough is taken.
+# The motion from each of the eight to the next [units of the mechanism's size, rad]. Long ways cost
+# accuracy by the motion's curvature, short ones by the poses' own nearness to the singular one; the
+# first that is accurate enough is taken.
 NODES = (0.02, 0.01, 0.005, 0.002)
 PLACES = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
-# Lagrange's weights at the middle of the eight, and of the inner six: the values differ by the error of the latter. Rounding adds
-# up to 2.7 times its size in a value, to 0.46 times in the difference, which may be less by chance: thirty differences cover both.
+# Lagrange's weights at the middle of the eight, and of the inner six: the values differ by the
+# error of the latter. Rounding adds up to 2.7 times its size in a value, to 0.46 times in the
+# difference, which may be less by chance: thirty differences cover both.
 EIGHT = np.array([-1.0, 8.0, -28.0, 56.0, 56.0, -28.0, 8.0, -1.0]) / 70.0
 SIX = np.array([0.0, 1.0, -6.0, 15.0, 15.0, -6.0, 1.0, 0.0]) / 20.0
 COVERED = 30.0
@@ -39,7 +43,8 @@ class Bridge:
     """A singular pose that a motion passes.
 
     Attributes:
-        kept: the kept rows there (`Model.rows`), shape (kept,); its tests are those of a pose right before it.
+        kept: the kept rows there (`Model.rows`), shape (kept,); its tests are those of a pose right
+            before it.
         off: bound of its errors: of the pose by the mechanism's size, of rates by their own.
         beyond: a lane that stands beyond it.
     """
@@ -52,16 +57,26 @@ class Bridge:
 def onward(route: Route, lane: Array, times: Array) -> Route:
     """Return the route to other times that sets off where a lane stands on this one."""
     since = float(lane[route.model.slots[FROM + TIME]])
-    return Route(route.model, Path(route.path.motions, times, route.path.design), arrived(route.model, lane), since)
+    return Route(
+        route.model,
+        Path(route.path.motions, times, route.path.design),
+        arrived(route.model, lane),
+        since,
+    )
 
 
-def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | None, *, rates: bool = True) -> Bridge | None:
-    """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not known well enough.
+def bridge(
+    route: Route, lane: Array, time: float, tol: float, near: Array | None, *, rates: bool = True
+) -> Bridge | None:
+    """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not
+    known well enough.
 
     Args:
-        near: a lane that stands there, where the motion was followed to, at or right before the singular pose: it must be on the
-            same curve. Without one, only what is interpolated may be believed, and not that the motion goes on.
-        rates: whether they are wanted there too. To go on beyond the pose itself is enough, whatever a request wants elsewhere.
+        near: a lane that stands there, where the motion was followed to, at or right before the
+            singular pose: it must be on the same curve. Without one, only what is interpolated may
+            be believed, and not that the motion goes on.
+        rates: whether they are wanted there too. To go on beyond the pose itself is enough,
+            whatever a request wants elsewhere.
     """
     model = route.model
     speed = float(np.abs(lane[model.vectors[FROM + RATE]]).max())
@@ -75,7 +90,9 @@ def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | Non
         own = WORSE * float((np.maximum(closure, EPSILON) / sigma).max())
         differences = np.abs(whole @ (EIGHT - SIX))
         scales = _scales(model, whole, speed, rates=rates)
-        off = max([own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in scales)])
+        off = max(
+            [own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in scales)]
+        )
         if off <= AMPLIFIED * tol and (near is None or _on_curve(route, lanes, near)):
             kept = whole @ EIGHT
             tests = slice(model.rows[TESTS[0]].start, None)
@@ -85,7 +102,9 @@ def bridge(route: Route, lane: Array, time: float, tol: float, near: Array | Non
 
 
 def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, Array] | None:
-    """What is kept of poses at eight times, and lanes that stand there; a singular pose lies between the fourth and the fifth."""
+    """What is kept of poses at eight times, and lanes that stand there; a singular pose lies
+    between the fourth and the fifth.
+    """
     before = march(onward(route, lane, times[:4]), tol, visit=range(4))
     if not before.solved.all():
         return None
@@ -98,7 +117,9 @@ def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, 
 
 
 def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
-    """Whether the pose of a lane at the middle time is that of the polynomial through eight others."""
+    """Whether the pose of a lane at the middle time is that of the polynomial through eight
+    others.
+    """
     system, time = system_of(route.model), near[[route.model.slots[FROM + TIME]]]
     solved = solve_closely(system, system.state(near[:, None]), route.sampled(time))
     eight = system.state(lanes)
@@ -106,14 +127,24 @@ def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
     return bool((off <= known + WORSE * solved.error[0, 0]).all())
 
 
-def _scales(model: Model, kept: Array, speed: float, *, rates: bool) -> Iterator[tuple[slice, float]]:
-    """Rows of every motion and what errors of it are measured by: the mechanism's size, and the motion's own where it is a rate."""
+def _scales(
+    model: Model, kept: Array, speed: float, *, rates: bool
+) -> Iterator[tuple[slice, float]]:
+    """Rows of every motion and what errors of it are measured by: the mechanism's size, and the
+    motion's own where it is a rate.
+    """
     for name, rows in model.rows.items():
         label = name.split(" ")[0]
         if label in TESTS:
             continue
         length = model.frame.unit if label in (*QUANTITIES, "r", "rdot", "rddot") else 1.0
-        order = 1 if label in ("velocity", "rdot", "omega") else 2 if label in ("acceleration", "rddot", "omega_t") else 0
+        order = (
+            1
+            if label in ("velocity", "rdot", "omega")
+            else 2
+            if label in ("acceleration", "rddot", "omega_t")
+            else 0
+        )
         if order and not rates:
             continue
         own = float(np.abs(kept[rows]).max()) if order else 0.0

@@ -1,8 +1,11 @@
-"""Samples of a march that are nearly singular, and singular poses that it crossed or ended at: none is passed in silence.
+"""Samples of a march that are nearly singular, and singular poses that it crossed or ended at: none
+is passed in silence.
 
-A pose is wrong by up to its residual over the smallest singular value sigma of its rows. The march sees residuals, and of sigma
-only an estimate. Where that leaves room for an error sigma is computed; where sigma does, the sample is solved again by orthogonal
-factors, and its errors are computed; where they are too large it is interpolated, if the motion goes on beyond, or else refused.
+A pose is wrong by up to its residual over the smallest singular value sigma of its rows. The march
+sees residuals, and of sigma only an estimate. Where that leaves room for an error sigma is
+computed; where sigma does, the sample is solved again by orthogonal factors, and its errors are
+computed; where they are too large it is interpolated, if the motion goes on beyond, or else
+refused.
 """
 
 from __future__ import annotations
@@ -24,7 +27,15 @@ from ..formulation.acceptance_criteria import AMPLIFIED, WORSE
 from .row_exchange import BETTER
 from .segments import Followed, Passage
 from .singular_crossing import bridge
-from .singularity import CONTINUED, REGULAR, Singularity, examine, listed, smallest_singular_values, solve_closely
+from .singularity import (
+    CONTINUED,
+    REGULAR,
+    Singularity,
+    examine,
+    listed,
+    smallest_singular_values,
+    solve_closely,
+)
 from .trace import limit_ahead
 from .walk import End, March
 
@@ -49,7 +60,8 @@ class Findings:
         retried: samples that were solved again.
         sigma: smallest singular value among those.
         renewed: how often rows were chosen anew.
-        uncertain: samples that are refused because their pose or rates are uncertain; the motion does not end there.
+        uncertain: samples that are refused because their pose or rates are uncertain; the motion
+            does not end there.
     """
 
     notes: list[str] = field(default_factory=list[str])
@@ -76,7 +88,9 @@ class Findings:
 
 
 def scrutinise(route: Route, found: March, tol: float) -> Findings:
-    """Solve doubtful samples again, in place, and those beyond an end that the motion passes; say what was found."""
+    """Solve doubtful samples again, in place, and those beyond an end that the motion passes; say
+    what was found.
+    """
     scrutiny = _Scrutiny(Followed(route, found, tol))
     if len(route.model.selection.chosen) > LARGEST:
         return scrutiny.too_large()
@@ -93,7 +107,12 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
 
 class _Scrutiny:
     def __init__(self, followed: Followed) -> None:
-        self.followed, self.route, self.found, self.tol = followed, followed.route, followed.found, followed.tol
+        self.followed, self.route, self.found, self.tol = (
+            followed,
+            followed.route,
+            followed.found,
+            followed.tol,
+        )
         self.rows, self.times = self.route.model.rows, self.route.path.times
         self.limit, self.orders = AMPLIFIED * self.tol, self.route.model.orders
         self.findings = Findings()
@@ -103,7 +122,8 @@ class _Scrutiny:
         count, unknowns = int(self.followed.doubtful.sum()), len(self.route.model.selection.chosen)
         if count:
             self.findings.notes.append(
-                f"{count} samples seem to be nearly singular, and were not examined: {unknowns} unknowns are more than {LARGEST}"
+                f"{count} samples seem to be nearly singular, and were not examined: {unknowns}"
+                f" unknowns are more than {LARGEST}"
             )
         self.findings.messages += self.found.messages
         return self.findings
@@ -111,15 +131,20 @@ class _Scrutiny:
     # Samples
 
     def samples(self) -> None:
-        """Follow samples by better rows, solve those in doubt closely, and interpolate or refuse those that remain in doubt."""
+        """Follow samples by better rows, solve those in doubt closely, and interpolate or refuse
+        those that remain in doubt.
+        """
         indices, doubtful = np.flatnonzero(self.followed.in_question), self.followed.doubtful
         visited = self.followed.visit(indices.tolist()) if len(indices) else {}
         self._lost([k for k in indices.tolist() if k not in visited and doubtful[k]])
         better: dict[int, Array] = {}
         for model, samples in self._by_model(visited):
-            # the estimate says too little of many unknowns: most of their samples are beyond doubt by sigma itself
+            # the estimate says too little of many unknowns: most of their samples are beyond doubt
+            # by sigma itself
             system, lanes = system_of(model), self._lanes(visited, samples)
-            sigma, of_all = smallest_singular_values(system, system.state(lanes), self.route.sampled(self.times[samples]))
+            sigma, of_all = smallest_singular_values(
+                system, system.state(lanes), self.route.sampled(self.times[samples])
+            )
             wanted = of_all > BETTER * sigma
             better |= {k: visited[k] for k in samples[wanted].tolist()}
             judged = wanted | doubtful[samples]
@@ -150,43 +175,72 @@ class _Scrutiny:
         state, sample = system.state(lanes), self.route.sampled(self.times[indices])
         solved = solve_closely(system, state, sample)
         outputs = system.outputs(solved.state, sample, solved.rate, solved.rate_t)
-        closure, leftover, branch = (outputs.pop(name)[0] for name in ("closure", "leftover", "branch"))
+        closure, leftover, branch = (
+            outputs.pop(name)[0] for name in ("closure", "leftover", "branch")
+        )
         kept, rows = self.found.kept, self.rows
         # closely solved is nearly where it was; anything else is another solution
         moved = np.abs(solved.state - state).max(axis=0)
-        near = moved <= np.maximum(self.limit, WORSE * kept[rows["closure"].start, indices] / solved.sigma)
-        good = (solved.error[: self.orders].max(axis=0) <= self.limit) & near & (closure <= self.tol) & (branch > 0.0)
+        near = moved <= np.maximum(
+            self.limit, WORSE * kept[rows["closure"].start, indices] / solved.sigma
+        )
+        good = (
+            (solved.error[: self.orders].max(axis=0) <= self.limit)
+            & near
+            & (closure <= self.tol)
+            & (branch > 0.0)
+        )
         for name, values in [*outputs.items(), ("closure", closure), ("leftover", leftover)]:
             kept[rows[name], indices[good]] = values[..., good]
         self.findings.retried += len(indices)
         self.findings.sigma = min(self.findings.sigma, float(solved.sigma.min()))
         doubted: list[int] = np.flatnonzero(~good).tolist()
-        # a motion passes singular poses one by one; where all its samples are nearly singular there is nothing to pass
+        # a motion passes singular poses one by one; where all its samples are nearly singular there
+        # is nothing to pass
         tried = doubted if len(doubted) <= BRIDGED else []
         passed = {at for at in tried if self._passed(int(indices[at]), lanes[:, at])}
         refused = [at for at in doubted if at not in passed]
         if refused:
-            self._refuse(system, indices[refused], state[:, refused], sample[:, refused], solved.error[: self.orders, refused])
+            self._refuse(
+                system,
+                indices[refused],
+                state[:, refused],
+                sample[:, refused],
+                solved.error[: self.orders, refused],
+            )
 
     def _lost(self, samples: list[int]) -> None:
-        """Refuse doubtful samples that are not reached a second time: rounding alone had them accepted."""
+        """Refuse doubtful samples that are not reached a second time: rounding alone had them
+        accepted.
+        """
         if samples:
             self.found.kept[:, samples], self.found.solved[samples] = np.nan, False
             self.findings.uncertain += samples
             places = listed([self._where(float(self.times[k])) for k in samples])
-            why = f"reached once and not again, so near are residuals to the tolerance {self.tol:.3g}; allow more"
+            why = (
+                "reached once and not again, so near are residuals to the tolerance"
+                f" {self.tol:.3g}; allow more"
+            )
             self.findings.messages.append(f"refused at {places}: {why}")
 
     def stuck(self) -> None:
         """Interpolate samples beside passages that neither side could reach, or refuse them."""
         stuck = [each for each in self.followed.stuck if not self.found.solved[each.sample]]
         for each in stuck[:BRIDGED]:
-            self.found.solved[each.sample] = self._bridged(each.route, each.sample, each.before, each.near, passed=True)
+            self.found.solved[each.sample] = self._bridged(
+                each.route, each.sample, each.before, each.near, passed=True
+            )
         for each in stuck:
             k = each.sample
             if not self.found.solved[k]:
                 system, sample = system_of(each.route.model), self.route.sampled(self.times[[k]])
-                self._refuse(system, np.array([k]), system.state(each.near[:, None]), sample, np.full((1, 1), self.tol**0.5))
+                self._refuse(
+                    system,
+                    np.array([k]),
+                    system.state(each.near[:, None]),
+                    sample,
+                    np.full((1, 1), self.tol**0.5),
+                )
 
     def _passed(self, k: int, near: Array) -> bool:
         """Put what the motion has on both sides of a sample in its place, where it goes on."""
@@ -195,7 +249,9 @@ class _Scrutiny:
         lane = self.followed.before(time, side, number)
         return lane is not None and self._bridged(self._followed_on(k), k, lane, near)
 
-    def _bridged(self, route: Route, k: int, lane: Array, near: Array, *, passed: bool = False) -> bool:
+    def _bridged(
+        self, route: Route, k: int, lane: Array, near: Array, *, passed: bool = False
+    ) -> bool:
         time, system = float(self.times[k]), system_of(route.model)
         found = bridge(route, lane, time, self.tol, None if passed else near)
         if found is None:
@@ -203,16 +259,20 @@ class _Scrutiny:
         tests = self.rows[TESTS[0]].start
         wanted = slice(None if passed else tests)  # a sample that was reached has tests of its own
         self.found.kept[wanted, k] = found.kept[wanted]
-        singularity = examine(system, system.state(near[:, None]), self.route.sampled(np.array([time])))
+        singularity = examine(
+            system, system.state(near[:, None]), self.route.sampled(np.array([time]))
+        )
         self._say("passed", time, singularity, k)
         what = "" if singularity.regular else "a singular pose at "
         self.findings.notes.append(
-            f"passes {what}{self._where(time)}: {singularity.words}; {CONTINUED}, interpolated there to "
-            f"{found.off:.1g} of the mechanism's size and of the rates"
+            f"passes {what}{self._where(time)}: {singularity.words}; {CONTINUED}, interpolated"
+            f" there to {found.off:.1g} of the mechanism's size and of the rates"
         )
         return True
 
-    def _refuse(self, system: System, indices: NDArray[np.intp], state: Array, sample: Array, error: Array) -> None:
+    def _refuse(
+        self, system: System, indices: NDArray[np.intp], state: Array, sample: Array, error: Array
+    ) -> None:
         self.found.kept[:, indices], self.found.solved[indices] = np.nan, False
         self.findings.uncertain += indices.tolist()
         found = [examine(system, state[:, [at]], sample[:, [at]]) for at in range(len(indices))]
@@ -222,14 +282,24 @@ class _Scrutiny:
         worst = int(error.max(axis=0).argmax())
         singularity = found[worst]
         uncertain = f"the pose uncertain by {error[0, worst]:.2g} of the mechanism's size"
-        uncertain += f", rates by {error[1:, worst].max():.2g} of their own" if len(error) > 1 else ""
+        uncertain += (
+            f", rates by {error[1:, worst].max():.2g} of their own" if len(error) > 1 else ""
+        )
         places = listed([self._where(float(self.times[k])) for k in indices.tolist()])
-        uncertain += f" (at {self._where(float(self.times[indices[worst]]))}), allowed {self.limit:.2g}"
+        uncertain += (
+            f" (at {self._where(float(self.times[indices[worst]]))}), allowed {self.limit:.2g}"
+        )
         if singularity.sigma < REGULAR:
-            why = f"so near a singular pose that residuals leave {uncertain}; {singularity.words}; keep away from it"
+            why = (
+                f"so near a singular pose that residuals leave {uncertain}; {singularity.words};"
+                " keep away from it"
+            )
         else:
             sigma = f"smallest singular value {singularity.sigma:.3g}"
-            why = f"rounding alone leaves {uncertain} by the tolerance {self.tol:.3g}; {sigma}, the pose is regular; allow more"
+            why = (
+                f"rounding alone leaves {uncertain} by the tolerance {self.tol:.3g}; {sigma}, the"
+                " pose is regular; allow more"
+            )
         self.findings.messages.append(f"refused at {places}: {why}")
 
     # Passages
@@ -237,31 +307,46 @@ class _Scrutiny:
     def passages(self) -> None:
         """Say what was passed between samples."""
         said = [pose["time"] for pose in self.findings.poses if pose["outcome"] == "passed"]
-        others = [each for each in self.followed.passages if not any(abs(each.time - t) <= BESIDE * (1.0 + abs(t)) for t in said)]
+        others = [
+            each
+            for each in self.followed.passages
+            if not any(abs(each.time - t) <= BESIDE * (1.0 + abs(t)) for t in said)
+        ]
         for each in others[:NAMED]:
             self._crossed(each)
         if len(others) > NAMED:
-            self.findings.notes.append(f"crosses {len(others) - NAMED} more singular poses, between samples")
+            self.findings.notes.append(
+                f"crosses {len(others) - NAMED} more singular poses, between samples"
+            )
 
     def _crossed(self, passage: Passage) -> None:
         path, time, where = passage.route.path, passage.time, passage.route.path.where
         system = system_of(passage.route.model)
-        singularity = examine(system, system.state(passage.lane[:, None]), passage.route.sampled(np.array([time])))
+        singularity = examine(
+            system, system.state(passage.lane[:, None]), passage.route.sampled(np.array([time]))
+        )
         if singularity.regular:  # the motion knows nothing of the choice of rows
             return
         self._say("crossed", time, singularity, path=path)
         if path.motions is self.route.path.motions:
             places = np.append(self.times, self.route.start)
-            low, high = (where(float(side)) for side in (places[places <= time].max(), places[places >= time].min()))
+            low, high = (
+                where(float(side))
+                for side in (places[places <= time].max(), places[places >= time].min())
+            )
             beside = f"between {low} and {high}, "
         else:
             beside = f"on the way to {self.route.begin.name}, "
-        self.findings.notes.append(f"crosses a singular pose {beside}near {where(time)}: {singularity.words}; {CONTINUED}")
+        self.findings.notes.append(
+            f"crosses a singular pose {beside}near {where(time)}: {singularity.words}; {CONTINUED}"
+        )
 
     # Ends
 
     def end(self, end: End) -> None:
-        """Say what stopped a side: a limit point ahead of its last pose, or what that pose is nearest to."""
+        """Say what stopped a side: a limit point ahead of its last pose, or what that pose is
+        nearest to.
+        """
         if end.divided:
             self.findings.messages.append(end.message)
             return
@@ -273,22 +358,40 @@ class _Scrutiny:
             singularity = examine(system, state, end.route.sampled(np.array([time])))
             regular = f"the pose is regular there, smallest singular value {singularity.sigma:.3g}"
             self.findings.messages.append(
-                f"{end.message}; there, {singularity.words}" if singularity.sigma < REGULAR else f"{end.message}; {regular}"
+                f"{end.message}; there, {singularity.words}"
+                if singularity.sigma < REGULAR
+                else f"{end.message}; {regular}"
             )
             return
         self._say("limit", ahead.value, ahead.singularity, path=path)
         self.findings.messages.append(
-            f"{end.message}; the limit of travel is {path.where(ahead.value)}: {ahead.singularity.words}; kincheck trace goes "
-            "on beyond"
+            f"{end.message}; the limit of travel is {path.where(ahead.value)}:"
+            f" {ahead.singularity.words}; kincheck trace goes on beyond"
         )
 
     def _where(self, time: float) -> str:
         return self.route.path.where(time)
 
     def _say(
-        self, outcome: str, time: float, singularity: Singularity, sample: int | None = None, path: Path | None = None
+        self,
+        outcome: str,
+        time: float,
+        singularity: Singularity,
+        sample: int | None = None,
+        path: Path | None = None,
     ) -> None:
         path = path or self.route.path
         values = path.drive(list(path.motions), np.array([time]))[0, :, 0]
-        driver = {name: path.design.get(name, 0.0) + float(x) for name, x in zip(path.motions, values, strict=True)}
-        self.findings.poses.append({"outcome": outcome, "time": time, "driver": driver, "sample": sample, **singularity.facts})
+        driver = {
+            name: path.design.get(name, 0.0) + float(x)
+            for name, x in zip(path.motions, values, strict=True)
+        }
+        self.findings.poses.append(
+            {
+                "outcome": outcome,
+                "time": time,
+                "driver": driver,
+                "sample": sample,
+                **singularity.facts,
+            }
+        )

@@ -1,9 +1,12 @@
-"""Singular poses: how near one is, which rows depend on which there, and what could move with the drivers held.
+"""Singular poses: how near one is, which rows depend on which there, and what could move with the
+drivers held.
 
-J is the Jacobian of the kept rows, in units in which rows and unknowns are of size one. Its smallest singular value sigma belongs
-to a motion z of all bodies that the rows hardly notice, J z = sigma y, and to a combination y of rows that hardly holds anything.
-Where the rows of the joints alone are independent, a driver is among those of y: it has come to the end of its travel (lock-up, a
-limit point of the motion). Where they are not, the motion may go on in several ways (bifurcation).
+J is the Jacobian of the kept rows, in units in which rows and unknowns are of size one. Its
+smallest singular value sigma belongs to a motion z of all bodies that the rows hardly notice, J z =
+sigma y, and to a combination y of rows that hardly holds anything. Where the rows of the joints
+alone are independent, a driver is among those of y: it has come to the end of its travel (lock-up,
+a limit point of the motion). Where they are not, the motion may go on in several ways
+(bifurcation).
 """
 
 from __future__ import annotations
@@ -22,9 +25,11 @@ from ..formulation.acceptance_criteria import EPSILON
 
 # Of what is largest, in a combination of rows or a motion: smaller shares are not named.
 SHARE = 0.1
-# Joint rows that are this much farther from dependence than all rows together: then it is a driver's row that depends on them.
+# Joint rows that are this much farther from dependence than all rows together: then it is a
+# driver's row that depends on them.
 APART = 10.0
-# Above this a smallest singular value explains nothing: rates have all but four of their digits there.
+# Above this a smallest singular value explains nothing: rates have all but four of their digits
+# there.
 REGULAR = 1e-2
 NAMED = 4
 """Names in a message; the record has all."""
@@ -38,10 +43,12 @@ class Singularity:
     Attributes:
         lock_up: a driver's row depends on the joints'; else the joints' rows on each other.
         sigma: smallest singular value of the kept rows.
-        of_all: of all rows, those that are redundant among them: where that is not small the mechanism is regular, and only the
-            rows that were chosen at the design depend on each other.
+        of_all: of all rows, those that are redundant among them: where that is not small the
+            mechanism is regular, and only the rows that were chosen at the design depend on each
+            other.
         owners: joints and drivers whose rows depend on each other, those that matter most first.
-        moves: bodies that move: velocity of a point of theirs [m] and angular velocity [rad], the largest number one.
+        moves: bodies that move: velocity of a point of theirs [m] and angular velocity [rad], the
+            largest number one.
     """
 
     lock_up: bool
@@ -65,22 +72,37 @@ class Singularity:
         """What is singular and what moves there, as a message says it after a place."""
         if self.regular:
             return (
-                f"smallest singular value {self.sigma:.3g} of the rows that were chosen at the design position, of "
-                f"{listed(self.owners)}, and {self.of_all:.3g} of all rows: the mechanism is regular there; it has more rows than "
-                "it needs; let the design be nearer, or have joints that constrain nothing twice (kincheck explain names the rows)"
+                f"smallest singular value {self.sigma:.3g} of the rows that were chosen at the"
+                f" design position, of {listed(self.owners)}, and {self.of_all:.3g} of all rows:"
+                " the mechanism is regular there; it has more rows than it needs; let the design"
+                " be nearer, or have joints that constrain nothing twice (kincheck explain names"
+                " the rows)"
             )
-        what = "a driver's row depends on the joints'" if self.lock_up else "rows of joints depend on each other"
-        how = [f"{body} {'turns' if any(turn) else 'moves'}" for body, (_, turn) in self.moves.items()]
+        what = (
+            "a driver's row depends on the joints'"
+            if self.lock_up
+            else "rows of joints depend on each other"
+        )
+        how = [
+            f"{body} {'turns' if any(turn) else 'moves'}" for body, (_, turn) in self.moves.items()
+        ]
         return (
-            f"smallest singular value {self.sigma:.3g}: {what} ({self.kind}), of {listed(self.owners)}; free to first order with "
-            f"the drivers held: {listed(how)}"
+            f"smallest singular value {self.sigma:.3g}: {what} ({self.kind}), of"
+            f" {listed(self.owners)}; free to first order with the drivers held: {listed(how)}"
         )
 
     @property
     def facts(self) -> dict[str, Any]:
         """The same as a record has it."""
-        direction = {body: {"moves": list(v), "turns": list(w)} for body, (v, w) in self.moves.items()}
-        return {"kind": self.kind, "smallest_singular_value": self.sigma, "rows_of": list(self.owners), "direction": direction}
+        direction = {
+            body: {"moves": list(v), "turns": list(w)} for body, (v, w) in self.moves.items()
+        }
+        return {
+            "kind": self.kind,
+            "smallest_singular_value": self.sigma,
+            "rows_of": list(self.owners),
+            "direction": direction,
+        }
 
 
 def listed(names: Sequence[str]) -> str:
@@ -110,13 +132,21 @@ def examine(system: System, state: Array, sample: Array) -> Singularity:
 
 def _shares(weights: Mapping[str, float]) -> list[str]:
     least = SHARE * max(weights.values())
-    return sorted((name for name, weight in weights.items() if weight >= least), key=lambda name: -weights[name])
+    return sorted(
+        (name for name, weight in weights.items() if weight >= least),
+        key=lambda name: -weights[name],
+    )
 
 
-def _moves(system: System, state: Array, z: Array) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
+def _moves(
+    system: System, state: Array, z: Array
+) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
     """Bodies by name, those that move most first; shares that are not worth a name are zero."""
     unit = system.model.frame.unit
-    rates = {name: (np.array([*twist.v]), np.array([*twist.w])) for name, twist in system.twists(state, z).items()}
+    rates = {
+        name: (np.array([*twist.v]), np.array([*twist.w]))
+        for name, twist in system.twists(state, z).items()
+    }
     sizes = {name: float(max(np.abs(v).max(), np.abs(w).max())) for name, (v, w) in rates.items()}
     largest = max(sizes.values())
 
@@ -124,18 +154,22 @@ def _moves(system: System, state: Array, z: Array) -> dict[str, tuple[tuple[floa
         kept = np.where(np.abs(x) >= SHARE * largest, x / largest * factor, 0.0)
         return tuple(float(each) for each in kept)
 
-    return {name: (share(rates[name][0], unit), share(rates[name][1], 1.0)) for name in _shares(sizes)}
+    return {
+        name: (share(rates[name][0], unit), share(rates[name][1], 1.0)) for name in _shares(sizes)
+    }
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Poses solved by orthogonal factors (singular value decomposition), as closely as the numbers allow.
+    """Poses solved by orthogonal factors (singular value decomposition), as closely as the numbers
+    allow.
 
     Attributes:
         state: shape (numbers, m).
         rate, rate_t: of the unknowns, shape (m, n).
         sigma: smallest singular value, shape (m,).
-        error: bounds of the errors of poses [units, rad], of rates and of their rates (both relative to the largest), shape (3, m).
+        error: bounds of the errors of poses [units, rad], of rates and of their rates (both
+            relative to the largest), shape (3, m).
     """
 
     state: Array
@@ -147,24 +181,31 @@ class Solved:
 
 # Steps of size EPSILON ** (1/3) lose as much to rounding as to curvature in a central difference.
 DIFFERENCE = EPSILON ** (1.0 / 3.0)
-# Each of Newton's steps at least halves the distance to a solution, whatever its multiplicity; five halvings more than from a
-# sample's residual tolerance (1e-6 of an angle at a dead centre) to where rounding ends it are enough.
+# Each of Newton's steps at least halves the distance to a solution, whatever its multiplicity; five
+# halvings more than from a sample's residual tolerance (1e-6 of an angle at a dead centre) to where
+# rounding ends it are enough.
 POLISH = 12
 
 
 def smallest_singular_values(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
-    """Return the smallest singular values of the kept rows at m states, and of all rows; shape (m,) each."""
+    """Return the smallest singular values of the kept rows at m states, and of all rows; shape (m,)
+    each.
+    """
     found = system.equations(state, sample)
     every = np.concatenate([found.jacobian, found.redundant], axis=1)
-    kept, of_all = (np.linalg.svd(_finite(rows), compute_uv=False)[:, -1].astype(np.float64) for rows in (found.jacobian, every))
+    kept, of_all = (
+        np.linalg.svd(_finite(rows), compute_uv=False)[:, -1].astype(np.float64)
+        for rows in (found.jacobian, every)
+    )
     return kept, of_all
 
 
 def solve_closely(system: System, state: Array, sample: Array) -> Solved:
-    """Poses near states, iterated until their residuals get no smaller; and how wrong they may still be.
+    """Poses near states, iterated until their residuals get no smaller; and how wrong they may
+    still be.
 
-    Residuals of rows of size one are known to EPSILON; along z that is EPSILON / sigma of the pose. What such an error does to the
-    rates is found by differences along z.
+    Residuals of rows of size one are known to EPSILON; along z that is EPSILON / sigma of the pose.
+    What such an error does to the rates is found by differences along z.
     """
     best, closure = state, np.full(state.shape[1], np.inf)
     for _ in range(POLISH):
@@ -178,13 +219,21 @@ def solve_closely(system: System, state: Array, sample: Array) -> Solved:
     rate, rate_t = _rates(system, best, sample)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         error = np.maximum(closure, EPSILON) / sigma[:, -1]
-        ahead, behind = (_rates(system, system.stepped(best, h * z[:, -1]), sample) for h in (DIFFERENCE, -DIFFERENCE))
+        ahead, behind = (
+            _rates(system, system.stepped(best, h * z[:, -1]), sample)
+            for h in (DIFFERENCE, -DIFFERENCE)
+        )
         part = error / (2.0 * DIFFERENCE)
         speed = np.abs(rate).max(axis=1)
         changes = [np.abs(a - b).max(axis=1) for a, b in zip(ahead, behind, strict=True)]
         scales = [speed, np.maximum(np.abs(rate_t).max(axis=1), speed**2)]
-        relative = [np.where(change == 0.0, 0.0, part * change / scale) for change, scale in zip(changes, scales, strict=True)]
-    return Solved(best, rate, rate_t, sigma[:, -1], np.nan_to_num(np.array([error, *relative]), nan=np.inf))
+        relative = [
+            np.where(change == 0.0, 0.0, part * change / scale)
+            for change, scale in zip(changes, scales, strict=True)
+        ]
+    return Solved(
+        best, rate, rate_t, sigma[:, -1], np.nan_to_num(np.array([error, *relative]), nan=np.inf)
+    )
 
 
 def _rates(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
@@ -194,7 +243,9 @@ def _rates(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
 
 
 def _solved(jacobian: Array, b: Array) -> Array:
-    """The least solution by singular values, those of no more than rounding left out; NaN where anything is not finite."""
+    """The least solution by singular values, those of no more than rounding left out; NaN where
+    anything is not finite.
+    """
     y, sigma, z = np.linalg.svd(_finite(jacobian))
     kept: NDArray[np.bool_] = sigma > jacobian.shape[1] * EPSILON * sigma[:, :1]
     inverse = np.where(kept, 1.0 / np.where(kept, sigma, 1.0), 0.0)

@@ -1,4 +1,6 @@
-"""Run a compiled model along a path: the march, a closer look at what is doubtful, and the motions of points and bodies."""
+"""Run a compiled model along a path: the march, a closer look at what is doubtful, and the motions
+of points and bodies.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,13 @@ def follow(route: Route, tol: float) -> Trajectory:
     if route.single:
         return _follow(route, tol)
     compare = math.isfinite(tol)  # else nothing is asked of the samples
-    return by_ways(route.begin, route.model.mechanism, route.path, lambda start: _follow(route.by(start), tol), compare=compare)
+    return by_ways(
+        route.begin,
+        route.model.mechanism,
+        route.path,
+        lambda start: _follow(route.by(start), tol),
+        compare=compare,
+    )
 
 
 def _follow(route: Route, tol: float) -> Trajectory:
@@ -43,7 +51,9 @@ def _follow(route: Route, tol: float) -> Trajectory:
         from .singular_samples import scrutinise  # rarely needed
 
         scrutiny = scrutinise(route, found, tol)
-        closure, leftover, sigma = _worst(found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved])
+        closure, leftover, sigma = _worst(
+            found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved]
+        )
         message, findings = "; ".join(scrutiny.messages), scrutiny.details
     if not (found.solved.any() if message else found.solved.size):
         closure = leftover = sigma = math.nan
@@ -51,7 +61,9 @@ def _follow(route: Route, tol: float) -> Trajectory:
     return Trajectory(
         points=Motions(PointMotion, table, model.of_points),
         solved=found.solved,
-        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(np.int64),
+        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(
+            np.int64
+        ),
         residual=closure * unit,
         message=message,
         details={
@@ -65,6 +77,8 @@ def _follow(route: Route, tol: float) -> Trajectory:
 
 
 def _worst(tests: Array) -> tuple[float, float, float]:
-    """The largest residuals of kept and redundant rows, and the smallest estimate of sigma; rows from "closure" to `SIGMA`."""
+    """The largest residuals of kept and redundant rows, and the smallest estimate of sigma; rows
+    from "closure" to `SIGMA`.
+    """
     closure, leftover = np.maximum.reduce(tests[:2], axis=1, initial=0.0).tolist()
     return closure, leftover, float(np.minimum.reduce(tests[-1], initial=1.0))

@@ -1,4 +1,6 @@
-"""Trace a mechanism along the length of its motion, with the driver's value as an outcome: through limit points and beyond."""
+"""Trace a mechanism along the length of its motion, with the driver's value as an outcome: through
+limit points and beyond.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ from .curve_start import Beginning
 from .pseudo_arclength import NODE, ArclengthWalk, Beside, Spot
 from .singularity import Singularity, examine
 
-# A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be cheap, near enough to be drawn.
+# A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be
+# cheap, near enough to be drawn.
 LONGEST = 0.05
 
 
@@ -44,7 +47,9 @@ class Event:
 
     @property
     def kind(self) -> str:
-        """A limit point is where the driver locks up and turns back; at a branch point the motion may go on in several ways."""
+        """A limit point is where the driver locks up and turns back; at a branch point the motion
+        may go on in several ways.
+        """
         return "limit point" if self.singularity.lock_up else "branch point"
 
 
@@ -54,10 +59,12 @@ class Curve:
 
     Attributes:
         driver: its name.
-        arc: length from the design position, falling from zero where the curve was traced backwards, shape (n,). The length of a
-            step is that of all unknowns: displacements in units of the mechanism's size, turns in radians.
+        arc: length from the design position, falling from zero where the curve was traced
+            backwards, shape (n,). The length of a step is that of all unknowns: displacements in
+            units of the mechanism's size, turns in radians.
         values: of the driver, from its design value [m or rad], shape (n,).
-        sigma: smallest singular value of the rows, drivers included: how near a singular pose is [-], shape (n,).
+        sigma: smallest singular value of the rows, drivers included: how near a singular pose is
+            [-], shape (n,).
         points: position by name [m], shape (n, 3).
         events: limit points and branch points, in order.
         closed: whether it came back to the design position, which then is the last pose too.
@@ -103,12 +110,14 @@ def trace(
     tol: float = 1e-12,
     style: str = "native",
 ) -> Curve:
-    """Trace the motion from the design position, whatever the driver does on the way; further drivers hold their design value.
+    """Trace the motion from the design position, whatever the driver does on the way; further
+    drivers hold their design value.
 
     Args:
         mechanism: what to trace.
         driver: whose value is given along the curve.
-        length: to trace [units of the mechanism's size, rad]; it ends before where it is back at the design position.
+        length: to trace [units of the mechanism's size, rad]; it ends before where it is back at
+            the design position.
         direction: 1 to start with the driver's value growing, -1 with it falling.
         points: names of the points whose positions are wanted; all of them unless given.
         longest: step.
@@ -116,14 +125,17 @@ def trace(
         style: how the rows are written, as for `solve`.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the design position, or an
-            argument makes no sense.
+        SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the
+            design position, or an argument makes no sense.
     """
     if driver not in (drivers := [each.name for each in mechanism.drivers]):
         require_driven(mechanism)
         raise no_such("trace", "driver", driver, drivers)
     if direction not in (1, -1):
-        raise SolveError(f"trace: direction is {direction}, expected 1 (the driver's value grows) or -1 (it falls)")
+        raise SolveError(
+            f"trace: direction is {direction}, expected 1 (the driver's value grows) or -1 (it"
+            " falls)"
+        )
     for name, given in (("length", length), ("longest", longest), ("tol", tol)):
         require_positive("trace", name, given)
     there = [point.name for point in mechanism.points]
@@ -135,21 +147,29 @@ def trace(
     model = compile_model(mechanism, request)
     system = System(model)
     walk = ArclengthWalk(system, Path({driver: Ramp(1.0)}, np.zeros(1)), tol)
-    trail = _walked(walk, walk.begin(system.state(model.design[:, None], ahead=""), 0.0, direction), length, longest)
+    trail = _walked(
+        walk,
+        walk.begin(system.state(model.design[:, None], ahead=""), 0.0, direction),
+        length,
+        longest,
+    )
     spots, reached = trail.spots, trail.spots[-1].arc
     message = (
         ""
         if trail.closed or reached >= length
         else (
-            f"ends at the length {reached:.6g} of {length:.6g}, {driver} = {spots[-1].time:.9g}: no pose is found ahead; "
-            f"smallest singular value of the rows without their driver {spots[-1].sigma:.3g}"
+            f"ends at the length {reached:.6g} of {length:.6g}, {driver} = {spots[-1].time:.9g}: no"
+            " pose is found ahead; smallest singular value of the rows without their driver"
+            f" {spots[-1].sigma:.3g}"
         )
     )
     return Curve(
         driver=driver,
         arc=direction * np.array([spot.arc for spot in spots]),
         values=np.array([spot.time for spot in spots]),
-        sigma=np.array([examine(system, spot.state, walk.sample(spot.time)).sigma for spot in spots]),
+        sigma=np.array(
+            [examine(system, spot.state, walk.sample(spot.time)).sigma for spot in spots]
+        ),
         points=_points(walk, spots),
         events=tuple(trail.events),
         closed=trail.closed,
@@ -157,8 +177,12 @@ def trace(
     )
 
 
-def limit_ahead(system: System, path: Path, state: Array, time: float, direction: int, tol: float) -> Event | None:
-    """The limit point that a pose of a path is close to, going on in a direction of time; None where there is none nearby."""
+def limit_ahead(
+    system: System, path: Path, state: Array, time: float, direction: int, tol: float
+) -> Event | None:
+    """The limit point that a pose of a path is close to, going on in a direction of time; None
+    where there is none nearby.
+    """
     walk = ArclengthWalk(system, path, tol)
     try:
         spot = walk.begin(state, time, direction)
@@ -170,10 +194,11 @@ def limit_ahead(system: System, path: Path, state: Array, time: float, direction
     return None
 
 
-# A march that fails is left this near [units of the mechanism's size, rad] to the limit point that stopped it, or it was something
-# else.
+# A march that fails is left this near [units of the mechanism's size, rad] to the limit point that
+# stopped it, or it was something else.
 NEARBY = 0.5
-# Ten times the steps that such a way takes; equations whose rows are wrong would have it creep on and on.
+# Ten times the steps that such a way takes; equations whose rows are wrong would have it creep on
+# and on.
 ATTEMPTS = 100
 
 
@@ -197,7 +222,9 @@ def _walked(walk: ArclengthWalk, first: Spot, length: float, longest: float) -> 
 
 
 def _turns_back(before: Spot, after: Spot) -> bool:
-    """Whether the driver's value is stationary between two spots; at a spot itself, before it or after it, and not twice."""
+    """Whether the driver's value is stationary between two spots; at a spot itself, before it or
+    after it, and not twice.
+    """
     return (before.dt < 0.0) != (after.dt < 0.0)
 
 
@@ -209,27 +236,44 @@ def _note_limit(walk: ArclengthWalk, trail: _Trail) -> None:
 
 
 def _note_branches(walk: ArclengthWalk, trail: _Trail) -> None:
-    """Add the branch points: sigma is least at a spot, or the determinant changes its sign beside it."""
+    """Add the branch points: sigma is least at a spot, or the determinant changes its sign beside
+    it.
+    """
     spots = _with_neighbours(walk, trail)
     for one, two, three in zip(spots, spots[1:], spots[2:], strict=False):
-        if two.sigma < min(one.sigma, three.sigma) or (two.sign != three.sign and two.sigma > three.sigma):
+        if two.sigma < min(one.sigma, three.sigma) or (
+            two.sign != three.sign and two.sigma > three.sigma
+        ):
             found = walk.branching(one, three)
-            if found is None or not trail.spots[0].arc <= (arc := found.arc % trail.length) <= trail.spots[-1].arc:
+            if (
+                found is None
+                or not trail.spots[0].arc
+                <= (arc := found.arc % trail.length)
+                <= trail.spots[-1].arc
+            ):
                 continue
             if any(_apart(arc, other.arc, trail.length) <= NODE for other in trail.events):
                 continue  # it is seen from both sides
-            turned = trail.spots[-1].time - trail.spots[0].time if found.arc > trail.spots[-1].arc else 0.0
+            turned = (
+                trail.spots[-1].time - trail.spots[0].time
+                if found.arc > trail.spots[-1].arc
+                else 0.0
+            )
             event = _event(walk, replace(found, arc=arc, time=found.time - turned))
             if not event.singularity.regular:
                 trail.events.append(event)
 
 
 def _with_neighbours(walk: ArclengthWalk, trail: _Trail) -> list[Spot]:
-    """Return the spots, and one before the first and after the last: a branch point is seen by the spots on both sides of it."""
+    """Return the spots, and one before the first and after the last: a branch point is seen by the
+    spots on both sides of it.
+    """
     first, last = trail.spots[0], trail.spots[-1]
     if trail.closed:
         after = trail.spots[1]
-        again = replace(after, arc=after.arc + trail.length, time=after.time + last.time - first.time)
+        again = replace(
+            after, arc=after.arc + trail.length, time=after.time + last.time - first.time
+        )
         return [*trail.spots, again]
     h = trail.spots[1].arc - first.arc if len(trail.spots) > 1 else NODE
     beside = walk.advance(first, -h), walk.advance(last, h)
@@ -244,7 +288,12 @@ def _apart(a: float, b: float, length: float) -> float:
 
 def _event(walk: ArclengthWalk, found: Beside) -> Event:
     spot = found.spot
-    return Event(found.arc, found.time, examine(walk.system, spot.state, walk.sample(spot.time)), _at(walk, spot))
+    return Event(
+        found.arc,
+        found.time,
+        examine(walk.system, spot.state, walk.sample(spot.time)),
+        _at(walk, spot),
+    )
 
 
 def _at(walk: ArclengthWalk, spot: Spot) -> dict[str, Array]:

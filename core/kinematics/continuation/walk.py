@@ -1,8 +1,9 @@
 """March from the design position outwards, along the samples of a path on both sides of it.
 
-The executor follows each side as far as sample after sample continues the motion. A step that fails is gone in parts, so a coarse
-grid costs steps: in equal ones, which the executor follows by itself, or else one by one, as long as may be. Where no part of a
-step succeeds the motion ends, and a message says where and why.
+The executor follows each side as far as sample after sample continues the motion. A step that fails
+is gone in parts, so a coarse grid costs steps: in equal ones, which the executor follows by itself,
+or else one by one, as long as may be. Where no part of a step succeeds the motion ends, and a
+message says where and why.
 """
 
 from __future__ import annotations
@@ -25,10 +26,12 @@ from ..compiled.samples import AS_THEY_ARE, Route
 from .failure_reasons import why_refused
 from .step_halving import AT_ONCE, LONGER, MOST_PARTS, TOO_MANY, part_of_step
 
-# A step that fails is gone in so many equal parts, or in more where that fails: each takes a tenth of a microsecond, and a hundred
-# where it is looked for by itself. They are kept ready for sweeps of up to so many parts: longer ones are seldom coarse.
+# A step that fails is gone in so many equal parts, or in more where that fails: each takes a tenth
+# of a microsecond, and a hundred where it is looked for by itself. They are kept ready for sweeps
+# of up to so many parts: longer ones are seldom coarse.
 FINER, ROOM = (8, 64, 512, 4096), 8192
-# So many steps are gone in parts before the next is tried whole; twice as many where that fails each time.
+# So many steps are gone in parts before the next is tried whole; twice as many where that fails
+# each time.
 FEW = 4
 
 
@@ -36,11 +39,14 @@ class March(NamedTuple):
     """What a march found, sample by sample in the order given.
 
     Attributes:
-        kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not reached.
-        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest estimate of sigma.
+        kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not
+            reached.
+        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest
+            estimate of sigma.
         solved: shape (n,).
         ends: one for each side that ended before its last sample.
-        visited: by sample, all slots of a lane that stands there and goes on from it; those asked for.
+        visited: by sample, all slots of a lane that stands there and goes on from it; those asked
+            for.
     """
 
     kept: Array
@@ -76,14 +82,24 @@ class End:
     divided: bool = False
 
 
-def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bool = False, low: float = 0.0) -> March:
-    """Solve a model at the samples of a path, from the design outwards; see `solve` for the tolerance.
+def march(
+    route: Route,
+    tol: float,
+    visit: Collection[int] = (),
+    *,
+    crossing: bool = False,
+    low: float = 0.0,
+) -> March:
+    """Solve a model at the samples of a path, from the design outwards; see `solve` for the
+    tolerance.
 
     Args:
         visit: samples at which the lane that stands there is wanted, and beyond which nothing is.
-        crossing: accept steps across singular poses, whatever is there, whole or not at all: parts of them end at the pose.
-        low: leave off at a step that fails where the smallest singular value is below this part of the largest that it has had,
-            if there are more rows than are solved: others may be better.
+        crossing: accept steps across singular poses, whatever is there, whole or not at all: parts
+            of them end at the pose.
+        low: leave off at a step that fails where the smallest singular value is below this part of
+            the largest that it has had, if there are more rows than are solved: others may be
+            better.
     """
     stands = route if route.stands else led(route, tol)
     if isinstance(stands, Route):
@@ -94,7 +110,9 @@ def march(route: Route, tol: float, visit: Collection[int] = (), *, crossing: bo
 
 
 def led(route: Route, tol: float) -> Route | End:
-    """Return the route from a lane that stands on its path, or where the straight way to there ends; kept with the route."""
+    """Return the route from a lane that stands on its path, or where the straight way to there
+    ends; kept with the route.
+    """
     return route if route.stands else route.bound(("led", tol), lambda: _led(route, tol))
 
 
@@ -108,8 +126,12 @@ def _led(route: Route, tol: float) -> Route | End:
 
 
 def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
-    """What goes along a route from its departure; kept with it, because binding takes as long as going."""
-    return route.bound((tol, crossing), lambda: Marcher(route, route.departure, accept_by(tol, crossing=crossing)))
+    """What goes along a route from its departure; kept with it, because binding takes as long as
+    going.
+    """
+    return route.bound(
+        (tol, crossing), lambda: Marcher(route, route.departure, accept_by(tol, crossing=crossing))
+    )
 
 
 def arrived(model: Model, lane: Array) -> Array:
@@ -128,7 +150,8 @@ def _columns(side: Side, at: int, stop: int) -> NDArray[np.intp]:
 
 
 class Grid:
-    """The samples of a route, bound to lanes of this thread, or as many more as make equal parts of the steps between them.
+    """The samples of a route, bound to lanes of this thread, or as many more as make equal parts of
+    the steps between them.
 
     Attributes:
         parts: how many.
@@ -139,7 +162,9 @@ class Grid:
     def __init__(self, route: Route, departure: Array, parts: int) -> None:
         self.parts, self.ends = parts, route.ends(parts)
         self.sides = route.sides if parts == 1 else route.divided(parts)
-        self.track = route.model.executor(route.lanes).track(self.sides, departure[route.model.ahead], parts * len(self.ends))
+        self.track = route.model.executor(route.lanes).track(
+            self.sides, departure[route.model.ahead], parts * len(self.ends)
+        )
 
     @cached_property
     def kept(self) -> Array:
@@ -160,7 +185,9 @@ class Marcher:
         self.track = self.grid.track
         self.counts = [side.count for side in self.grid.sides]
         self._finer: list[Grid] = []
-        self.sigmas = [self.model.ahead.index(self.slots[FROM + name]) for name in (SIGMA, LARGEST_SIGMA)]
+        self.sigmas = [
+            self.model.ahead.index(self.slots[FROM + name]) for name in (SIGMA, LARGEST_SIGMA)
+        ]
 
     def finer(self) -> Iterator[Grid]:
         """Grids of parts of the steps; each is made when it is first needed."""
@@ -172,14 +199,18 @@ class Marcher:
     def run(self, visit: Collection[int] = (), low: float = 0.0) -> March:
         """See `march`."""
         if self.model.geometry:  # the lanes know their variant
-            self.route.model.executor(self.route.lanes).put(range(len(self.departure)), self.departure[:, None])
+            self.route.model.executor(self.route.lanes).put(
+                range(len(self.departure)), self.departure[:, None]
+            )
         self.kept, self.solved = self.track.begin(), self.every.copy()
         self.visit, self.visited = visit, dict[int, Array]()
         self.low = low if self.model.selection.dropped else 0.0
         reached = [0] * len(self.counts) if visit else self.track.run()
         ends: list[End] = []
         if reached != self.counts:
-            ends = [end for side, at in enumerate(reached) if (end := self._side(side, at)) is not None]
+            ends = [
+                end for side, at in enumerate(reached) if (end := self._side(side, at)) is not None
+            ]
         kept, solved, back = self.kept, self.solved, self.route.back
         del self.kept, self.solved  # they are whose they are given to
         if back is not AS_THEY_ARE:
@@ -187,7 +218,9 @@ class Marcher:
         return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
 
     def _side(self, number: int, at: int) -> End | None:
-        """Follow one side, which came so far, to its last sample; None, or where and why it ends before."""
+        """Follow one side, which came so far, to its last sample; None, or where and why it ends
+        before.
+        """
         side, anew = self.grid.sides[number], True
         for stop in self._stops(side) if self.visit else [side.count]:
             if self.visit:
@@ -199,14 +232,27 @@ class Marcher:
                     at, few = self._in_parts(number, at, min(at + few, stop)), 2 * few
                 if at == came:
                     anchor, wanted = self._anchor(number), float(side.samples[0, at])
-                    further = "" if early else TOO_MANY if divided == MOST_PARTS else self._divide(anchor, wanted, length)
+                    further = (
+                        ""
+                        if early
+                        else (
+                            TOO_MANY
+                            if divided == MOST_PARTS
+                            else self._divide(anchor, wanted, length)
+                        )
+                    )
                     if isinstance(further, str):
                         columns = _columns(side, at, side.count)
                         self.kept[:, columns], self.solved[columns] = np.nan, False
                         said = self._end(side, at, anchor, further)
-                        return End(said, self.route, anchor, wanted, early, divided=further is TOO_MANY)
+                        return End(
+                            said, self.route, anchor, wanted, early, divided=further is TOO_MANY
+                        )
                     self.track.anchors[number] = further[self.model.ahead]
-                    divided, length = divided + 1, LONGER * abs(self._stands(further) - self._stands(anchor))
+                    divided, length = (
+                        divided + 1,
+                        LONGER * abs(self._stands(further) - self._stands(anchor)),
+                    )
                 beyond, at = at, self.track.follow(number, at, stop, anew=False)
                 few = FEW if at - beyond > few else few
                 divided, length = (0, math.inf) if at > came else (divided, length)
@@ -220,7 +266,9 @@ class Marcher:
         return self.crossing or bool(sigma < self.low * largest)
 
     def _in_parts(self, number: int, at: int, stop: int) -> int:
-        """Go on in equal parts of steps, and in more to the end of one that fails; how many samples have passed then."""
+        """Go on in equal parts of steps, and in more to the end of one that fails; how many samples
+        have passed then.
+        """
         anchors, passed, before = self.track.anchors, at, 1
         for grid in self.finer():
             kept, parts = grid.kept, grid.parts
@@ -243,7 +291,11 @@ class Marcher:
         for k, slot in enumerate([*plan.largest, *plan.smallest]):
             if slot in plan.kept:
                 values = self.kept[plan.kept.index(slot), columns]
-                worst[k] = max(worst[k], values.max()) if k < len(plan.largest) else min(worst[k], values.min())
+                worst[k] = (
+                    max(worst[k], values.max())
+                    if k < len(plan.largest)
+                    else min(worst[k], values.min())
+                )
 
     def _anchor(self, number: int) -> Array:
         """All slots of a lane where the motion stands on a side."""
@@ -268,7 +320,9 @@ class Marcher:
             self.visited[sample] = self._anchor(number)
 
     def _divide(self, anchor: Array, aim: float, length: float) -> Array | str:
-        """Go a part of a step, no longer than a length: the lane there, or why the shortest is refused."""
+        """Go a part of a step, no longer than a length: the lane there, or why the shortest is
+        refused.
+        """
         parts, every = self.model.executor(AT_ONCE), range(len(self.slots))
 
         def attempt(times: Array) -> Array:
@@ -280,11 +334,19 @@ class Marcher:
         part = part_of_step(self._stands(anchor), aim, attempt, AT_ONCE, length)
         lanes = parts.get(every)
         if part is None:
-            return why_refused(self.model, lanes[:, np.flatnonzero(~(lanes[self.slots[MARGIN]] > 0.0))[-1]])
+            return why_refused(
+                self.model, lanes[:, np.flatnonzero(~(lanes[self.slots[MARGIN]] > 0.0))[-1]]
+            )
         return self.model.departing(lanes[:, part[0]], lanes[self.model.sampled, part[0]])
 
     def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
-        sigma, last = float(anchor[self.slots[FROM + SIGMA]]), float(side.samples[0, at - 1]) if at else None
+        sigma, last = (
+            float(anchor[self.slots[FROM + SIGMA]]),
+            float(side.samples[0, at - 1]) if at else None,
+        )
         if reason is not TOO_MANY:
-            reason += f"; smallest singular value there about {sigma:.3g} (zero at a lock-up or dead centre)"
+            reason += (
+                f"; smallest singular value there about {sigma:.3g} (zero at a lock-up or dead"
+                " centre)"
+            )
         return self.route.path.ended(self._stands(anchor), float(side.samples[0, at]), last, reason)

@@ -1,12 +1,15 @@
-"""How well the equations determine the motion, sample by sample, and how what is read from it depends on them and on hardpoints.
+"""How well the equations determine the motion, sample by sample, and how what is read from it
+depends on them and on hardpoints.
 
-With J the solved rows and phi their residuals at a pose that closes, q the unknowns and g the numbers of the geometry,
+With J the solved rows and phi their residuals at a pose that closes, q the unknowns and g the
+numbers of the geometry,
 
     dq = J^-1 d(residual)          what residuals left over by a solver shift the pose by
     dq = -J^-1 (d phi / dg) dg     what a hardpoint placed elsewhere shifts it by, drivers held
 
-so both are one factorisation and no neighbouring design is solved; d phi / dg is exact (see `slope`). A redundant row that is left
-out of J need not hold for the changed geometry: its residual then says how much that geometry would contradict itself.
+so both are one factorisation and no neighbouring design is solved; d phi / dg is exact (see
+`slope`). A redundant row that is left out of J need not hold for the changed geometry: its residual
+then says how much that geometry would contradict itself.
 """
 
 from __future__ import annotations
@@ -63,12 +66,15 @@ class PoseConditioning:
 
     Attributes:
         value: of the swept driver or time, as the sweep has it.
-        owners: joint or driver and primitive of each solved row: where those chosen at design are worse than need be, others are.
+        owners: joint or driver and primitive of each solved row: where those chosen at design are
+            worse than need be, others are.
         smallest, largest: singular values of the solved rows, lengths in mechanism sizes.
-        orientation: sign of their determinant, against that at design; of all rows if there are more, followed from pose to pose.
+        orientation: sign of their determinant, against that at design; of all rows if there are
+            more, followed from pose to pose.
         direction: the motion that the rows determine least.
         points: gradients by point.
-        contradicted: by how much each redundant row would not hold, by the numbers of the places, shape (redundant rows, numbers).
+        contradicted: by how much each redundant row would not hold, by the numbers of the places,
+            shape (redundant rows, numbers).
     """
 
     value: float
@@ -93,7 +99,8 @@ class Conditioning:
     Attributes:
         trajectory: of the whole sweep, with its message where it cannot be followed.
         poses: at the samples that were looked at; those not reached are left out.
-        numbers: place and component of each number of the geometry, and the length of its vector for a direction, else 1.
+        numbers: place and component of each number of the geometry, and the length of its vector
+            for a direction, else 1.
     """
 
     trajectory: Trajectory
@@ -102,7 +109,13 @@ class Conditioning:
 
 
 def conditioning(
-    mechanism: Mechanism, path: Path, values: Array, points: Sequence[str], varied: Sequence[str], samples: int, tol: float
+    mechanism: Mechanism,
+    path: Path,
+    values: Array,
+    points: Sequence[str],
+    varied: Sequence[str],
+    samples: int,
+    tol: float,
 ) -> Conditioning:
     """Look at up to so many samples of a path, both ends and the one nearest to design among them.
 
@@ -120,7 +133,9 @@ def conditioning(
     frame = model.frame
     drive = path.drive(drivers, path.times)[0]
     reached = np.flatnonzero(found.solved)
-    at = {int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()}
+    at = {
+        int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()
+    }
     at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
     geometry = _Geometry(mechanism, varied)
     elsewhere = placed(mechanism, geometry.slopes)
@@ -130,17 +145,27 @@ def conditioning(
         change = dict(zip(drivers, drive[:, k].tolist(), strict=True))
         drives = standing_drives(mechanism, frame.unit, change)
         formulation = Cartesian.of(mechanism, frame, drives)
-        pose = displaced(mechanism, frame, {name: (found.bodies[name].r[k], found.bodies[name].p[k]) for name in bodies})
-        configuration = formulation.configuration(_floats(state_of(formulation, mechanism, frame, pose, change)))
+        pose = displaced(
+            mechanism,
+            frame,
+            {name: (found.bodies[name].r[k], found.bodies[name].p[k]) for name in bodies},
+        )
+        configuration = formulation.configuration(
+            _floats(state_of(formulation, mechanism, frame, pose, change))
+        )
         matrix = jacobian(formulation, configuration)
         matrices.append(matrix)
-        kept = list(chosen(matrix, [model.selection.chosen], len(mechanism.drivers), formulation.conditions))
+        kept = list(
+            chosen(matrix, [model.selection.chosen], len(mechanism.drivers), formulation.conditions)
+        )
         dropped = [row for row in range(len(matrix)) if row not in kept]
         solved, rest = matrix[kept], matrix[dropped]
         U, sizes, V = np.linalg.svd(solved)
         inverse = (V.T / sizes) @ U.T
         metres = inverse / np.where(_is_length(formulation, solved), frame.unit, 1.0)
-        phi = Cartesian.of(elsewhere, frame, _held(mechanism, elsewhere, drives, frame)).phi(configuration)
+        phi = Cartesian.of(elsewhere, frame, _held(mechanism, elsewhere, drives, frame)).phi(
+            configuration
+        )
         by_geometry = np.array([geometry.derivatives_of(x) for x in phi])
         shift = -inverse @ by_geometry[kept]
         dependence = _Dependence(formulation, configuration, frame, metres, shift)
@@ -159,20 +184,33 @@ def conditioning(
     still = Cartesian.of(mechanism, frame)
     nearest = int(np.abs(path.times[seen]).argmin()) if seen else 0
     turned = _orientations(matrices, jacobian(still), nearest)
-    return Conditioning(found, [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)], geometry.numbers)
+    return Conditioning(
+        found,
+        [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)],
+        geometry.numbers,
+    )
 
 
-def _held(mechanism: Mechanism, elsewhere: Mechanism, drives: Mapping[str, Drive], frame: Frames) -> dict[str, Drive]:
-    """Drives whose values stay where the geometry changes: from the design, which goes elsewhere, an absolute one is another."""
-    shift = {name: (elsewhere.design_value(name) - mechanism.design_value(name)) * (1.0 / frame.unit) for name in drives}
+def _held(
+    mechanism: Mechanism, elsewhere: Mechanism, drives: Mapping[str, Drive], frame: Frames
+) -> dict[str, Drive]:
+    """Drives whose values stay where the geometry changes: from the design, which goes elsewhere,
+    an absolute one is another.
+    """
+    shift = {
+        name: (elsewhere.design_value(name) - mechanism.design_value(name)) * (1.0 / frame.unit)
+        for name in drives
+    }
     return {name: replace(drive, c=drive.c - shift[name]) for name, drive in drives.items()}
 
 
 def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> list[float]:
-    """Signs of determinants against that at design, from pose to pose, beginning at the one nearest to design.
+    """Signs of determinants against that at design, from pose to pose, beginning at the one nearest
+    to design.
 
-    Of a tall matrix there is none, but of the product A^T B of two that are near each other: it is the sum over all choices of rows
-    of the products of their determinants, and of square ones the product itself.
+    Of a tall matrix there is none, but of the product A^T B of two that are near each other: it is
+    the sum over all choices of rows of the products of their determinants, and of square ones the
+    product itself.
     """
     found, n = np.ones(len(matrices)), len(matrices)
     for way in (range(nearest, n), range(nearest, -1, -1)):
@@ -207,13 +245,25 @@ class _Geometry:
         every, holds = places(mechanism), kinds(mechanism)
         values = {place: every[place] for place in varied}
         # a derivative by the components of a direction becomes one by its angle
-        lengths = {place: math.hypot(*value) for place, value in values.items() if holds[place] is Kind.DIRECTION}
-        self.numbers = [(place, k, lengths.get(place, 1.0)) for place, value in values.items() for k in range(len(value))]
+        lengths = {
+            place: math.hypot(*value)
+            for place, value in values.items()
+            if holds[place] is Kind.DIRECTION
+        }
+        self.numbers = [
+            (place, k, lengths.get(place, 1.0))
+            for place, value in values.items()
+            for k in range(len(value))
+        ]
         rows = iter(np.eye(len(self.numbers)))
-        self.slopes = {place: tuple(Slope(x, next(rows)) for x in value) for place, value in values.items()}
+        self.slopes = {
+            place: tuple(Slope(x, next(rows)) for x in value) for place, value in values.items()
+        }
 
     def derivatives_of(self, x: Any) -> Array:
-        """Return the derivatives of a number by all numbers of the places, shape (numbers,); zero where it depends on none."""
+        """Return the derivatives of a number by all numbers of the places, shape (numbers,); zero
+        where it depends on none.
+        """
         return np.broadcast_to(derivatives(x), (len(self.numbers),))
 
 
@@ -222,8 +272,10 @@ class _Dependence:
     """What the unknowns at a sample owe to residuals and to geometry.
 
     Attributes:
-        by_residuals: derivatives of the unknowns by the residuals of the solved rows [m or rad], shape (unknowns, rows).
-        by_geometry: derivatives of the unknowns by the numbers of the places, shape (unknowns, numbers).
+        by_residuals: derivatives of the unknowns by the residuals of the solved rows [m or rad],
+            shape (unknowns, rows).
+        by_geometry: derivatives of the unknowns by the numbers of the places, shape (unknowns,
+            numbers).
     """
 
     formulation: Cartesian
@@ -234,7 +286,10 @@ class _Dependence:
 
     def gradient(self, point: Point, geometry: _Geometry) -> Gradient:
         """How the position of a point depends on both."""
-        pose, arm = self.at.poses.get(point.body, GROUND_POSE), self.frame.arm(point.body, point.position)
+        pose, arm = (
+            self.at.poses.get(point.body, GROUND_POSE),
+            self.frame.arm(point.body, point.position),
+        )
         turned = pose.turn(arm)
         by_unknowns = np.zeros((3, self.formulation.unknowns))
         if point.body in self.formulation.columns:
@@ -247,5 +302,14 @@ class _Dependence:
         # the body carries its point along: A times the change of where it is at design
         design = np.array([geometry.derivatives_of(x) for x in moved])
         along = np.array([geometry.derivatives_of(x) for x in pose.turn(moved)])
-        here, there = np.array([*position_of(point.position, arm, self.frame.unit, pose)]), np.array(point.position)
-        return Gradient(here, there, by_unknowns @ self.by_residuals, by_unknowns @ self.by_geometry + along, design)
+        here, there = (
+            np.array([*position_of(point.position, arm, self.frame.unit, pose)]),
+            np.array(point.position),
+        )
+        return Gradient(
+            here,
+            there,
+            by_unknowns @ self.by_residuals,
+            by_unknowns @ self.by_geometry + along,
+            design,
+        )

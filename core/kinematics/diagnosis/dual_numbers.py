@@ -1,8 +1,8 @@
 """Slopes: a number with its derivatives by many parameters at once, for geometry that is varied.
 
-A joint chooses its auxiliary axes by comparing components; here the value decides, as it does for the plain number, so the rows
-keep the axes they have and their derivatives are exact. Differences between neighbouring designs would jump where the
-choice changes.
+A joint chooses its auxiliary axes by comparing components; here the value decides, as it does for
+the plain number, so the rows keep the axes they have and their derivatives are exact. Differences
+between neighbouring designs would jump where the choice changes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ class Slope:
     d: Array
 
     def __add__(self, b: Any) -> Slope:
-        return Slope(self.x + b.x, self.d + b.d) if isinstance(b, Slope) else Slope(self.x + b, self.d)
+        return (
+            Slope(self.x + b.x, self.d + b.d) if isinstance(b, Slope) else Slope(self.x + b, self.d)
+        )
 
     __radd__ = __add__
 
@@ -40,7 +42,11 @@ class Slope:
     def __mul__(self, b: Any) -> Slope:
         if isinstance(b, Vec3):
             return NotImplemented
-        return Slope(self.x * b.x, self.d * b.x + self.x * b.d) if isinstance(b, Slope) else Slope(self.x * b, self.d * b)
+        return (
+            Slope(self.x * b.x, self.d * b.x + self.x * b.d)
+            if isinstance(b, Slope)
+            else Slope(self.x * b, self.d * b)
+        )
 
     __rmul__ = __mul__
 

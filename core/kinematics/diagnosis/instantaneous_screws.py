@@ -1,4 +1,6 @@
-"""Motions in words: how each body moves at given rates of the unknowns, as a turn about an axis, a screw or a shift."""
+"""Motions in words: how each body moves at given rates of the unknowns, as a turn about an axis, a
+screw or a shift.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,11 @@ from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.formulation import Configuration, Formulation
 
-# Parts of a motion below this share of its largest are left out: round-off of a null vector is far below, what moves is above.
+# Parts of a motion below this share of its largest are left out: round-off of a null vector is far
+# below, what moves is above.
 STILL = 1e-6
-# Components below this [- or m] are printed as zero: they are round-off, of which a reader would see a direction askew.
+# Components below this [- or m] are printed as zero: they are round-off, of which a reader would
+# see a direction askew.
 ROUND_OFF = 1e-9
 
 
@@ -49,14 +53,19 @@ class Screw:
 
 
 def screws(formulation: Formulation, at: Configuration, frame: Frames, rates: Array) -> list[Screw]:
-    """The motion of each body that moves at the rates of the unknowns, shape (unknowns,), the fastest first.
+    """The motion of each body that moves at the rates of the unknowns, shape (unknowns,), the
+    fastest first.
 
-    Rates may be taken either way: the fastest body's axis points along x, y or z rather than against it.
+    Rates may be taken either way: the fastest body's axis points along x, y or z rather than
+    against it.
     """
     twists = formulation.twists(at, rates.tolist())
     speeds = {name: max(_size(twist.v), _size(twist.w)) for name, twist in twists.items()}
     fastest = max(speeds.values(), default=0.0)
-    moving = sorted((name for name, speed in speeds.items() if speed > STILL * fastest), key=lambda name: -speeds[name])
+    moving = sorted(
+        (name for name, speed in speeds.items() if speed > STILL * fastest),
+        key=lambda name: -speeds[name],
+    )
     if moving:
         first = twists[moving[0]]
         leading = max([*(first.w if _size(first.w) > STILL * fastest else first.v)], key=abs)
@@ -65,10 +74,11 @@ def screws(formulation: Formulation, at: Configuration, frame: Frames, rates: Ar
 
 
 def free_motions(matrix: Array) -> Array:
-    """A basis of the null space of a matrix, shape (motions, columns), in which each motion has as few bodies as can be.
+    """A basis of the null space of a matrix, shape (motions, columns), in which each motion has as
+    few bodies as can be.
 
-    The orthonormal basis mixes motions that have nothing to do with each other; reduced to echelon form, each has a column of its
-    own, and a rod that spins is seen to spin alone.
+    The orthonormal basis mixes motions that have nothing to do with each other; reduced to echelon
+    form, each has a column of its own, and a rod that spins is seen to spin alone.
     """
     from ..structure.redundancy import RANK_TOLERANCE
 
@@ -96,11 +106,19 @@ def _screw(name: str, twist: Twist, at: Configuration, frame: Frames, fastest: f
     turn = _size(w)
     if turn <= STILL:
         size = _size(v)
-        return Screw(name, 0.0, _tuple((1.0 / size) * v), _tuple(frame.unit * origin), frame.unit * size)
+        return Screw(
+            name, 0.0, _tuple((1.0 / size) * v), _tuple(frame.unit * origin), frame.unit * size
+        )
     axis = (1.0 / turn) * w
     foot = origin + (1.0 / (turn * turn)) * cross(w, v)
     along = axis @ v
-    return Screw(name, turn, _tuple(axis), _tuple(frame.unit * foot), frame.unit * along if abs(along) > STILL else 0.0)
+    return Screw(
+        name,
+        turn,
+        _tuple(axis),
+        _tuple(frame.unit * foot),
+        frame.unit * along if abs(along) > STILL else 0.0,
+    )
 
 
 def _size(a: Vec3) -> float:

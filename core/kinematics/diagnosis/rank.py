@@ -1,8 +1,9 @@
-"""Which rows say what others say, which contradict each other and by how much, and what is left free: by name, at the design.
+"""Which rows say what others say, which contradict each other and by how much, and what is left
+free: by name, at the design.
 
-The rows are those of the native formulation, joints first, then drivers; lengths are in mechanism sizes, so that rows of lengths
-and of angles compare. Contradictions are found by exact rows: simplified ones have another fixed point where the residual is
-not zero (formulation section 3).
+The rows are those of the native formulation, joints first, then drivers; lengths are in mechanism
+sizes, so that rows of lengths and of angles compare. Contradictions are found by exact rows:
+simplified ones have another fixed point where the residual is not zero (formulation section 3).
 """
 
 from __future__ import annotations
@@ -25,12 +26,14 @@ from .instantaneous_screws import Screw, free_motions, screws
 
 # What a row owes to another below this is round-off of an orthogonalisation.
 OWED = 1e-9
-# Singular values of sound linkages are above this; below, geometry is nearly redundant, and often meant to be so.
+# Singular values of sound linkages are above this; below, geometry is nearly redundant, and often
+# meant to be so.
 NEARLY = 1e-3
 # Rows with less than this part of the largest share of a contradiction are not its cause.
 SHARE = 0.1
-# The way to the pose nearest to an assembly: no step is longer than this [units of the mechanism's size, rad], within which rows
-# are near to linear, and there are enough to go around the mechanism several times.
+# The way to the pose nearest to an assembly: no step is longer than this [units of the mechanism's
+# size, rad], within which rows are near to linear, and there are enough to go around the mechanism
+# several times.
 STEP, STEPS = 0.1, 200
 
 
@@ -41,7 +44,8 @@ class NamedRow:
     Attributes:
         owner: joint or driver.
         primitive: the condition it is one equation of.
-        holds: what it prevents at the design, on the owner's second body: a shift along, or a turn about, a direction.
+        holds: what it prevents at the design, on the owner's second body: a shift along, or a turn
+            about, a direction.
     """
 
     owner: str
@@ -62,7 +66,9 @@ class Dependency:
 
 @dataclass(frozen=True)
 class ComponentCount:
-    """Bodies that joints, couplers or drivers tie together, with their share of the count; drivers are not among the rows."""
+    """Bodies that joints, couplers or drivers tie together, with their share of the count; drivers
+    are not among the rows.
+    """
 
     bodies: tuple[str, ...]
     unknowns: int
@@ -78,7 +84,9 @@ class ComponentCount:
 
 @dataclass(frozen=True)
 class Violation:
-    """A row that cannot be met, and by how much: residual [m or rad], or its rate by the driver's."""
+    """A row that cannot be met, and by how much: residual [m or rad], or its rate by the
+    driver's.
+    """
 
     row: NamedRow
     amount: float
@@ -86,7 +94,9 @@ class Violation:
 
 @dataclass(frozen=True)
 class Blocked:
-    """A driver that cannot move what it drives: the least by which other rows would have to give way, per unit of the driver."""
+    """A driver that cannot move what it drives: the least by which other rows would have to give
+    way, per unit of the driver.
+    """
 
     driver: str
     rows: tuple[Violation, ...]
@@ -115,16 +125,28 @@ class Ranks:
             count = c.primitive.n if isinstance(c, Constraint) else 1
             kind = type(c.primitive).__name__ if isinstance(c, Constraint) else "Relation"
             found += [
-                NamedRow(c.owner, kind, self._holds(len(found) + k, c.j if isinstance(c, Constraint) else "")) for k in range(count)
+                NamedRow(
+                    c.owner,
+                    kind,
+                    self._holds(len(found) + k, c.j if isinstance(c, Constraint) else ""),
+                )
+                for k in range(count)
             ]
         return found
 
     def _holds(self, k: int, body: str) -> str:
         """What a row prevents: read from its entries on a body that moves."""
-        names = [body, *self.formulation.bodies] if body in self.formulation.columns else [*self.formulation.bodies]
+        names = (
+            [body, *self.formulation.bodies]
+            if body in self.formulation.columns
+            else [*self.formulation.bodies]
+        )
         for name in names:
             first = self.formulation.columns[name]
-            for what, block in (("along", self.matrix[k, first : first + 3]), ("about", self.matrix[k, first + 3 : first + 6])):
+            for what, block in (
+                ("along", self.matrix[k, first : first + 3]),
+                ("about", self.matrix[k, first + 3 : first + 6]),
+            ):
                 size = float(np.linalg.norm(block))
                 if size > OWED:
                     return f"{what} {_direction(block / size)}"
@@ -138,19 +160,34 @@ class Ranks:
         found: list[Dependency] = []
         for k in sorted(set(range(self.joint_rows)) - set(kept)):
             weights: Array = joints[k] @ np.linalg.pinv(joints[kept])
-            terms = [(float(weights[at]), self.rows[kept[at]]) for at in _largest_first(weights) if abs(weights[at]) > OWED]
+            terms = [
+                (float(weights[at]), self.rows[kept[at]])
+                for at in _largest_first(weights)
+                if abs(weights[at]) > OWED
+            ]
             found.append(Dependency(self.rows[k], tuple(terms)))
         return found
 
     @cached_property
     def nearly(self) -> list[tuple[float, list[NamedRow]]]:
-        """Combinations of joint rows that are nearly redundant: their size, which is a singular value, and the rows in them."""
+        """Combinations of joint rows that are nearly redundant: their size, which is a singular
+        value, and the rows in them.
+        """
         u, values = np.linalg.svd(self.matrix[: self.joint_rows], full_matrices=False)[:2]
         scale = values.max(initial=0.0)
         found: list[tuple[float, list[NamedRow]]] = []
         for k in np.flatnonzero((values > RANK_TOLERANCE * scale) & (values < NEARLY * scale)):
             share = np.abs(u[:, k])
-            found.append((float(values[k]), [self.rows[row] for row in _largest_first(share) if share[row] > SHARE * share.max()]))
+            found.append(
+                (
+                    float(values[k]),
+                    [
+                        self.rows[row]
+                        for row in _largest_first(share)
+                        if share[row] > SHARE * share.max()
+                    ],
+                )
+            )
         return found
 
     @cached_property
@@ -160,13 +197,18 @@ class Ranks:
         for row in self.matrix:
             columns = set(np.flatnonzero(row).tolist())
             columns |= {
-                COLUMNS * (c // COLUMNS) + k for c in columns if c < COLUMNS * len(self.formulation.bodies) for k in range(6)
+                COLUMNS * (c // COLUMNS) + k
+                for c in columns
+                if c < COLUMNS * len(self.formulation.bodies)
+                for k in range(6)
             }
             touching = [group for group in groups if group & columns]
             groups = [group for group in groups if not group & columns] + [columns.union(*touching)]
         loose = set(range(self.formulation.unknowns)) - set[int]().union(*groups)
         groups += [set(range(c, c + COLUMNS)) for c in sorted(loose) if c % COLUMNS == 0]
-        return [self._component(sorted(group)) for group in sorted((g for g in groups if g), key=min)]
+        return [
+            self._component(sorted(group)) for group in sorted((g for g in groups if g), key=min)
+        ]
 
     def _component(self, columns: Sequence[int]) -> ComponentCount:
         own = np.flatnonzero(np.abs(self.matrix[:, columns]).max(axis=1) > 0.0)
@@ -179,7 +221,10 @@ class Ranks:
     @cached_property
     def free(self) -> list[list[Screw]]:
         """The motions that are left with all drivers held, each by the bodies that take part."""
-        return [screws(self.formulation, self.at, self.frame, rates) for rates in free_motions(self.matrix)]
+        return [
+            screws(self.formulation, self.at, self.frame, rates)
+            for rates in free_motions(self.matrix)
+        ]
 
     @cached_property
     def blocked(self) -> list[Blocked]:
@@ -192,7 +237,10 @@ class Ranks:
             start, _, rank, _ = np.linalg.lstsq(drives, rate)
             against = float(np.abs(drives @ start - rate).max())
             hold = np.linalg.svd(drives, full_matrices=True)[2][int(rank) :].T
-            least = start + hold @ np.linalg.lstsq(joints @ hold, -joints @ start, rcond=RANK_TOLERANCE)[0]
+            least = (
+                start
+                + hold @ np.linalg.lstsq(joints @ hold, -joints @ start, rcond=RANK_TOLERANCE)[0]
+            )
             given = joints @ least
             if np.abs(given).max(initial=0.0) > OWED or against > OWED:
                 # by a radian of the driver, or by a metre
@@ -203,13 +251,22 @@ class Ranks:
     def _violations(self, amounts: Array, length: float, angle: float = 1.0) -> list[Violation]:
         """The rows with the largest amounts; those of lengths and of angles are in these units."""
         largest = np.abs(amounts).max(initial=0.0)
-        order = [k for k in _largest_first(amounts) if abs(amounts[k]) > max(SHARE * largest, OWED * OWED)]
+        order = [
+            k
+            for k in _largest_first(amounts)
+            if abs(amounts[k]) > max(SHARE * largest, OWED * OWED)
+        ]
         units = [length if "along" in self.rows[k].holds else angle for k in order]
-        return [Violation(self.rows[k], float(amounts[k]) * unit) for k, unit in zip(order, units, strict=True)]
+        return [
+            Violation(self.rows[k], float(amounts[k]) * unit)
+            for k, unit in zip(order, units, strict=True)
+        ]
 
     @cached_property
     def contradictions(self) -> list[Violation]:
-        """The rows that do not hold in the pose nearest to an assembly, with the drivers at design; empty where it closes."""
+        """The rows that do not hold in the pose nearest to an assembly, with the drivers at design;
+        empty where it closes.
+        """
         exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
         state = exact.design
         for _ in range(STEPS):
@@ -223,11 +280,17 @@ class Ranks:
             if size < CONSISTENT:
                 break
         phi = np.array(self.formulation.phi(self.formulation.configuration(state)))
-        return self._violations(phi, self.frame.unit) if np.abs(phi).max(initial=0.0) > CONSISTENT else []
+        return (
+            self._violations(phi, self.frame.unit)
+            if np.abs(phi).max(initial=0.0) > CONSISTENT
+            else []
+        )
 
 
 def _largest_first(amounts: Array) -> list[int]:
-    """Indices by size; of equals, to all but round-off, in their own order: the same on every processor."""
+    """Indices by size; of equals, to all but round-off, in their own order: the same on every
+    processor.
+    """
     sizes = np.abs(amounts)
     scale = float(sizes.max(initial=0.0)) or 1.0
     return np.argsort(-np.round(sizes / scale, DIGITS), kind="stable").tolist()

@@ -1,1 +1,3 @@
-"""What is solved: a mechanism's constraints as equations over any scalar, in Cartesian or in joint coordinates."""
+"""What is solved: a mechanism's constraints as equations over any scalar, in Cartesian or in joint
+coordinates.
+"""

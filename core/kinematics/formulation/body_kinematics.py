@@ -21,7 +21,12 @@ def position_of(position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pos
 
 
 def motion_of_point(
-    position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose, twist: Twist, acceleration: Acceleration
+    position: Sequence[Scalar],
+    arm: Vec3,
+    metres: Scalar,
+    pose: Pose,
+    twist: Twist,
+    acceleration: Acceleration,
 ) -> tuple[Vec3, Vec3, Vec3]:
     """Position [m], velocity and acceleration of a point; see `position_of`."""
     turned = pose.turn(arm)
@@ -32,8 +37,12 @@ def motion_of_point(
     )
 
 
-def motion_of_frame(design: Quat, pose: Pose, twist: Twist, acceleration: Acceleration) -> tuple[Quat, Vec3, Vec3]:
-    """p, omega' and omega'dot of a body's own frame, the paper's variables, from its Euler parameters at design."""
+def motion_of_frame(
+    design: Quat, pose: Pose, twist: Twist, acceleration: Acceleration
+) -> tuple[Quat, Vec3, Vec3]:
+    """p, omega' and omega'dot of a body's own frame, the paper's variables, from its Euler
+    parameters at design.
+    """
     p = pose.q * design
     to_body = rotation_less_identity(p).T
     return p, twist.w + to_body @ twist.w, acceleration.w_t + to_body @ acceleration.w_t

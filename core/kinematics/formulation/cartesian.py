@@ -1,7 +1,8 @@
 """The Cartesian formulation: six unknowns (dr, dpi) of every moving body, and all joints as rows.
 
-A joint's own coordinate, its turn or displacement, is a further unknown where it is named: coupled to another, or by the style.
-dpi is in global axes, or in body axes where the row style is; the poses are the same.
+A joint's own coordinate, its turn or displacement, is a further unknown where it is named: coupled
+to another, or by the style. dpi is in global axes, or in body axes where the row style is; the
+poses are the same.
 """
 
 from __future__ import annotations
@@ -48,9 +49,15 @@ class Cartesian:
 
     @classmethod
     def of(
-        cls, mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive] | None = None, style: Style = Style.NATIVE
+        cls,
+        mechanism: Mechanism,
+        frame: Frames,
+        drives: Mapping[str, Drive] | None = None,
+        style: Style = Style.NATIVE,
     ) -> Cartesian:
-        """All constraints of a mechanism over its moving bodies; drivers that are not named hold their design value."""
+        """All constraints of a mechanism over its moving bodies; drivers that are not named hold
+        their design value.
+        """
         return cls(constraints(mechanism, frame, drives or {}, style), frame.moving)
 
     @cached_property
@@ -61,8 +68,13 @@ class Cartesian:
     @cached_property
     def coordinates(self) -> Mapping[str, int]:
         """Column of every named coordinate; they come after the bodies."""
-        driven = (c.coordinate for c in self.constraints if isinstance(c, Constraint) and c.coordinate)
-        return {name: COLUMNS * len(self.bodies) + k for k, name in enumerate(dict.fromkeys([*self.named, *driven]))}
+        driven = (
+            c.coordinate for c in self.constraints if isinstance(c, Constraint) and c.coordinate
+        )
+        return {
+            name: COLUMNS * len(self.bodies) + k
+            for k, name in enumerate(dict.fromkeys([*self.named, *driven]))
+        }
 
     @property
     def unknowns(self) -> int:
@@ -86,16 +98,25 @@ class Cartesian:
             rows = range(first, first := first + sum(map(_count, members)))
             pairs = [c for c in members if isinstance(c, Constraint)]
             remote = max((far.get(c.i, 0) + far.get(c.j, 0) for c in pairs), default=0)
-            steady = all(c.primitive.steady or not (c.i in self.columns or c.i in self.given) for c in pairs)
+            steady = all(
+                c.primitive.steady or not (c.i in self.columns or c.i in self.given) for c in pairs
+            )
             found.append(Condition(rows, remote, steady))
         return found
 
     @property
     def _from_ground(self) -> Mapping[str, int]:
-        """Joints and drivers between every body and the ground, or what is given; bodies that none leads to are missing."""
+        """Joints and drivers between every body and the ground, or what is given; bodies that none
+        leads to are missing.
+        """
         pairs = [(c.i, c.j) for c in self.constraints if isinstance(c, Constraint)]
         far = {name: 0 for pair in pairs for name in pair if name not in self.columns}
-        while reached := {b: far[a] + 1 for i, j in pairs for a, b in ((i, j), (j, i)) if a in far and b not in far}:
+        while reached := {
+            b: far[a] + 1
+            for i, j in pairs
+            for a, b in ((i, j), (j, i))
+            if a in far and b not in far
+        }:
             far |= reached
         return far
 
@@ -112,7 +133,10 @@ class Cartesian:
     def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
         state: dict[str, Sequence[Scalar]] = {}
         for name, k in self.columns.items():
-            dr, dpi = vec(step[k : k + 3]), self._global(at.poses[name], vec(step[k + 3 : k + COLUMNS]))
+            dr, dpi = (
+                vec(step[k : k + 3]),
+                self._global(at.poses[name], vec(step[k + 3 : k + COLUMNS])),
+            )
             state[f"u {name}"] = tuple(at.poses[name].u + dr)
             state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi))
         for name, k in self.coordinates.items():
@@ -123,7 +147,10 @@ class Cartesian:
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
-                found.append(sum((k * at.state[f"x {name}"][0] for name, k in c.weights.items()), 0.0) - c.drive.c)
+                found.append(
+                    sum((k * at.state[f"x {name}"][0] for name, k in c.weights.items()), 0.0)
+                    - c.drive.c
+                )
             else:
                 found += self._bound(c, at).phi(*_pair(c, at))
         return found
@@ -140,7 +167,9 @@ class Cartesian:
                 continue
             pair, bound = _pair(c, at), self._bound(c, at, rate=1.0)
             rows = [self._sparse(row, c) for row in bound.rows(*pair)]
-            if c.coordinate:  # nu is linear in the drive's rate: what it is at rate one is minus the coordinate's column
+            # nu is linear in the drive's rate: what it is at rate one is minus the coordinate's
+            # column
+            if c.coordinate:
                 for row, value in zip(rows, bound.nu(*pair), strict=True):
                     if not is_literal_zero(value):
                         row[self.coordinates[c.coordinate]] = -value
@@ -159,7 +188,10 @@ class Cartesian:
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
         twists = self._own(v) | {name: each.twist for name, each in self.given.items()}
-        carried = {name: Twist(each.acceleration.v_t, each.acceleration.w_t) for name, each in self.given.items()}
+        carried = {
+            name: Twist(each.acceleration.v_t, each.acceleration.w_t)
+            for name, each in self.given.items()
+        }
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
@@ -167,20 +199,32 @@ class Cartesian:
                 continue
             rate = v[self.coordinates[c.coordinate]] if c.coordinate else 0.0
             vi, vj = twists.get(c.i, GROUND_TWIST), twists.get(c.j, GROUND_TWIST)
-            found += self._less(self._bound(c, at, rate).gamma(*_pair(c, at), vi, vj), c, at, carried)
+            found += self._less(
+                self._bound(c, at, rate).gamma(*_pair(c, at), vi, vj), c, at, carried
+            )
         return found
 
-    def _less(self, values: Sequence[Scalar], c: Constraint, at: Configuration, carried: Mapping[str, Twist]) -> list[Scalar]:
+    def _less(
+        self,
+        values: Sequence[Scalar],
+        c: Constraint,
+        at: Configuration,
+        carried: Mapping[str, Twist],
+    ) -> list[Scalar]:
         """Right-hand sides less what given bodies contribute to the left."""
         found: list[Scalar] = [*values]
         for body, place in ((c.i, "i"), (c.j, "j")):
             if body in carried:
                 rows = self._bound(c, at).rows(*_pair(c, at))
-                found = [x - row.along(place, carried[body]) for x, row in zip(found, rows, strict=True)]
+                found = [
+                    x - row.along(place, carried[body]) for x, row in zip(found, rows, strict=True)
+                ]
         return found
 
     def _bound(self, c: Constraint, at: Configuration, rate: Scalar = 0.0) -> Primitive:
-        """The primitive, driven by its coordinate where it has one; the coordinate's acceleration is an unknown's, not here."""
+        """The primitive, driven by its coordinate where it has one; the coordinate's acceleration
+        is an unknown's, not here.
+        """
         if not c.coordinate:
             return c.primitive
         (x,) = at.state[f"x {c.coordinate}"]
@@ -189,15 +233,26 @@ class Cartesian:
         return replace(driven, drive=drive)
 
     def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
-        return {name: Twist(twist.v, self._global(at.poses[name], twist.w)) for name, twist in self._own(v).items()}
+        return {
+            name: Twist(twist.v, self._global(at.poses[name], twist.w))
+            for name, twist in self._own(v).items()
+        }
 
-    def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:
+    def accelerations(
+        self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
+    ) -> Mapping[str, Acceleration]:
         # A w' differentiated is A w'dot + w x w, and the last is zero
-        return {name: Acceleration(twist.v, self._global(at.poses[name], twist.w)) for name, twist in self._own(a).items()}
+        return {
+            name: Acceleration(twist.v, self._global(at.poses[name], twist.w))
+            for name, twist in self._own(a).items()
+        }
 
     def _own(self, v: Sequence[Scalar]) -> dict[str, Twist]:
         """The unknowns by body, in the axes of the rows."""
-        return {name: Twist(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS])) for name, k in self.columns.items()}
+        return {
+            name: Twist(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS]))
+            for name, k in self.columns.items()
+        }
 
     def _global(self, pose: Pose, w: Vec3) -> Vec3:
         return pose.turn(w) if self._body_axes else w

@@ -1,7 +1,9 @@
-"""The equations of a mechanism: its joints and drivers as primitives between bodies, over any scalar.
+"""The equations of a mechanism: its joints and drivers as primitives between bodies, over any
+scalar.
 
-Lengths are measured in a power of two of metres near the mechanism's size, which is exact and makes rows of lengths and of angles
-alike in size. Every moving body gets an internal origin at one of its joints, so that the arm of that joint is a literal zero.
+Lengths are measured in a power of two of metres near the mechanism's size, which is exact and makes
+rows of lengths and of angles alike in size. Every moving body gets an internal origin at one of its
+joints, so that the arm of that joint is a literal zero.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ class Constraint:
     """A primitive between two bodies, and the joint or driver it belongs to.
 
     Attributes:
-        coordinate: the unknown that drives the primitive, as JOINT.rotation or JOINT.translation; empty where none does.
+        coordinate: the unknown that drives the primitive, as JOINT.rotation or JOINT.translation;
+            empty where none does.
     """
 
     owner: str
@@ -41,7 +44,9 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Relation:
-    """A linear row between coordinates: the weighted sum is the drive's value (zero unless driven)."""
+    """A linear row between coordinates: the weighted sum is the drive's value (zero unless
+    driven).
+    """
 
     owner: str
     weights: Mapping[str, float]
@@ -50,19 +55,25 @@ class Relation:
 
 @dataclass(frozen=True)
 class Frames:
-    """How the mechanism is measured: the length unit [m], the internal origin of every body [units], and which bodies move."""
+    """How the mechanism is measured: the length unit [m], the internal origin of every body
+    [units], and which bodies move.
+    """
 
     unit: float
     origins: Mapping[str, Vec3]
     moving: tuple[str, ...]
 
     def arm(self, body: str, position: Sequence[float]) -> Vec3:
-        """Return the vector from the internal origin of the body to a point, global at design [units]."""
+        """Return the vector from the internal origin of the body to a point, global at design
+        [units].
+        """
         return (1.0 / self.unit) * vec(position) - self.origins[body]
 
 
 def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
-    """The length unit, unless it is given, and the internal origins: at the joint by which the spanning tree reaches a body."""
+    """The length unit, unless it is given, and the internal origins: at the joint by which the
+    spanning tree reaches a body.
+    """
     if length_unit is None:
         length_unit = unit_near(size_of(mechanism))
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
@@ -73,14 +84,18 @@ def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
     for branch in spanning_tree(mechanism).branches:
         at = branch.joint.points_on() if branch.joint is not None else []
         if not at:  # a free body, or a joint without a point: the first point any joint has on it
-            at = [q for joint in touching.get(branch.child, ()) for q in joint.points_on(branch.child)]
+            at = [
+                q for joint in touching.get(branch.child, ()) for q in joint.points_on(branch.child)
+            ]
         position = at[0] if at else mechanism.body(branch.child).origin
         origins[branch.child] = (1.0 / length_unit) * vec(position)
     return Frames(length_unit, origins, tuple(body.name for body in mechanism.moving))
 
 
 def measured(mechanism: Mechanism) -> tuple[float, Frames]:
-    """A large mechanism's size, and frames whose unit of length is near the size of its bodies; powers of two of metres."""
+    """A large mechanism's size, and frames whose unit of length is near the size of its bodies;
+    powers of two of metres.
+    """
     whole = frames(mechanism)
     points: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     for joint in mechanism.joints:
@@ -88,14 +103,19 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
             points[body] += joint.points_on(body)
     sizes = sorted(size for body in whole.moving if (size := extent(points[body])) > 0.0)
     unit = unit_near(sizes[len(sizes) // 2]) if sizes else whole.unit
-    return whole.unit, Frames(unit, {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()}, whole.moving)
+    return whole.unit, Frames(
+        unit,
+        {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()},
+        whole.moving,
+    )
 
 
 def size_of(mechanism: Mechanism) -> float:
-    """Return the extent of the joints' points [m]; where they have none, as around a single pivot, of these and all others.
+    """Return the extent of the joints' points [m]; where they have none, as around a single pivot,
+    of these and all others.
 
-    A metre in its place would be the unit of a mechanism of micrometres: its residuals are too small to be seen, and its
-    singular values too.
+    A metre in its place would be the unit of a mechanism of micrometres: its residuals are too
+    small to be seen, and its singular values too.
     """
     joints = [point for joint in mechanism.joints for point in joint.points_on()]
     for places in (joints, joints + [point.position for point in mechanism.points]):
@@ -111,7 +131,9 @@ def extent(points: Sequence[Sequence[float]]) -> float:
 
 
 def unit_near(length: float) -> float:
-    """Return the power of two nearest to a positive length [m]: measured in it, lengths keep all their digits."""
+    """Return the power of two nearest to a positive length [m]: measured in it, lengths keep all
+    their digits.
+    """
     return 2.0 ** round(math.log2(length))
 
 
@@ -136,70 +158,118 @@ def constraints(
 
     Args:
         drives: the motion of each driver by name; drivers not named hold their design value.
-        style: how rows are written. MIXED and RELATIVE name the coordinates of all axial joints, the others those of couplers.
+        style: how rows are written. MIXED and RELATIVE name the coordinates of all axial joints,
+            the others those of couplers.
     """
     mixed = style in (Style.MIXED, Style.RELATIVE)
-    coupled = {f"{joint}.{freedom}" for coupler in mechanism.couplers for joint, freedom, _ in coupler.terms}
+    coupled = {
+        f"{joint}.{freedom}"
+        for coupler in mechanism.couplers
+        for joint, freedom, _ in coupler.terms
+    }
     found: list[Constraint | Relation] = []
     for original in mechanism.joints:
         if isinstance(original, AxialJoint):
-            found += _axial(original, frame, coupled, mixed=mixed, fixed_last=mechanism.is_fixed(original.j))
+            found += _axial(
+                original, frame, coupled, mixed=mixed, fixed_last=mechanism.is_fixed(original.j)
+            )
             continue
         # the ground as body i: its rows are constant and the simplified ones need nothing of body j
-        joint = original.reversed() if original.symmetric and mechanism.is_fixed(original.j) else original
+        joint = (
+            original.reversed()
+            if original.symmetric and mechanism.is_fixed(original.j)
+            else original
+        )
         i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
         composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
         found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
     for coupler in mechanism.couplers:
-        found.append(_relation(coupler.name, {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}, frame))
-    found += [_driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed) for each in mechanism.drivers]
+        found.append(
+            _relation(
+                coupler.name,
+                {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms},
+                frame,
+            )
+        )
+    found += [
+        _driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
+        for each in mechanism.drivers
+    ]
     return _restyled(found, style)
 
 
 def _axial(
     original: AxialJoint, frame: Frames, coupled: Collection[str], *, mixed: bool, fixed_last: bool
 ) -> list[Constraint | Relation]:
-    """An axial joint; its coordinates are named where they are coupled, related to each other, or the style names all."""
-    related = {f"{original.name}.{freedom}" for relation in original.relations for freedom in relation}
+    """An axial joint; its coordinates are named where they are coupled, related to each other, or
+    the style names all.
+    """
+    related = {
+        f"{original.name}.{freedom}" for relation in original.relations for freedom in relation
+    }
     names = {freedom: f"{original.name}.{freedom}" for freedom in original.freedoms}
-    named = [freedom for freedom, name in names.items() if mixed or name in coupled or name in related]
-    # the ground as body i: its rows are constant; but a named coordinate is that of body j relative to body i, in this order
+    named = [
+        freedom for freedom, name in names.items() if mixed or name in coupled or name in related
+    ]
+    # the ground as body i: its rows are constant; but a named coordinate is that of body j relative
+    # to body i, in this order
     joint = original.reversed() if fixed_last and not named else original
     i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
     scaled = joint.scaled(1.0 / frame.unit)
     composed = [(primitive, "") for primitive in scaled.primitives(i, j)]
     if mixed:
-        composed = [(primitive, freedom if freedom in names else "") for primitive, freedom in scaled.mixed(i, j)]
+        composed = [
+            (primitive, freedom if freedom in names else "")
+            for primitive, freedom in scaled.mixed(i, j)
+        ]
     else:
         composed += [(scaled.measured(freedom, i, j), freedom) for freedom in named]
     found: list[Constraint | Relation] = [
-        Constraint(joint.name, primitive, joint.i, joint.j, names.get(freedom, "")) for primitive, freedom in composed
+        Constraint(joint.name, primitive, joint.i, joint.j, names.get(freedom, ""))
+        for primitive, freedom in composed
     ]
-    weights = ({f"{joint.name}.{freedom}": k for freedom, k in relation.items()} for relation in original.relations)
+    weights = (
+        {f"{joint.name}.{freedom}": k for freedom, k in relation.items()}
+        for relation in original.relations
+    )
     return found + [_relation(joint.name, each, frame) for each in weights]
 
 
 def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relation:
-    """Weights in metres and radians to weights in units and radians, the largest of those that are known made one."""
-    scaled = {name: k * (frame.unit if name.endswith(".translation") else 1.0) for name, k in weights.items()}
-    largest = max(abs(k) for k in scaled.values() if hasattr(k, "__abs__"))  # a traced lead is known only later
+    """Weights in metres and radians to weights in units and radians, the largest of those that are
+    known made one.
+    """
+    scaled = {
+        name: k * (frame.unit if name.endswith(".translation") else 1.0)
+        for name, k in weights.items()
+    }
+    # a traced lead is known only later
+    largest = max(abs(k) for k in scaled.values() if hasattr(k, "__abs__"))
     return Relation(owner, {name: k / largest for name, k in scaled.items()})
 
 
-def _driven(mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, mixed: bool) -> Constraint | Relation:
+def _driven(
+    mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, mixed: bool
+) -> Constraint | Relation:
     """The constraint of a driver that moves as the drive says."""
     if isinstance(driver, PointCoordinate):
         point = mechanism.point(driver.point)
         arm = frame.arm(point.body, point.position)
-        return Constraint(driver.name, p.DrivenCoordinate(unit(driver.direction), arm, drive), GROUND, point.body)
+        return Constraint(
+            driver.name, p.DrivenCoordinate(unit(driver.direction), arm, drive), GROUND, point.body
+        )
     joint = mechanism.joint(driver.joint) if isinstance(driver, JointDriver) else None
     if joint is not None and not isinstance(joint, AxialJoint):
         raise SolveError(
-            f"driver {driver.name!r} ({driver.type}): joint {joint.name!r} is {joint.type}, which measures no coordinate; "
-            "derive its class from kincheck.core.joints.base.AxialJoint, or drive a point"
+            f"driver {driver.name!r} ({driver.type}): joint {joint.name!r} is {joint.type}, which"
+            " measures no coordinate; derive its class from kincheck.core.joints.base.AxialJoint,"
+            " or drive a point"
         )
     if joint is None or not isinstance(driver, JointDriver):
-        raise SolveError(f"driver {driver.name!r} ({driver.type}) is of a kind the native formulation cannot drive")
+        raise SolveError(
+            f"driver {driver.name!r} ({driver.type}) is of a kind the native formulation cannot"
+            " drive"
+        )
     if mixed:
         return Relation(driver.name, {f"{joint.name}.{driver.freedom}": 1.0}, drive)
     i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
@@ -216,5 +286,9 @@ def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Cons
     twins = {Style.PAPER: paper.TWINS, Style.CONVENTIONAL: conventional.TWINS}[style]
     styled: list[Constraint | Relation] = []
     for c in found:
-        styled += [c] if isinstance(c, Relation) else [replace(c, primitive=t) for t in twins[type(c.primitive)](c.primitive)]
+        styled += (
+            [c]
+            if isinstance(c, Relation)
+            else [replace(c, primitive=t) for t in twins[type(c.primitive)](c.primitive)]
+        )
     return styled

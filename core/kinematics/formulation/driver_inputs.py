@@ -13,7 +13,8 @@ from ...trajectory import Array
 
 
 def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
-    """The numbers of a `Drive` for each driver, in the mechanism's unit of length, shape (5 * drivers, n).
+    """The numbers of a `Drive` for each driver, in the mechanism's unit of length, shape (5 *
+    drivers, n).
 
     Args:
         drive: value from the design, velocity and acceleration [SI], shape (3, drivers, n).
@@ -26,12 +27,20 @@ def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array
 
 
 def turns(mechanism: Mechanism, drivers: Sequence[str]) -> list[str]:
-    """Return the scalars of a lane that hold the angles of those of the drivers that turn [rad from the design]."""
+    """Return the scalars of a lane that hold the angles of those of the drivers that turn [rad from
+    the design].
+    """
     return [f"drive {name}.0" for name in drivers if mechanism.driver(name).turns]
 
 
-def standing_drives(mechanism: Mechanism, unit: float, change: Mapping[str, float]) -> dict[str, Drive]:
+def standing_drives(
+    mechanism: Mechanism, unit: float, change: Mapping[str, float]
+) -> dict[str, Drive]:
     """Drivers by name that stand at values from the design [SI]."""
     values = np.array([[*change.values()], *np.zeros((2, len(change)))])[..., None]
-    numbers = drive_numbers([mechanism.driver(name) for name in change], values, unit).reshape(-1, 5).tolist()
+    numbers = (
+        drive_numbers([mechanism.driver(name) for name in change], values, unit)
+        .reshape(-1, 5)
+        .tolist()
+    )
     return {name: Drive(*each) for name, each in zip(change, numbers, strict=True)}

@@ -1,7 +1,8 @@
-"""What a formulation is: its unknowns, what they mean for the poses of the bodies, and the equations over them.
+"""What a formulation is: its unknowns, what they mean for the poses of the bodies, and the
+equations over them.
 
-Newton's iteration, velocities, accelerations, prediction and the selection of rows are the same for all formulations; they are
-written once, over this interface.
+Newton's iteration, velocities, accelerations, prediction and the selection of rows are the same for
+all formulations; they are written once, over this interface.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from ...algebra import ZERO, Scalar, Vec3, cross
 from ...primitives.base import Pose, Twist
 
 State: TypeAlias = Mapping[str, Sequence[Scalar]]
-"""Named vectors that fix the configuration (for Cartesian coordinates: displacement and Euler parameters of every body)."""
+"""Named vectors that fix the configuration (for Cartesian coordinates: displacement and Euler
+parameters of every body).
+"""
 
 EULER_PARAMETERS = 4
 """Numbers of a vector of a state that is Euler parameters."""
@@ -61,7 +64,8 @@ GROUND_ACCELERATION = Acceleration(ZERO, ZERO)
 
 
 class Formulation(Protocol):
-    """The equations of a mechanism over the unknowns of one formulation: joints first, drivers last.
+    """The equations of a mechanism over the unknowns of one formulation: joints first, drivers
+    last.
 
     Attributes:
         unknowns: number of unknowns (columns).
@@ -111,7 +115,9 @@ class Formulation(Protocol):
         """How the bodies move at unknown rates v."""
         ...
 
-    def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:
+    def accelerations(
+        self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
+    ) -> Mapping[str, Acceleration]:
         """How the bodies accelerate at unknown rates v and accelerations a."""
         ...
 

@@ -1,7 +1,8 @@
-"""The geometry of a mechanism as named places, so that it can be varied: the hardpoints, axes and lengths of joints and points.
+"""The geometry of a mechanism as named places, so that it can be varied: the hardpoints, axes and
+lengths of joints and points.
 
-A place is named as in a case file: "joints.NAME.point", "joints.NAME.axis", "joints.NAME.points.0", "joints.NAME.lead",
-"points.NAME.position".
+A place is named as in a case file: "joints.NAME.point", "joints.NAME.axis", "joints.NAME.points.0",
+"joints.NAME.lead", "points.NAME.position".
 """
 
 from __future__ import annotations
@@ -26,14 +27,22 @@ def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
 
 def kinds(mechanism: Mechanism) -> dict[str, Kind]:
     """What every place holds: a point, a direction or a length."""
-    found = {f"joints.{joint.name}.{name}": kind for joint in mechanism.joints for name, kind, _ in joint.parts()}
+    found = {
+        f"joints.{joint.name}.{name}": kind
+        for joint in mechanism.joints
+        for name, kind, _ in joint.parts()
+    }
     return found | {f"points.{point.name}.position": Kind.POSITION for point in mechanism.points}
 
 
 def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mechanism:
-    """The mechanism with other values at some places, numbers of any kind; they are not checked again."""
+    """The mechanism with other values at some places, numbers of any kind; they are not checked
+    again.
+    """
     joints = [joint.changed(**_changes(joint, values)) for joint in mechanism.joints]
-    points = [_moved(point, values.get(f"points.{point.name}.position")) for point in mechanism.points]
+    points = [
+        _moved(point, values.get(f"points.{point.name}.position")) for point in mechanism.points
+    ]
     return replace(mechanism, joints=joints, points=points)
 
 
@@ -44,7 +53,10 @@ def _changes(joint: Joint, values: Mapping[str, Sequence[Scalar]]) -> dict[str, 
         if kind.pair:
             given = tuple(values.get(f"{place}.{k}") for k in range(2))
             if given != (None, None):
-                changes[name] = tuple(old if new is None else tuple(new) for new, old in zip(given, value, strict=True))
+                changes[name] = tuple(
+                    old if new is None else tuple(new)
+                    for new, old in zip(given, value, strict=True)
+                )
         elif place in values:
             changes[name] = values[place][0] if kind is Kind.LENGTH else tuple(values[place])
     return changes

@@ -1,14 +1,16 @@
-"""The relative formulation: joint coordinates of a spanning tree as unknowns, cut joints and drivers as rows.
+"""The relative formulation: joint coordinates of a spanning tree as unknowns, cut joints and
+drivers as rows.
 
-Formulation section 5. The rows are those of the Cartesian formulation for the joints left over, times the velocity transformation B
-of the tree, and b = Bdot y_t the accelerations at constant rates:
+Formulation section 5. The rows are those of the Cartesian formulation for the joints left over,
+times the velocity transformation B of the tree, and b = Bdot y_t the accelerations at constant
+rates:
 
     position      (Phi_Pi B) dy   = -Phi
     velocity      (Phi_Pi B) y_t  = nu
     acceleration  (Phi_Pi B) y_tt = gamma - Phi_Pi b
 
-Tree joints hold exactly by construction and have no rows; the system is small and dense where the Cartesian one is large and
-sparse.
+Tree joints hold exactly by construction and have no rows; the system is small and dense where the
+Cartesian one is large and sparse.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ class Relative:
     """A tree and the constraints that close it; implements `Formulation`.
 
     Attributes:
-        closed: the constraints left over, in Cartesian form; its named coordinates are those of the tree, then its own.
+        closed: the constraints left over, in Cartesian form; its named coordinates are those of the
+            tree, then its own.
     """
 
     chains: Sequence[spanning_tree.Chain]
@@ -40,10 +43,17 @@ class Relative:
 
     @staticmethod
     def of(mechanism: Mechanism, frame: Frames, found: Sequence[Constraint | Relation]) -> Relative:
-        """The formulation of a mechanism from its constraints in the mixed style, of which the tree joints are dropped."""
+        """The formulation of a mechanism from its constraints in the mixed style, of which the tree
+        joints are dropped.
+        """
         chains, used = spanning_tree.chains(mechanism, frame)
         left = [c for c in found if isinstance(c, Relation) or c.owner not in used]
-        names = tuple(step.name.removeprefix("x ") for chain in chains for step in chain.steps if step.axis is not None)
+        names = tuple(
+            step.name.removeprefix("x ")
+            for chain in chains
+            for step in chain.steps
+            if step.axis is not None
+        )
         return Relative(chains, Cartesian(left, frame.moving, names), frame.origins)
 
     @cached_property
@@ -72,7 +82,9 @@ class Relative:
     @property
     def design(self) -> Mapping[str, Sequence[float]]:
         steps = (step for chain in self.chains for step in chain.steps)
-        state: dict[str, Sequence[float]] = {s.name: (1.0, 0.0, 0.0, 0.0) if s.axis is None else (0.0,) for s in steps}
+        state: dict[str, Sequence[float]] = {
+            s.name: (1.0, 0.0, 0.0, 0.0) if s.axis is None else (0.0,) for s in steps
+        }
         return state | {f"x {name}": (0.0,) for name in self._own}
 
     @property
@@ -90,7 +102,9 @@ class Relative:
 
     def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
         after = spanning_tree.retracted(self.chains, at.state, step)
-        return after | {f"x {name}": (at.state[f"x {name}"][0] + step[k],) for name, k in self._own.items()}
+        return after | {
+            f"x {name}": (at.state[f"x {name}"][0] + step[k],) for name, k in self._own.items()
+        }
 
     def phi(self, at: Configuration) -> list[Scalar]:
         return self.closed.phi(at)
@@ -105,7 +119,9 @@ class Relative:
         return self.closed.nu(at)
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        moved = spanning_tree.accelerating(self.chains, _posed(at).tree, at.state, v, [0.0] * len(v))
+        moved = spanning_tree.accelerating(
+            self.chains, _posed(at).tree, at.state, v, [0.0] * len(v)
+        )
         rates, bias = [0.0] * self.closed.unknowns, [0.0] * self.closed.unknowns
         for name, k in self.closed.columns.items():
             twist, acceleration = moved[name]
@@ -122,7 +138,9 @@ class Relative:
     def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
         return spanning_tree.moving(self.chains, _posed(at).tree, at.state, v)
 
-    def accelerations(self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]) -> Mapping[str, Acceleration]:
+    def accelerations(
+        self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
+    ) -> Mapping[str, Acceleration]:
         found = spanning_tree.accelerating(self.chains, _posed(at).tree, at.state, v, a)
         return {name: acceleration for name, (_, acceleration) in found.items()}
 
@@ -141,13 +159,18 @@ class Relative:
             for k in at.tree.ancestors[name]:
                 column = at.tree.columns[k]
                 value = r @ column.axis
-                if not column.slides:  # turning about P moves the body's origin by axis x (origin - P)
+                # turning about P moves the body's origin by axis x (origin - P)
+                if not column.slides:
                     value = (p + cross(at.arm(name, column, self.origins), r)) @ column.axis
                 entries[k] = entries.get(k, 0.0) + value
         for name, k in self.closed.coordinates.items():
             if k in row:
                 entries[self._column(name)] = entries.get(self._column(name), 0.0) + row[k]
-        return {k: value for k, value in entries.items() if not (isinstance(value, float) and value == 0.0)}
+        return {
+            k: value
+            for k, value in entries.items()
+            if not (isinstance(value, float) and value == 0.0)
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +180,9 @@ class TreeConfiguration(Configuration):
     tree: spanning_tree.Posed
 
     def arm(self, name: str, column: spanning_tree.Column, origins: Mapping[str, Vec3]) -> Vec3:
-        """Return the vector from the column's point P to the body's origin, now, global axes [units]."""
+        """Return the vector from the column's point P to the body's origin, now, global axes
+        [units].
+        """
         return (origins[name] - column.P_design) + (self.poses[name].u - column.P)
 
 

@@ -1,8 +1,9 @@
 """The spanning tree in joint coordinates: poses, velocities and accelerations of all bodies by recursion.  Formulation section 5.
 
-A tree joint is a chain of steps from the parent to the child, each with its unknowns: a turn about an axis, a slide along one, or a
-ball (any rotation). Axes are given at design and carried by the chain: body axes are parallel to the global ones at design, so a
-turn by theta about a is the rotation [cos theta/2, a sin theta/2] after those before it. In global axes, with h the carried axis
+A tree joint is a chain of steps from the parent to the child, each with its unknowns: a turn about
+an axis, a slide along one, or a ball (any rotation). Axes are given at design and carried by the
+chain: body axes are parallel to the global ones at design, so a turn by theta about a is the
+rotation [cos theta/2, a sin theta/2] after those before it. In global axes, with h the carried axis
 and p the joint's point on the chain:
 
     turn    q = q Q(theta)          w = w + theta_t h         wdot = wdot + theta_tt h + w x theta_t h
@@ -15,7 +16,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...algebra import ZERO, Quat, Scalar, Vec3, X, Y, Z, cross, quat, turned_by, vec
-from ...joints import Cylindrical, Fixed, Joint, Revolute, Screw, Spherical, Translational, Universal
+from ...joints import (
+    Cylindrical,
+    Fixed,
+    Joint,
+    Revolute,
+    Screw,
+    Spherical,
+    Translational,
+    Universal,
+)
 from ...joints.base import unit
 from ...mechanism.mechanism import GROUND, Mechanism
 from ...mechanism.topology import Branch, spanning_tree
@@ -30,7 +40,9 @@ BALL = 3
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a chain. name: of its state; axis: at design, None for a ball; slides: along the axis, else it turns about it."""
+    """One step of a chain. name: of its state; axis: at design, None for a ball; slides: along the
+    axis, else it turns about it.
+    """
 
     name: str
     axis: Vec3 | None
@@ -45,7 +57,9 @@ class Step:
 
 @dataclass(frozen=True)
 class Chain:
-    """A branch of the tree as steps at a point P, global at design; arms to it from the origins of parent and child."""
+    """A branch of the tree as steps at a point P, global at design; arms to it from the origins of
+    parent and child.
+    """
 
     parent: str
     child: str
@@ -57,7 +71,9 @@ class Chain:
 
 @dataclass(frozen=True)
 class Column:
-    """What one unknown does: turns all that follows about an axis through P (given as displacement from design), or shifts it."""
+    """What one unknown does: turns all that follows about an axis through P (given as displacement
+    from design), or shifts it.
+    """
 
     axis: Vec3
     slides: bool
@@ -68,16 +84,24 @@ class Column:
 def chains(mechanism: Mechanism, frame: Frames) -> tuple[list[Chain], set[str]]:
     """The chains of all moving bodies, parents first, and the names of the joints they are made of.
 
-    A joint that is no chain of turns, slides and a ball leaves its body free, with six unknowns; the joint then closes a loop.
+    A joint that is no chain of turns, slides and a ball leaves its body free, with six unknowns;
+    the joint then closes a loop.
     """
     found, used = list[Chain](), set[str]()
     for branch in spanning_tree(mechanism).branches:
         steps = _steps(branch)
         if branch.joint is None or steps is None:
-            free = tuple(Step(f"x {branch.child} {axis}", e, slides=True) for axis, e in (("x", X), ("y", Y), ("z", Z)))
+            free = tuple(
+                Step(f"x {branch.child} {axis}", e, slides=True)
+                for axis, e in (("x", X), ("y", Y), ("z", Z))
+            )
             # about its own origin: the arms end there
             own = frame.origins[branch.child]
-            found.append(Chain(GROUND, branch.child, own, own, ZERO, (*free, Step(f"q {branch.child}", None))))
+            found.append(
+                Chain(
+                    GROUND, branch.child, own, own, ZERO, (*free, Step(f"q {branch.child}", None))
+                )
+            )
             continue
         used.add(branch.joint.name)
         point = getattr(branch.joint, "point", None)
@@ -99,7 +123,9 @@ def _steps(branch: Branch) -> tuple[Step, ...] | None:
         case Cylindrical() if type(joint) in (Cylindrical, Screw):
             steps = [_slide(joint, joint.axis), _turn(joint, joint.axis)]
         case Universal():
-            steps = [_turn(joint, axis, f" {body}") for axis, body in zip(joint.axes, "ij", strict=True)]
+            steps = [
+                _turn(joint, axis, f" {body}") for axis, body in zip(joint.axes, "ij", strict=True)
+            ]
         case Spherical():
             return (Step(f"q {joint.name}", None),)
         case Fixed():
@@ -121,7 +147,9 @@ def _slide(joint: Joint, axis: Sequence[float]) -> Step:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """The tree at a state: poses of the bodies, what every unknown does, and on which unknowns each body depends."""
+    """The tree at a state: poses of the bodies, what every unknown does, and on which unknowns each
+    body depends.
+    """
 
     poses: Mapping[str, Pose]
     columns: Sequence[Column]
@@ -157,13 +185,17 @@ def posed(tree: Sequence[Chain], state: State) -> Posed:
     return Posed(poses, columns, ancestors)
 
 
-def retracted(tree: Sequence[Chain], state: State, step_of: Sequence[Scalar]) -> dict[str, Sequence[Scalar]]:
+def retracted(
+    tree: Sequence[Chain], state: State, step_of: Sequence[Scalar]
+) -> dict[str, Sequence[Scalar]]:
     """The state after a step of the unknowns."""
     after: dict[str, Sequence[Scalar]] = {}
     k = 0
     for step in (step for chain in tree for step in chain.steps):
         if step.axis is None:
-            after[step.name] = tuple(turned_by(quat(state[step.name]), 0.5 * vec(step_of[k : k + BALL])))
+            after[step.name] = tuple(
+                turned_by(quat(state[step.name]), 0.5 * vec(step_of[k : k + BALL]))
+            )
         else:
             after[step.name] = (state[step.name][0] + step_of[k],)
         k += step.unknowns
@@ -172,7 +204,9 @@ def retracted(tree: Sequence[Chain], state: State, step_of: Sequence[Scalar]) ->
 
 def moving(tree: Sequence[Chain], at: Posed, state: State, v: Sequence[Scalar]) -> dict[str, Twist]:
     """Velocities of all bodies at rates v."""
-    return {name: twist for name, (twist, _) in accelerating(tree, at, state, v, [0.0] * len(v)).items()}
+    return {
+        name: twist for name, (twist, _) in accelerating(tree, at, state, v, [0.0] * len(v)).items()
+    }
 
 
 def accelerating(
@@ -194,7 +228,13 @@ def accelerating(
             if step.slides:
                 slid = state[step.name][0] * axes[0]
                 v_P = v_P + rate + cross(w, slid)
-                v_P_t = v_P_t + rate_t + 2.0 * cross(w, rate) + cross(w_t, slid) + cross(w, cross(w, slid))
+                v_P_t = (
+                    v_P_t
+                    + rate_t
+                    + 2.0 * cross(w, rate)
+                    + cross(w_t, slid)
+                    + cross(w, cross(w, slid))
+                )
             else:
                 w, w_t = w + rate, w_t + rate_t + cross(w, rate)
             k += step.unknowns

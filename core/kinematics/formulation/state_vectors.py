@@ -1,4 +1,6 @@
-"""Where bodies are, as poses and as the state of a formulation: the way from results and estimates back to the equations."""
+"""Where bodies are, as poses and as the state of a formulation: the way from results and estimates
+back to the equations.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,12 @@ from .constraints import Frames
 from .formulation import Configuration, Formulation
 
 
-def displaced(mechanism: Mechanism, frame: Frames, placed: Mapping[str, tuple[Array, Array]]) -> dict[str, Pose]:
-    """Poses since design from origins r [m], shape (..., 3), and Euler parameters p [-], shape (..., 4), by body."""
+def displaced(
+    mechanism: Mechanism, frame: Frames, placed: Mapping[str, tuple[Array, Array]]
+) -> dict[str, Pose]:
+    """Poses since design from origins r [m], shape (..., 3), and Euler parameters p [-], shape
+    (..., 4), by body.
+    """
     found: dict[str, Pose] = {}
     for name, (r, p) in placed.items():
         body = mechanism.body(name)
@@ -31,18 +37,27 @@ def displaced(mechanism: Mechanism, frame: Frames, placed: Mapping[str, tuple[Ar
 
 
 def state_of(
-    formulation: Formulation, mechanism: Mechanism, frame: Frames, poses: Mapping[str, Pose], values: Mapping[str, float]
+    formulation: Formulation,
+    mechanism: Mechanism,
+    frame: Frames,
+    poses: Mapping[str, Pose],
+    values: Mapping[str, float],
 ) -> dict[str, Any]:
-    """The state of a Cartesian formulation that poses mean: named vectors, joint coordinates included.
+    """The state of a Cartesian formulation that poses mean: named vectors, joint coordinates
+    included.
 
     Args:
-        poses: of all moving bodies, or those left out are at design; scalars are floats or arrays of lanes.
-        values: of the drivers, from design [m or rad]: an angle, which poses know up to two turns only, is the one nearest to them.
+        poses: of all moving bodies, or those left out are at design; scalars are floats or arrays
+            of lanes.
+        values: of the drivers, from design [m or rad]: an angle, which poses know up to two turns
+            only, is the one nearest to them.
     """
     state: dict[str, Any] = dict(formulation.design)
     for name, pose in poses.items():
         state[f"u {name}"], state[f"q {name}"] = (*pose.u,), (pose.q.e0, *pose.q.e)
-    driven = {d.joint: values.get(d.name, 0.0) for d in mechanism.drivers if isinstance(d, JointAngle)}
+    driven = {
+        d.joint: values.get(d.name, 0.0) for d in mechanism.drivers if isinstance(d, JointAngle)
+    }
     for joint in mechanism.joints:
         if isinstance(joint, AxialJoint) and not state.keys().isdisjoint(
             {f"x {joint.name}.{freedom}" for freedom in joint.freedoms}
@@ -52,7 +67,9 @@ def state_of(
             s_i, s_j = (frame.arm(body, joint.point) for body in joint.bodies)
             apart = (j.u - i.u) + (j.swing(s_j) - i.swing(s_i))
             angle: Array = np.asarray(angle_about(h, relative))
-            angle = angle + 4.0 * np.pi * np.round((driven.get(joint.name, 0.0) - angle) / (4.0 * np.pi))
+            angle = angle + 4.0 * np.pi * np.round(
+                (driven.get(joint.name, 0.0) - angle) / (4.0 * np.pi)
+            )
             for freedom, value in (("rotation", angle), ("translation", i.turn(h) @ apart)):
                 if f"x {joint.name}.{freedom}" in state:
                     state[f"x {joint.name}.{freedom}"] = (value,)
@@ -60,7 +77,9 @@ def state_of(
 
 
 def jacobian(formulation: Formulation, at: Configuration | None = None) -> Array:
-    """The Jacobian of all rows at one configuration, else at the design, shape (rows, unknowns), in the units of the frames."""
+    """The Jacobian of all rows at one configuration, else at the design, shape (rows, unknowns), in
+    the units of the frames.
+    """
     rows = formulation.rows(at or formulation.configuration(formulation.design))
     matrix = np.zeros((len(rows), formulation.unknowns))
     for k, row in enumerate(rows):

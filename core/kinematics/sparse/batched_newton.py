@@ -1,8 +1,9 @@
 """Several samples of a sparse system at once, each in a lane of vectors.
 
-A group of samples is predicted by the polynomial through eight that came before it, at first by a Taylor step, and solved by
-Newton's iteration with factors in the order that served one pose. What is believed is what `SparseModel.reach` believes, and less
-near a singular pose: no pivot was chosen here. Samples are accepted up to the first that is not.
+A group of samples is predicted by the polynomial through eight that came before it, at first by a
+Taylor step, and solved by Newton's iteration with factors in the order that served one pose. What
+is believed is what `SparseModel.reach` believes, and less near a singular pose: no pivot was chosen
+here. Samples are accepted up to the first that is not.
 """
 
 from __future__ import annotations
@@ -23,12 +24,15 @@ if TYPE_CHECKING:
     from .sparse_model import SparseModel
 
 REMEMBERED = 8
-"""Samples that the next ones are predicted from: extrapolated by as many again, their rounding errors grow to 1e-12."""
+"""Samples that the next ones are predicted from: extrapolated by as many again, their rounding
+errors grow to 1e-12.
+"""
 ITERATIONS = 6
 """At most: what needs more is better predicted from the samples before it."""
 GROWTH = 5.0 / PIVOT_THRESHOLD
-"""The largest entry of L that is believed. SuperLU allows a fifth of it: most of a digit of the rates may be lost. Twice as much
-lost more than the library's conditions explain, eight samples at a time, and saved no order of large mechanisms."""
+"""The largest entry of L that is believed. SuperLU allows a fifth of it: most of a digit of the
+rates may be lost. Twice as much lost more than the library's conditions explain, eight samples at a
+time, and saved no order of large mechanisms."""
 
 
 class Batch:
@@ -36,19 +40,27 @@ class Batch:
 
     Attributes:
         width: how many.
-        outgrown: whether a sample was refused for what the order made of its factors: another would serve it.
+        outgrown: whether a sample was refused for what the order made of its factors: another would
+            serve it.
     """
 
     def __init__(self, model: SparseModel) -> None:
-        # not the model, which keeps this: what refers to each other stays in memory until somebody looks for it
+        # not the model, which keeps this: what refers to each other stays in memory until somebody
+        # looks for it
         self._kept, self._dropped, self._solved = model.kept, model.dropped, model.solved
         self._angles = model.angles
-        self._blocks, self._scale, self._tables = model.blocks, model.scale, SparseTables(model.elements, model.bodies)
+        self._blocks, self._scale, self._tables = (
+            model.blocks,
+            model.scale,
+            SparseTables(model.elements, model.bodies),
+        )
         self.width = self._tables.width
         self.order(model)
 
     def order(self, model: SparseModel) -> None:
-        """Eliminate from now on in the order that serves the pose where the model was last evaluated."""
+        """Eliminate from now on in the order that serves the pose where the model was last
+        evaluated.
+        """
         tables, self.outgrown = self._tables, False
         model.factors.update(model.elements.entries[model.solved])
         model.factors.factor()
@@ -59,11 +71,14 @@ class Batch:
         # the sign of the determinant is that of the model's factors, or always the opposite
         self._sign = np.sign(model.factors.signed_pivot) * np.sign(tables.pivots).prod(axis=0)
 
-    def reach(self, before: Sequence[Stand], times: Array, drives: Array, tol: float) -> list[Stand]:
+    def reach(
+        self, before: Sequence[Stand], times: Array, drives: Array, tol: float
+    ) -> list[Stand]:
         """Follow a motion to the next samples, as far as can be believed.
 
         Args:
-            before: where it stood, at different times, up to where it stands; `REMEMBERED` of them where there were as many.
+            before: where it stood, at different times, up to where it stands; `REMEMBERED` of them
+                where there were as many.
             times, drives: of the samples, one or more; those beyond a group are left out.
             tol: largest accepted residual.
         """
@@ -75,16 +90,39 @@ class Batch:
             self._predict(before, times)
             closure, iterations, done = self._iterated(tol)
             tables.motion()
-            state, rates, accelerations = tables["state"].copy(), tables["rates"].copy(), tables["accelerations"].copy()
-            leftover: Array = np.abs(tables["phi"].take(self._dropped, axis=0)).max(axis=0, initial=0.0)
+            state, rates, accelerations = (
+                tables["state"].copy(),
+                tables["rates"].copy(),
+                tables["accelerations"].copy(),
+            )
+            leftover: Array = np.abs(tables["phi"].take(self._dropped, axis=0)).max(
+                axis=0, initial=0.0
+            )
             branch: Array = tables["branch"].min(axis=0, initial=1.0)
             (pivot, turned), sigmas = self._pivots(here), self._sigmas()
             past = _past(here.state, state)
-            taylor = self._taylor(past, _past(here.rates, rates), _past(here.accelerations, accelerations), times - earlier)
+            taylor = self._taylor(
+                past,
+                _past(here.rates, rates),
+                _past(here.accelerations, accelerations),
+                times - earlier,
+            )
             gap, step = distance(state - taylor, self._scale), distance(state - past, self._scale)
             angles = tables["drives"][self._angles]
             turn = np.abs(angles - _past(here.turns, angles)).max(axis=0, initial=0.0)
-            poses = Poses(done, closure, leftover, branch, gap, step, turn, pivot, chosen=False, turned=turned, sigmas=sigmas)
+            poses = Poses(
+                done,
+                closure,
+                leftover,
+                branch,
+                gap,
+                step,
+                turn,
+                pivot,
+                chosen=False,
+                turned=turned,
+                sigmas=sigmas,
+            )
             sure = np.logical_and.reduce([*poses.passed(here, tol).values()])
             small = tables.growth <= GROWTH
         accepted = int(np.logical_and.accumulate((sure & small)[:count]).sum())
@@ -101,21 +139,29 @@ class Batch:
         ]
 
     def _pivots(self, here: Stand) -> tuple[Array, NDArray[np.bool_]]:
-        """Where all was last factored the smallest in size, and whether the orientation is another than where the motion stands."""
+        """Where all was last factored the smallest in size, and whether the orientation is another
+        than where the motion stands.
+        """
         pivots = self._tables.pivots
         entries = self._tables["entries"].take(self._solved, axis=0)
         orientation = self._blocks.orientation(entries, self._sign * np.sign(pivots).prod(axis=0))
-        return np.abs(pivots).min(axis=0), np.array([each != here.orientation for each in orientation])
+        return np.abs(pivots).min(axis=0), np.array(
+            [each != here.orientation for each in orientation]
+        )
 
     def _sigmas(self) -> Array:
         """As of `SparseModel`, where all was last factored."""
         if not len(self._dropped):
             return np.abs(self._tables.pivots).min(axis=0)[:, None]
         tables = self._tables
-        return self._blocks.sigmas(tables["entries"].take(self._solved, axis=0), tables.solve, tables.solve_transposed)
+        return self._blocks.sigmas(
+            tables["entries"].take(self._solved, axis=0), tables.solve, tables.solve_transposed
+        )
 
     def _predict(self, before: Sequence[Stand], times: Array) -> None:
-        """By the polynomial through the samples before, or by a Taylor step and what the last such step lacked."""
+        """By the polynomial through the samples before, or by a Taylor step and what the last such
+        step lacked.
+        """
         here = before[-1]
         if len(before) == REMEMBERED:
             known = np.array([each.time for each in before])
@@ -123,8 +169,12 @@ class Batch:
             state = np.column_stack([each.state for each in before]) @ weights
         else:
             h = times - here.time
-            state = self._taylor(here.state[:, None], here.rates[:, None], here.accelerations[:, None], h)
-            state = state + lacked(h, here.time - here.earlier) * (here.state - here.predicted)[:, None]
+            state = self._taylor(
+                here.state[:, None], here.rates[:, None], here.accelerations[:, None], h
+            )
+            state = (
+                state + lacked(h, here.time - here.earlier) * (here.state - here.predicted)[:, None]
+            )
         self._taylor(state, np.zeros(1), np.zeros(1), times)
 
     def _taylor(self, state: Array, rates: Array, accelerations: Array, h: Array) -> Array:
@@ -134,7 +184,9 @@ class Batch:
         return tables["state"].copy()
 
     def _iterated(self, tol: float) -> tuple[Array, int, NDArray[np.bool_]]:
-        """Newton's iteration from the state there is: residuals, how many iterations, and of which lanes it ended."""
+        """Newton's iteration from the state there is: residuals, how many iterations, and of which
+        lanes it ended.
+        """
         residual, iterations = self._evaluated(), 0
         rate, done = np.full(self.width, np.inf), residual <= SETTLED
         while iterations < ITERATIONS and not done.all():

@@ -1,4 +1,6 @@
-"""Signs of determinants and smallest singular values of a large sparse matrix, by block; `Elimination` has them of a small one."""
+"""Signs of determinants and smallest singular values of a large sparse matrix, by block;
+`Elimination` has them of a small one.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,16 @@ class Blocks:
         start: some vector that is of no direction in particular, shape (n, 1).
     """
 
-    def __init__(self, rows: Indices, columns: Indices, n: int, *, well_chosen: bool = True) -> None:
+    def __init__(
+        self, rows: Indices, columns: Indices, n: int, *, well_chosen: bool = True
+    ) -> None:
         """Find the blocks.
 
         Args:
             rows, columns: of the entries of the pattern.
             n: rows, and columns, of the matrix.
-            well_chosen: rows were chosen for being well conditioned; without, the largest block's singular values say nothing.
+            well_chosen: rows were chosen for being well conditioned; without, the largest block's
+                singular values say nothing.
         """
         self._well_chosen = well_chosen
         sparse: Any = importlib.import_module("scipy.sparse")
@@ -39,7 +44,9 @@ class Blocks:
         _, block = graphs.connected_components(needs, directed=True, connection="strong")
         sizes = np.bincount(block)
         largest = sizes.argmax()
-        self.rows, self.columns = ((each == largest).astype(float)[:, None] for each in (block, block[row_of]))
+        self.rows, self.columns = (
+            (each == largest).astype(float)[:, None] for each in (block, block[row_of])
+        )
         self.start = np.random.default_rng(0).normal(size=(n, 1))
         sizes[largest] = 0
         # of every row its place in its block, and of every column that of its row
@@ -51,41 +58,60 @@ class Blocks:
         for size in np.unique(sizes[sizes > 0]).tolist():
             number = np.where(sizes == size, np.cumsum(sizes == size) - 1, -1)
             entries = np.flatnonzero(inside & (number[block[rows]] >= 0))
-            at = (number[block[rows[entries]]] * size + place[rows[entries]]) * size + place[row_of[columns[entries]]]
+            at = (number[block[rows[entries]]] * size + place[rows[entries]]) * size + place[
+                row_of[columns[entries]]
+            ]
             self._groups.append((size, entries, at))
 
     def orientation(self, values: Array, whole: Array) -> list[bytes]:
-        """Of several poses the sign of each block's determinant, each right at all values, or at none.
+        """Of several poses the sign of each block's determinant, each right at all values, or at
+        none.
 
         Args:
             values: of the entries, in the order of the pattern, shape (entries, poses).
-            whole: of the sign of the whole determinant, from which that of the largest block follows, shape (poses,).
+            whole: of the sign of the whole determinant, from which that of the largest block
+                follows, shape (poses,).
         """
         signs = [np.ones((len(whole), 1))]
         # most blocks are of one row
-        signs += [np.sign(each[..., 0, 0]) if each.shape[-1] == 1 else np.linalg.slogdet(each)[0] for each in self._dense(values)]
+        signs += [
+            np.sign(each[..., 0, 0]) if each.shape[-1] == 1 else np.linalg.slogdet(each)[0]
+            for each in self._dense(values)
+        ]
         small = np.concatenate(signs, axis=1)
         found = np.column_stack([small, np.sign(whole) * small.prod(axis=1)])
         return [each.tobytes() for each in found.astype(np.int8)]
 
-    def sigmas(self, values: Array, solve: Callable[[Array], Array], solve_transposed: Callable[[Array], Array]) -> Array:
+    def sigmas(
+        self,
+        values: Array,
+        solve: Callable[[Array], Array],
+        solve_transposed: Callable[[Array], Array],
+    ) -> Array:
         """Of several poses the smallest singular value of each block, shape (poses, blocks).
 
-        Of the largest, which comes first, it is an estimate by a step of inverse iteration: no less, and the nearer the more
-        singular the block is. The whole matrix gives it: blocks before have no part in what is asked of one, and what it says of
-        those behind is left out.
+        Of the largest, which comes first, it is an estimate by a step of inverse iteration: no
+        less, and the nearer the more singular the block is. The whole matrix gives it: blocks
+        before have no part in what is asked of one, and what it says of those behind is left out.
 
         Args:
             solve, solve_transposed: solve for right-hand sides of all poses, shape (n, poses).
         """
         found = [np.zeros((values.shape[1], 0))]
         if self._well_chosen:
-            left = self.rows * solve_transposed(np.repeat(self.columns * self.start, values.shape[1], axis=1))
+            left = self.rows * solve_transposed(
+                np.repeat(self.columns * self.start, values.shape[1], axis=1)
+            )
             right = self.columns * solve(left)
             found.append((np.linalg.norm(left, axis=0) / np.linalg.norm(right, axis=0))[:, None])
         for each in self._dense(values):
-            sound = np.where(np.isfinite(each).all(axis=(2, 3), keepdims=True), each, 0.0)  # what is no number is singular
-            found.append(np.abs(sound[..., 0, 0]) if each.shape[-1] == 1 else np.linalg.svd(sound, compute_uv=False)[..., -1])
+            # what is no number is singular
+            sound = np.where(np.isfinite(each).all(axis=(2, 3), keepdims=True), each, 0.0)
+            found.append(
+                np.abs(sound[..., 0, 0])
+                if each.shape[-1] == 1
+                else np.linalg.svd(sound, compute_uv=False)[..., -1]
+            )
         return np.concatenate(found, axis=1)
 
     def _dense(self, values: Array) -> Iterator[Array]:

@@ -20,15 +20,19 @@ from ..structure.sparse_lu import Indices
 
 SIDES = ("i", "j")
 WHERE, HOW = "where", "how"
-"""The programs of a kind: what follows from where its bodies are, and gamma, which needs to know how they move."""
+"""The programs of a kind: what follows from where its bodies are, and gamma, which needs to know
+how they move.
+"""
 QUANTITIES: tuple[str, ...] = ("phi", "nu", "gamma", "branch", "entries")
 
 
 @dataclass(frozen=True)
 class Numbering:
-    """Places in the vectors of a mechanism: component by component, in each the bodies in order, and then the coordinates.
+    """Places in the vectors of a mechanism: component by component, in each the bodies in order,
+    and then the coordinates.
 
-    A state has u and q of the bodies, and drives may stand behind it; rates have v and w, steps dr and dpi.
+    A state has u and q of the bodies, and drives may stand behind it; rates have v and w, steps dr
+    and dpi.
     """
 
     bodies: Mapping[str, int]
@@ -44,8 +48,12 @@ class Numbering:
         """Numbers of the rates."""
         return 6 * len(self.bodies) + len(self.coordinates)
 
-    def places(self, components: int, bodies: Iterable[str], coordinates: Iterable[str]) -> list[int]:
-        """Where the components of some bodies stand, and then some coordinates: 7 for a state, 6 for rates."""
+    def places(
+        self, components: int, bodies: Iterable[str], coordinates: Iterable[str]
+    ) -> list[int]:
+        """Where the components of some bodies stand, and then some coordinates: 7 for a state, 6
+        for rates.
+        """
         n = len(self.bodies)
         found = [k * n + self.bodies[body] for body in bodies for k in range(components)]
         return found + [components * n + self.coordinates[name] for name in coordinates]
@@ -53,7 +61,9 @@ class Numbering:
 
 @dataclass(frozen=True)
 class Member:
-    """A constraint, the number of its first row, and of the driver that moves it; None where none does."""
+    """A constraint, the number of its first row, and of the driver that moves it; None where none
+    does.
+    """
 
     constraint: Constraint | Relation
     row: int
@@ -69,7 +79,9 @@ class Member:
     def coordinates(self) -> tuple[str, ...]:
         """The coordinates it reads."""
         c = self.constraint
-        return tuple(c.weights) if isinstance(c, Relation) else (c.coordinate,) if c.coordinate else ()
+        return (
+            tuple(c.weights) if isinstance(c, Relation) else (c.coordinate,) if c.coordinate else ()
+        )
 
     def bodies(self, moving: Mapping[str, int]) -> dict[str, str]:
         """Those of its bodies that move, by side."""
@@ -82,22 +94,34 @@ class Member:
         """What it is made of, by name."""
         c = self.constraint
         if isinstance(c, Relation):
-            return {**{f"x{k}": weight for k, weight in enumerate(c.weights.values())}, "drive": c.drive}
+            return {
+                **{f"x{k}": weight for k, weight in enumerate(c.weights.values())},
+                "drive": c.drive,
+            }
         return {each.name: getattr(c.primitive, each.name) for each in fields(c.primitive)}
 
     def kind(self, moving: Mapping[str, int]) -> Any:
         """What constraints must have in common to share a program."""
-        # vectors, not their components: axes that happen to lie in a global plane would make a kind each
-        zero = tuple(not any(value) for value in self.geometry().values() if isinstance(value, Vec3))
+        # vectors, not their components: axes that happen to lie in a global plane would make a kind
+        # each
+        zero = tuple(
+            not any(value) for value in self.geometry().values() if isinstance(value, Vec3)
+        )
         named = len(self.coordinates), self.driver is not None
         c = self.constraint
-        return (Relation if isinstance(c, Relation) else type(c.primitive), tuple(self.bodies(moving)), *named, zero)
+        return (
+            Relation if isinstance(c, Relation) else type(c.primitive),
+            tuple(self.bodies(moving)),
+            *named,
+            zero,
+        )
 
 
 class ElementType:
     """The constraints of one kind: what their programs read, and what they give, as traced.
 
-    Slots of a lane: the numbers of its state and drive, those of its rates, its geometry, its outputs.
+    Slots of a lane: the numbers of its state and drive, those of its rates, its geometry, its
+    outputs.
     """
 
     def __init__(self, members: Sequence[Member], numbering: Numbering) -> None:
@@ -119,11 +143,17 @@ class ElementType:
         formulation = self._formulation(members, moving)
         given = iter(self.inputs[WHERE])
         state = {
-            f"{part} {side}": self._next(given, count) for side in first.bodies(moving) for part, count in (("u", 3), ("q", 4))
+            f"{part} {side}": self._next(given, count)
+            for side in first.bodies(moving)
+            for part, count in (("u", 3), ("q", 4))
         }
         state |= {f"x {name}": self._next(given, 1) for name in formulation.coordinates}
         at = formulation.configuration(state)
-        rows = [(k, column, value) for k, row in enumerate(formulation.rows(at)) for column, value in row.items()]
+        rows = [
+            (k, column, value)
+            for k, row in enumerate(formulation.rows(at))
+            for column, value in row.items()
+        ]
         self._values: dict[str, Sequence[Scalar]] = {
             "phi": formulation.phi(at),
             "nu": formulation.nu(at),
@@ -137,19 +167,29 @@ class ElementType:
         end, programs = self.geometry_at + len(self.geometry), dict[str, Program]()
         self.outputs: dict[str, range] = {}
         for name in (WHERE, HOW):
-            values = [value for of, *_, value in self._written() if of == name and isinstance(value, Traced)]
+            values = [
+                value
+                for of, *_, value in self._written()
+                if of == name and isinstance(value, Traced)
+            ]
             if values:
                 self.outputs[name] = range(end, end := end + len(values))
-                programs[name] = program(name, self._tape, dict(zip(self.outputs[name], values, strict=True)))
+                programs[name] = program(
+                    name, self._tape, dict(zip(self.outputs[name], values, strict=True))
+                )
         self.plan = Plan(programs, {str(k): k for k in range(end)})
 
     def _next(self, slots: Iterator[int], count: int) -> list[Scalar]:
         return [self._tape.input(slot) for slot in islice(slots, count)]
 
     def _formulation(self, members: Sequence[Member], moving: Mapping[str, int]) -> Cartesian:
-        """The equations of one of them, over numbers that are known when the program runs, but for those all have in common."""
+        """The equations of one of them, over numbers that are known when the program runs, but for
+        those all have in common.
+        """
         first, drive = members[0], self.inputs[WHERE][-5:]
-        geometry = {name: self._lifted(name, value, members) for name, value in first.geometry().items()}
+        geometry = {
+            name: self._lifted(name, value, members) for name, value in first.geometry().items()
+        }
         if first.driver is not None:
             geometry["drive"] = Drive(*(self._tape.input(slot) for slot in drive))
         c = first.constraint
@@ -163,7 +203,13 @@ class ElementType:
     def _lifted(self, name: str, value: Any, members: Sequence[Member]) -> Any:
         if isinstance(value, Drive):
             return value
-        numbers = np.array([[*each] if isinstance(each, Vec3) else [each] for m in members for each in [m.geometry()[name]]]).T
+        numbers = np.array(
+            [
+                [*each] if isinstance(each, Vec3) else [each]
+                for m in members
+                for each in [m.geometry()[name]]
+            ]
+        ).T
         found = [self._constant_or_input(row) for row in numbers]
         return vec(found) if isinstance(value, Vec3) else found[0]
 
@@ -178,15 +224,23 @@ class ElementType:
         return len(self._values[quantity]) * self.lanes
 
     def _written(self) -> Iterator[tuple[str, str, Indices, Scalar]]:
-        """What it gives, of all constraints at a time: the name of a program, quantity and places in it, and the value."""
+        """What it gives, of all constraints at a time: the name of a program, quantity and places
+        in it, and the value.
+        """
         for name, quantities in ((WHERE, ("phi", "nu", "branch", "entries")), (HOW, ("gamma",))):
             for quantity in quantities:
                 for k, value in enumerate(self._values[quantity]):
-                    rows = k * self.lanes + np.arange(self.lanes) if quantity in ("branch", "entries") else self._row + k
+                    rows = (
+                        k * self.lanes + np.arange(self.lanes)
+                        if quantity in ("branch", "entries")
+                        else self._row + k
+                    )
                     yield name, quantity, rows, value
 
     def places(self, starts: Mapping[str, int]) -> dict[str, Indices]:
-        """Where the outputs of its programs go, where every quantity has its start, shape (outputs, constraints)."""
+        """Where the outputs of its programs go, where every quantity has its start, shape (outputs,
+        constraints).
+        """
         found: dict[str, list[Indices]] = {name: [] for name in self.outputs}
         for name, quantity, rows, value in self._written():
             if isinstance(value, Traced):
@@ -202,4 +256,7 @@ class ElementType:
     @property
     def sizes(self) -> dict[str, dict[str, int]]:
         """Operations and flops of one constraint, by program."""
-        return {f"{name}, {self.lanes} {self.label}": each.size for name, each in self.plan.programs.items()}
+        return {
+            f"{name}, {self.lanes} {self.label}": each.size
+            for name, each in self.plan.programs.items()
+        }

@@ -1,8 +1,10 @@
-"""The constraints of a large mechanism as elements: constraints of one kind share one small program, its lanes are the constraints.
+"""The constraints of a large mechanism as elements: constraints of one kind share one small
+program, its lanes are the constraints.
 
-Constraints are of one kind where their primitives have the same type, the same of their bodies move and the same vectors are zero
-(the arm of a joint at a body's origin). What all of a kind have in common is a constant of its program; all else is an input:
-geometry once, poses and drives at every evaluation, rates for the accelerations.
+Constraints are of one kind where their primitives have the same type, the same of their bodies move
+and the same vectors are zero (the arm of a joint at a body's origin). What all of a kind have in
+common is a constant of its program; all else is an input: geometry once, poses and drives at every
+evaluation, rates for the accelerations.
 """
 
 from __future__ import annotations
@@ -38,37 +40,55 @@ class Elements:
     """
 
     def __init__(
-        self, constraints: Sequence[Constraint | Relation], bodies: Sequence[str], drivers: int, *, compiled: bool
+        self,
+        constraints: Sequence[Constraint | Relation],
+        bodies: Sequence[str],
+        drivers: int,
+        *,
+        compiled: bool,
     ) -> None:
         members, self.drivers = list[Member](), drivers
         self.owners: list[tuple[str, str]] = []
         for k, c in enumerate(constraints, drivers - len(constraints)):  # the drivers come last
             members.append(Member(c, len(self.owners), k if k >= 0 else None))
-            self.owners += [(c.owner, members[-1].what)] * (1 if isinstance(c, Relation) else c.primitive.n)
+            self.owners += [(c.owner, members[-1].what)] * (
+                1 if isinstance(c, Relation) else c.primitive.n
+            )
         coordinates = dict.fromkeys(name for member in members for name in member.coordinates)
-        self.numbering = Numbering(*({name: k for k, name in enumerate(names)} for names in (bodies, coordinates)))
+        self.numbering = Numbering(
+            *({name: k for k, name in enumerate(names)} for names in (bodies, coordinates))
+        )
         kinds: dict[Any, list[Member]] = {}
         for member in members:
             kinds.setdefault(member.kind(self.numbering.bodies), []).append(member)
-        self.kinds, self.compiled = [ElementType(each, self.numbering) for each in kinds.values()], compiled and available()
+        self.kinds, self.compiled = (
+            [ElementType(each, self.numbering) for each in kinds.values()],
+            compiled and available(),
+        )
         self.rows, self.columns = (
-            np.concatenate([getattr(kind, name).ravel() for kind in self.kinds]) for name in ("rows", "columns")
+            np.concatenate([getattr(kind, name).ravel() for kind in self.kinds])
+            for name in ("rows", "columns")
         )
         sizes = dict.fromkeys(QUANTITIES, len(self.owners))
-        sizes |= {name: sum(kind.size(name) for kind in self.kinds) for name in ("branch", "entries")}
+        sizes |= {
+            name: sum(kind.size(name) for kind in self.kinds) for name in ("branch", "entries")
+        }
         ends = np.cumsum(list(sizes.values()))
         # one array, so that each kind writes once
         self.results = np.zeros(ends[-1])
         self.phi, self.nu, self.gamma, self.branch, self.entries = np.split(self.results, ends[:-1])
         starts: dict[str, int] = dict(zip(QUANTITIES, [0, *ends[:-1].tolist()], strict=True))
-        self.parts = {name: slice(starts[name], starts[name] + size) for name, size in sizes.items()}
+        self.parts = {
+            name: slice(starts[name], starts[name] + size) for name, size in sizes.items()
+        }
         self.starts: list[Mapping[str, int]] = []
         for kind in self.kinds:
             self.starts.append(dict(starts))
             for name in ("branch", "entries"):
                 starts[name] += kind.size(name)
         self._bound = [
-            _Bound(kind, self.results, at, compiled=self.compiled) for kind, at in zip(self.kinds, self.starts, strict=True)
+            _Bound(kind, self.results, at, compiled=self.compiled)
+            for kind, at in zip(self.kinds, self.starts, strict=True)
         ]
 
     @property
@@ -96,17 +116,29 @@ class Elements:
 class _Bound:
     """The constraints of a kind as lanes."""
 
-    def __init__(self, kind: ElementType, results: Array, starts: Mapping[str, int], *, compiled: bool) -> None:
-        """Write what is constant, and prepare to write the rest, into an array where every quantity has its start."""
+    def __init__(
+        self, kind: ElementType, results: Array, starts: Mapping[str, int], *, compiled: bool
+    ) -> None:
+        """Write what is constant, and prepare to write the rest, into an array where every quantity
+        has its start.
+        """
         self._results, lanes = results, kind.lanes
-        self._executor: Executor = LlvmExecutor(LlvmCode(kind.plan), lanes) if compiled else NumpyExecutor(kind.plan, lanes)
+        self._executor: Executor = (
+            LlvmExecutor(LlvmCode(kind.plan), lanes)
+            if compiled
+            else NumpyExecutor(kind.plan, lanes)
+        )
         for rows, value in kind.constants(starts):
             results[rows] = value
-        # gathered and scattered by one call each: of some hundred bodies it is the calls that take the time
+        # gathered and scattered by one call each: of some hundred bodies it is the calls that take
+        # the time
         inputs = {name: (kind.inputs[name], read) for name, read in kind.read.items()}
         outputs = {name: (kind.outputs[name], rows) for name, rows in kind.places(starts).items()}
         self._taken, self._written = (
-            {name: (self._executor.window(slots), self._executor.arranged(at).copy()) for name, (slots, at) in each.items()}
+            {
+                name: (self._executor.window(slots), self._executor.arranged(at).copy())
+                for name, (slots, at) in each.items()
+            }
             for each in (inputs, outputs)
         )
         if kind.geometry:

@@ -12,16 +12,18 @@ from ..formulation.acceptance_criteria import EPSILON
 from .sparse_model import FailedError, SparseModel
 from .step_state import Stand, distance
 
-# Steps of inverse iteration: each divides what is left of other directions by the square of how much better they are determined.
+# Steps of inverse iteration: each divides what is left of other directions by the square of how
+# much better they are determined.
 STEPS = 3
 
 
 def uncertain(model: SparseModel, at: Stand, drives: Array) -> Sequence[float]:
-    """By how much what is left of residuals may have moved a pose [of the mechanism's size], its rates and accelerations [of their
-    own].
+    """By how much what is left of residuals may have moved a pose [of the mechanism's size], its
+    rates and accelerations [of their own].
 
-    That is seen where the pose is moved as far as they can move it, in the direction that the rows determine least. By the smallest
-    singular value itself all samples of a large ring would be in doubt, which are known well.
+    That is seen where the pose is moved as far as they can move it, in the direction that the rows
+    determine least. By the smallest singular value itself all samples of a large ring would be in
+    doubt, which are known well.
     """
     residual, left = max(at.closure, EPSILON), np.ones(len(model.kept))
     try:
@@ -29,7 +31,9 @@ def uncertain(model: SparseModel, at: Stand, drives: Array) -> Sequence[float]:
             model.evaluate(at.state, drives)
             here = model.motion()
             for _ in range(STEPS):
-                left = model.factors.solve_transposed(model.factors.solve(left / np.abs(left).max()))
+                left = model.factors.solve_transposed(
+                    model.factors.solve(left / np.abs(left).max())
+                )
             moved = model.moved(at.state, model.factors.solve(residual * np.sign(left)))
             model.evaluate(moved, drives)
             there = model.motion()
@@ -37,5 +41,8 @@ def uncertain(model: SparseModel, at: Stand, drives: Array) -> Sequence[float]:
         return math.inf, math.inf, math.inf
     speed, acceleration = (float(np.abs(each).max(initial=0.0)) for each in here)
     sizes = speed, max(acceleration, speed**2)
-    off = [float(np.abs(a - b).max()) / (size or 1.0) for a, b, size in zip(there, here, sizes, strict=True)]
+    off = [
+        float(np.abs(a - b).max()) / (size or 1.0)
+        for a, b, size in zip(there, here, sizes, strict=True)
+    ]
     return float(distance(moved - at.state, model.scale)), *off

@@ -23,15 +23,21 @@ def turned() -> Program:
 
 
 class Turn:
-    """Turns Euler parameters by small global rotations; to compute that with arrays took an eighth of a sparse sweep."""
+    """Turns Euler parameters by small global rotations; to compute that with arrays took an eighth
+    of a sparse sweep.
+    """
 
     def __init__(self, bodies: int, *, compiled: bool) -> None:
         plan = Plan({"turned": turned()}, {str(k): k for k in range(TO.stop)})
         compiled = compiled and available()
-        self._executor: Executor = LlvmExecutor(LlvmCode(plan), bodies) if compiled else NumpyExecutor(plan, bodies)
+        self._executor: Executor = (
+            LlvmExecutor(LlvmCode(plan), bodies) if compiled else NumpyExecutor(plan, bodies)
+        )
 
     def __call__(self, q: Array, rotation: Array) -> Array:
-        """Euler parameters after rotations [rad], of length one; shapes (4 * bodies,) and (3 * bodies,), component by component."""
+        """Euler parameters after rotations [rad], of length one; shapes (4 * bodies,) and (3 *
+        bodies,), component by component.
+        """
         self._executor.put(BY, np.concatenate([q, rotation]).reshape(len(BY), -1))
         self._executor.run("turned")
         return self._executor.get(TO).ravel()

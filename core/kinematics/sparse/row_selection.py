@@ -1,14 +1,19 @@
-"""Which rows of a large mechanism to solve for: nothing dense, and where redundant rows are many nothing quadratic.
+"""Which rows of a large mechanism to solve for: nothing dense, and where redundant rows are many
+nothing quadratic.
 
-They are seen in J J^T, sparse and in a sparse order, with a little added to the diagonal, so that the elimination can go on after a
-row that has no pivot. Multiplied by the inverse of that, any vectors become such as make J vanish: the weights of sums of rows that
-are zero. Rows are left out by pivoted QR of these (rank-revealing): where they have most weight, those kept are well conditioned.
+They are seen in J J^T, sparse and in a sparse order, with a little added to the diagonal, so that
+the elimination can go on after a row that has no pivot. Multiplied by the inverse of that, any
+vectors become such as make J vanish: the weights of sums of rows that are zero. Rows are left out
+by pivoted QR of these (rank-revealing): where they have most weight, those kept are well
+conditioned.
 
-Where redundant rows are many the pivots themselves are taken: that of a row of length one is its squared distance from the rows
-eliminated before it. What is kept is independent, and may be badly conditioned: in a chain of loops rows are left out at one end.
+Where redundant rows are many the pivots themselves are taken: that of a row of length one is its
+squared distance from the rows eliminated before it. What is kept is independent, and may be badly
+conditioned: in a chain of loops rows are left out at one end.
 
-Squares lose half the digits: that the rows kept are independent is for their own factorisation to say, which has all of them.
-Refused for this: orthogonal factorisation of J, which scipy has dense only.
+Squares lose half the digits: that the rows kept are independent is for their own factorisation to
+say, which has all of them. Refused for this: orthogonal factorisation of J, which scipy has dense
+only.
 """
 
 from __future__ import annotations
@@ -23,13 +28,15 @@ from ...trajectory import Array
 from ..structure.sparse_lu import NARROW, Indices
 from .elements import Elements
 
-# Added to the squared length, one, of every row. A repeated row keeps this times the number of rows it repeats, well below the
-# pivots of independent ones, and far above round-off.
+# Added to the squared length, one, of every row. A repeated row keeps this times the number of rows
+# it repeats, well below the pivots of independent ones, and far above round-off.
 LIFT = 1e-13
-# Numbers that are looked at together, 80 MB. Each redundant row takes a solution as long as the rows.
+# Numbers that are looked at together, 80 MB. Each redundant row takes a solution as long as the
+# rows.
 TOGETHER = 10**7
-# Vectors beyond those that are needed, so that none is missed by chance. Sums that are smaller than the second are taken for zero,
-# before drivers are taken to repeat joints: geometry that is nearly redundant is often meant to be so.
+# Vectors beyond those that are needed, so that none is missed by chance. Sums that are smaller than
+# the second are taken for zero, before drivers are taken to repeat joints: geometry that is nearly
+# redundant is often meant to be so.
 SPARE, NEARLY = 8, 1e-3
 
 
@@ -61,10 +68,12 @@ class Jacobian:
         return (count - wanted) * count <= TOGETHER
 
     def independent(self, last: int) -> Indices:
-        """As many rows as there are columns, the most independent of them; all where there are no more.
+        """As many rows as there are columns, the most independent of them; all where there are no
+        more.
 
         Args:
-            last: so many rows at the end (the drivers) are judged after all others, and not at their expense.
+            last: so many rows at the end (the drivers) are judged after all others, and not at
+                their expense.
         """
         count, wanted = self.shape
         if count <= wanted:
@@ -72,9 +81,15 @@ class Jacobian:
         joints = count - last
         sparse, linear, dense = _modules()
         lengths = np.sqrt(np.bincount(self.rows, self.values**2, count))
-        J = sparse.csr_matrix((self.values / lengths[self.rows], (self.rows, self.columns)), shape=self.shape)
+        J = sparse.csr_matrix(
+            (self.values / lengths[self.rows], (self.rows, self.columns)), shape=self.shape
+        )
         gram = (J @ J.T + LIFT * sparse.identity(count)).tocsc()
-        options: Any = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True, "Equil": False}, **NARROW}
+        options: Any = {
+            "diag_pivot_thresh": 0.0,
+            "options": {"SymmetricMode": True, "Equil": False},
+            **NARROW,
+        }
         if self.well_chosen:
             found = linear.splu(gram[:joints, :joints], permc_spec="COLAMD", **options)
             some = np.random.default_rng(0).normal(size=(joints, count - wanted + SPARE))
@@ -93,5 +108,8 @@ class Jacobian:
 
 
 def _modules() -> tuple[Any, Any, Any]:
-    sparse, linear, dense = (importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.linalg", "scipy.linalg"))
+    sparse, linear, dense = (
+        importlib.import_module(name)
+        for name in ("scipy.sparse", "scipy.sparse.linalg", "scipy.linalg")
+    )
     return sparse, linear, dense

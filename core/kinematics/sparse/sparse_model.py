@@ -1,11 +1,14 @@
-"""A large mechanism as one sparse system: for what cannot be solved part by part and is too large for a program of its own.
+"""A large mechanism as one sparse system: for what cannot be solved part by part and is too large
+for a program of its own.
 
-With machine code several samples are solved at once (see `together`). What these cannot follow, and all where there is none, is
-solved here, one sample after the other: constraints in bulk (see `elements`), SuperLU in a fixed order (see `factors`). A sample is
-predicted by a Taylor step and takes two factorisations: at the predicted pose for Newton's iterations, as long as they converge
-fast with it, and at the solution for velocities and accelerations. With one for all, and refinement for the last two, a ring of
-3,000 cranks takes a third longer, a chain of 5,000 loops a tenth less. Lengths are measured near the size of the bodies, not of the
-whole: that is what the entries of the matrix and the round-off of the rows depend on.
+With machine code several samples are solved at once (see `together`). What these cannot follow, and
+all where there is none, is solved here, one sample after the other: constraints in bulk (see
+`elements`), SuperLU in a fixed order (see `factors`). A sample is predicted by a Taylor step and
+takes two factorisations: at the predicted pose for Newton's iterations, as long as they converge
+fast with it, and at the solution for velocities and accelerations. With one for all, and refinement
+for the last two, a ring of 3,000 cranks takes a third longer, a chain of 5,000 loops a tenth less.
+Lengths are measured near the size of the bodies, not of the whole: that is what the entries of the
+matrix and the round-off of the rows depend on.
 """
 
 from __future__ import annotations
@@ -38,7 +41,8 @@ from .rotation_update import Turn
 from .row_selection import Jacobian
 from .step_state import CONTRACTS, SETTLED, STALLS, Poses, Stand, distance, lacked
 
-# Rows are chosen anew where that makes the determinant, and so the least of what it is a product of, as many times larger.
+# Rows are chosen anew where that makes the determinant, and so the least of what it is a product
+# of, as many times larger.
 BETTER = 3.0
 FEW = 5
 """Names listed in a message, at most."""
@@ -52,14 +56,17 @@ class SparseModel:
     """A mechanism made ready to be solved along paths, as often as wanted.
 
     Attributes:
-        extent: a power of two of metres near the mechanism's size; frame: what lengths are measured in.
-        kept, dropped: rows that are solved, and rows that repeat them; solved: the entries of those.
+        extent: a power of two of metres near the mechanism's size; frame: what lengths are measured
+            in.
+        kept, dropped: rows that are solved, and rows that repeat them; solved: the entries of
+            those.
         blocks, factors: of the matrix that these make.
         scale: see `distance`.
         design: at the design position, with all drivers at rest.
 
     Raises:
-        SolveError: it cannot move, can move more than its drivers say, or does not close at the design position.
+        SolveError: it cannot move, can move more than its drivers say, or does not close at the
+            design position.
     """
 
     def __init__(self, mechanism: Mechanism, *, compiled: bool = True) -> None:
@@ -68,18 +75,24 @@ class SparseModel:
         self.mechanism = mechanism
         self.extent, self.frame = measured(mechanism)
         self.elements = Elements(
-            constraints(mechanism, self.frame, {}), self.frame.moving, len(mechanism.drivers), compiled=compiled
+            constraints(mechanism, self.frame, {}),
+            self.frame.moving,
+            len(mechanism.drivers),
+            compiled=compiled,
         )
         numbering = self.elements.numbering
         n = self.bodies = len(self.frame.moving)
         # what a change of the state is measured by: lengths by the mechanism's size
         length = self.frame.unit / self.extent
-        coordinates = [length if name.endswith(".translation") else 1.0 for name in numbering.coordinates]
+        coordinates = [
+            length if name.endswith(".translation") else 1.0 for name in numbering.coordinates
+        ]
         self.scale = np.concatenate([np.full(3 * n, length), np.ones(4 * n), coordinates])
         state = np.zeros(numbering.state)
         state[3 * n : 4 * n] = 1.0
         self._turn = Turn(n, compiled=compiled)
-        self.angles = [5 * k for k, driver in enumerate(mechanism.drivers) if driver.turns]  # among the numbers of all drives
+        # among the numbers of all drives
+        self.angles = [5 * k for k, driver in enumerate(mechanism.drivers) if driver.turns]
         self._rest = self.drives(Path({}, np.zeros(1)), np.zeros(1))[:, 0]
         self.elements.evaluate(state, self._rest)
         self._select()
@@ -100,9 +113,10 @@ class SparseModel:
         if not pivot > RANK_TOLERANCE or (self.dropped >= rows - drivers).any():
             require_driven(self.mechanism)
             raise SolveError(
-                f"mechanism {self.mechanism.name!r}: driven by {locked_drivers(self.mechanism)} it does not move at the design "
-                "position (lock-up or dead centre); give the design in another pose, some degrees on, and sweep from there, "
-                "or drive another coordinate"
+                f"mechanism {self.mechanism.name!r}: driven by {locked_drivers(self.mechanism)} it"
+                " does not move at the design position (lock-up or dead centre); give the design"
+                " in another pose, some degrees on, and sweep from there, or drive another"
+                " coordinate"
             )
 
     def _keep(self, kept: Indices, jacobian: Jacobian) -> None:
@@ -114,8 +128,11 @@ class SparseModel:
         self.factors = Factors(*pattern, jacobian.values[self.solved], len(kept))
         self.blocks = Blocks(*pattern, len(kept), well_chosen=jacobian.well_chosen)
 
-    def anew(self, at: Stand, drives: Array, known: Sequence[SparseModel]) -> tuple[SparseModel, Stand] | None:
-        """The same by rows that are better where a motion stands, and how it stands by them; None where none are better.
+    def anew(
+        self, at: Stand, drives: Array, known: Sequence[SparseModel]
+    ) -> tuple[SparseModel, Stand] | None:
+        """The same by rows that are better where a motion stands, and how it stands by them; None
+        where none are better.
 
         Args:
             known: others that are made already.
@@ -153,7 +170,11 @@ class SparseModel:
     def drives(self, path: Path, times: Array) -> Array:
         """What `Elements.evaluate` wants of all drivers at the times, shape (5 * drivers, n)."""
         drivers = self.mechanism.drivers
-        drive = path.drive([driver.name for driver in drivers], times) if drivers else np.empty((3, 0, len(times)))
+        drive = (
+            path.drive([driver.name for driver in drivers], times)
+            if drivers
+            else np.empty((3, 0, len(times)))
+        )
         return drive_numbers(drivers, drive, self.frame.unit)
 
     def moved(self, state: Array, step: Array) -> Array:
@@ -169,7 +190,9 @@ class SparseModel:
         return float(np.abs(self.elements.phi[self.kept]).max())
 
     def _closed(self, state: Array) -> Stand:
-        """The design position; a rod given longer or shorter than its design distance is taken up here."""
+        """The design position; a rod given longer or shorter than its design distance is taken up
+        here.
+        """
         residual = math.inf
         for _ in range(50):
             residual = self.evaluate(state, self._rest)
@@ -182,21 +205,41 @@ class SparseModel:
             state = self.moved(state, -self.factors.solve(self.elements.phi[self.kept]))
         if not residual <= CLOSED or not self.elements.branch.min(initial=1.0) > 0.0:
             raise SolveError(
-                f"mechanism {self.mechanism.name!r} does not close at the design position: residual "
-                f"{residual * self.frame.unit:.3g} m after Newton's iteration, expected 0; check points, axes and lengths"
+                f"mechanism {self.mechanism.name!r} does not close at the design position: residual"
+                f" {residual * self.frame.unit:.3g} m after Newton's iteration, expected 0; check"
+                " points, axes and lengths"
             )
         zero = np.zeros(self.elements.numbering.unknowns)
         return Stand(0.0, 0.0, state, state, zero, zero)
 
     def moving(self, at: Stand, time: float, drives: Array) -> Stand:
-        """What stands, with the rates that the drives give it there, and no step behind it. Raises FailedError."""
+        """What stands, with the rates that the drives give it there, and no step behind it. Raises
+        FailedError.
+        """
         self.evaluate(at.state, drives)
         rates, accelerations = self.motion()
-        now = replace(at, time=time, earlier=time, predicted=at.state, rates=rates, accelerations=accelerations)
+        now = replace(
+            at,
+            time=time,
+            earlier=time,
+            predicted=at.state,
+            rates=rates,
+            accelerations=accelerations,
+        )
         (pivot, orientation), sigmas = self._pivots(), self._sigmas()
-        slopes, high = (each if len(each) else np.zeros(len(sigmas)) for each in (at.slopes, at.high))
-        now = replace(now, turns=drives[self.angles], sigmas=sigmas, slopes=slopes, high=np.maximum(high, sigmas))
-        return replace(now, pivot=pivot, largest_pivot=max(at.largest_pivot, pivot), orientation=orientation)
+        slopes, high = (
+            each if len(each) else np.zeros(len(sigmas)) for each in (at.slopes, at.high)
+        )
+        now = replace(
+            now,
+            turns=drives[self.angles],
+            sigmas=sigmas,
+            slopes=slopes,
+            high=np.maximum(high, sigmas),
+        )
+        return replace(
+            now, pivot=pivot, largest_pivot=max(at.largest_pivot, pivot), orientation=orientation
+        )
 
     def _pivots(self) -> tuple[float, bytes]:
         """The smallest in size, and the orientation, where all was last factored."""
@@ -204,7 +247,9 @@ class SparseModel:
         return abs(pivot), self.blocks.orientation(entries[:, None], np.array([pivot]))[0]
 
     def _sigmas(self) -> Array:
-        """Those of the blocks where all was last factored; where all rows are solved the smallest pivot stands for all."""
+        """Those of the blocks where all was last factored; where all rows are solved the smallest
+        pivot stands for all.
+        """
         if not len(self.dropped):
             return np.array([abs(self.factors.signed_pivot)])
         factors, entries = self.factors, self.elements.entries[self.solved]
@@ -217,7 +262,9 @@ class SparseModel:
             raise FailedError("the equations are singular there") from error
 
     def motion(self) -> tuple[Array, Array]:
-        """Rates and accelerations of the unknowns where all was last evaluated: one factorisation for both."""
+        """Rates and accelerations of the unknowns where all was last evaluated: one factorisation
+        for both.
+        """
         self._factor()
         rates = self.factors.solve(self.elements.nu[self.kept])
         self.elements.accelerate(rates)
@@ -240,10 +287,14 @@ class SparseModel:
         return Batch(self) if self.elements.compiled else None
 
     def _predicted(self, here: Stand, time: float) -> tuple[Array, Array]:
-        """A Taylor step of second order, and that with what the last such step lacked, which grows by the cube of the step."""
+        """A Taylor step of second order, and that with what the last such step lacked, which grows
+        by the cube of the step.
+        """
         h = time - here.time
         taylor = self.moved(here.state, h * (here.rates + (0.5 * h) * here.accelerations))
-        corrected = taylor + lacked(np.array(h), here.time - here.earlier) * (here.state - here.predicted)
+        corrected = taylor + lacked(np.array(h), here.time - here.earlier) * (
+            here.state - here.predicted
+        )
         return taylor, self.moved(corrected, np.zeros_like(here.rates))
 
     def reach(self, here: Stand, time: float, drives: Array, tol: float) -> Stand:
@@ -252,7 +303,8 @@ class SparseModel:
         Raises:
             FailedError: what is there is no solution, or does not continue the motion.
         """
-        with np.errstate(all="ignore"):  # a lost iteration may overflow; it is found by its residual
+        # a lost iteration may overflow; it is found by its residual
+        with np.errstate(all="ignore"):
             taylor, state = self._predicted(here, time)
             residual = self.evaluate(state, drives)
             rate, done, iterations = math.inf, residual <= SETTLED, 0
@@ -268,7 +320,9 @@ class SparseModel:
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
             if not done or not math.isfinite(residual):
                 raise FailedError(self._in_words(["closed"], residual, tol))
-            step, gap = (float(distance(state - other, self.scale)) for other in (here.state, taylor))
+            step, gap = (
+                float(distance(state - other, self.scale)) for other in (here.state, taylor)
+            )
             rates, accelerations = self.motion()
         pivot, orientation = self._pivots()
         leftover = float(np.abs(self.elements.phi[self.dropped]).max(initial=0.0))
@@ -290,10 +344,42 @@ class SparseModel:
         if failed:
             raise FailedError(self._in_words(failed, residual, tol, leftover, branch))
         (found,) = poses.remembered(here)
-        motion = time, here.time, state, taylor, rates, accelerations, drives[self.angles], iterations
-        return Stand(*motion, residual, leftover, branch, pivot, max(pivot, here.largest_pivot), orientation, *found)
+        motion = (
+            time,
+            here.time,
+            state,
+            taylor,
+            rates,
+            accelerations,
+            drives[self.angles],
+            iterations,
+        )
+        return Stand(
+            *motion,
+            residual,
+            leftover,
+            branch,
+            pivot,
+            max(pivot, here.largest_pivot),
+            orientation,
+            *found,
+        )
 
-    def _in_words(self, failed: Sequence[str], closure: float, tol: float, leftover: float = 0.0, branch: float = 1.0) -> str:
+    def _in_words(
+        self,
+        failed: Sequence[str],
+        closure: float,
+        tol: float,
+        leftover: float = 0.0,
+        branch: float = 1.0,
+    ) -> str:
         """Why a pose was refused."""
         names = self.redundant
-        return in_words(failed, closure, leftover, branch, tol, [*names[:FEW], "..."] if len(names) > FEW else names)
+        return in_words(
+            failed,
+            closure,
+            leftover,
+            branch,
+            tol,
+            [*names[:FEW], "..."] if len(names) > FEW else names,
+        )

@@ -1,4 +1,6 @@
-"""Where a motion of a sparse system stands, when Newton's iteration for the next pose may end, and whether that is believed."""
+"""Where a motion of a sparse system stands, when Newton's iteration for the next pose may end, and
+whether that is believed.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,11 @@ from ..formulation.acceptance_criteria import (
     WORSE_BY_PIVOTS,
 )
 
-# An iteration with old factors costs half of one with new ones; it is worth it where it gains two digits.
+# An iteration with old factors costs half of one with new ones; it is worth it where it gains two
+# digits.
 CONTRACTS = 1e-2
-# Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an iteration that gains less than
-# a digit though its factors are new shows that they are.
+# Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an
+# iteration that gains less than a digit though its factors are new shows that they are.
 SETTLED, STALLS = 1e-15, 0.1
 
 
@@ -46,11 +49,14 @@ class Stand:
         state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
         rates, accelerations: of the unknowns.
         turns: angles of the drivers that turn [rad from the design].
-        closure, leftover, branch: largest residual of the rows solved and of the redundant ones, smallest branch test.
-        pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see `Blocks`.
-        sigmas: of the blocks (`Blocks.sigmas`); where all rows are solved, which keep the signs of their determinants, the smallest
-            pivot stands for all; slopes: how steeply they change, zero where nothing is known of that; high: the largest that each
-            was since rows were last looked for.
+        closure, leftover, branch: largest residual of the rows solved and of the redundant ones,
+            smallest branch test.
+        pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see
+            `Blocks`.
+        sigmas: of the blocks (`Blocks.sigmas`); where all rows are solved, which keep the signs of
+            their determinants, the smallest pivot stands for all; slopes: how steeply they change,
+            zero where nothing is known of that; high: the largest that each was since rows were
+            last looked for.
     """
 
     time: float
@@ -74,12 +80,14 @@ class Stand:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses that a motion may have come to, each by the one before it, and what the tests of them are of; shape (poses,) each.
+    """Poses that a motion may have come to, each by the one before it, and what the tests of them
+    are of; shape (poses,) each.
 
     Attributes:
         done: whether Newton's iteration ended.
         closure, leftover, branch: see `Stand`.
-        gap: to what a Taylor step made of the pose before; step: to that; turn: of a driver from there, the largest.
+        gap: to what a Taylor step made of the pose before; step: to that; turn: of a driver from
+            there, the largest.
         pivot: see `Stand`; chosen: whether pivots were chosen at each pose.
         turned: whether the orientation is another.
         sigmas: shape (poses, blocks).
@@ -98,7 +106,8 @@ class Poses:
     sigmas: Array
 
     def passed(self, here: Stand, tol: float) -> Mapping[str, NDArray[np.bool_]]:
-        """Which passed each test of a solution, by the names of `acceptance.margins`; less is known here, and more asked of it.
+        """Which passed each test of a solution, by the names of `acceptance.margins`; less is known
+        here, and more asked of it.
 
         Args:
             here: where the first of them is predicted from.
@@ -122,7 +131,8 @@ class Poses:
             "not turned round": self.turn <= LONGEST_TURN,
             "as regular": np.all(ratio, axis=1),
             "on this side": ~self.turned,
-            # the signs of determinants do not say so where rows are chosen from more: they change by the choice too
+            # the signs of determinants do not say so where rows are chosen from more: they change
+            # by the choice too
             "regular between": np.all(self.sigmas + before > steepest * self.step[:, None], axis=1),
             "certain": FOLLOWED * least**2 > uncertain,
             "not turned by rounding": (TURNED_BY_PIVOTS * least**2 > uncertain) | falls,
@@ -135,7 +145,9 @@ class Poses:
         return [*zip(self.sigmas, slopes, high, strict=True)]
 
     def _slopes(self, here: Stand) -> tuple[Array, Array]:
-        """How steeply sigmas change at each pose, and what was known of that before; shape (poses, blocks) each."""
+        """How steeply sigmas change at each pose, and what was known of that before; shape (poses,
+        blocks) each.
+        """
         before = np.vstack([here.sigmas, self.sigmas[:-1]])
         change, moved = np.abs(self.sigmas - before), self.step[:, None]
         found = np.divide(change, moved, out=np.zeros_like(change), where=moved > NEGLIGIBLE)
@@ -145,10 +157,14 @@ class Poses:
 
 
 def lacked(h: Array, before: float) -> Array:
-    """By how much what a Taylor step lacked grows from the last step to others: by the cube, where they are not much longer."""
+    """By how much what a Taylor step lacked grows from the last step to others: by the cube, where
+    they are not much longer.
+    """
     return np.where(ABOUT * abs(before) > np.abs(h), (h / (before or 1.0)) ** 3, 0.0)
 
 
 def distance(change: Array, scale: Array) -> Array:
-    """The largest of a change of the state, each number measured by its scale; of several poses of each."""
+    """The largest of a change of the state, each number measured by its scale; of several poses of
+    each.
+    """
     return np.abs(change.T * scale).max(axis=-1)

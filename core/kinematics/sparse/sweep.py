@@ -37,7 +37,8 @@ def solve_sparse(
     """Solve a mechanism over the samples of a path, as one sparse system.
 
     Args:
-        mechanism: what to solve; made ready (`SparseModel`) where it is to be solved more than once.
+        mechanism: what to solve; made ready (`SparseModel`) where it is to be solved more than
+            once.
         points, bodies: names whose motion is wanted.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too.
         tol: largest accepted constraint residual, relative to the size of the bodies.
@@ -46,18 +47,26 @@ def solve_sparse(
         The motion; NaN where a sample cannot be reached, and the reason in its message.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at the design position.
+        SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
+            the design position.
     """
     model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
     wanted = _Wanted(model, points), _Wanted(model, bodies, frames=True)
-    sweep, start = partial(_Sweep, model, path, tol, *wanted, order), start_of(model.mechanism, path)
-    return by_ways(start, model.mechanism, path, lambda each: sweep(each).solve(), compare=np.isfinite(tol))
+    sweep, start = (
+        partial(_Sweep, model, path, tol, *wanted, order),
+        start_of(model.mechanism, path),
+    )
+    return by_ways(
+        start, model.mechanism, path, lambda each: sweep(each).solve(), compare=np.isfinite(tol)
+    )
 
 
 AT_ONCE = 64
 """Stands whose motions are computed together: one alone takes as many calls of numpy."""
 WORTH = 4
-"""Samples on one side that are worth making tables for: that takes what 12 (43 bodies) to 36 (1,999) save, once for all sweeps."""
+"""Samples on one side that are worth making tables for: that takes what 12 (43 bodies) to 36
+(1,999) save, once for all sweeps.
+"""
 
 
 class _Wanted:
@@ -65,18 +74,31 @@ class _Wanted:
 
     def __init__(self, model: SparseModel, names: Sequence[str], *, frames: bool = False) -> None:
         m, self.names, self._model = model.mechanism, names, model
-        found = [(name, m.body(name).origin) if frames else (m.point(name).body, m.point(name).position) for name in names]
+        found = [
+            (name, m.body(name).origin) if frames else (m.point(name).body, m.point(name).position)
+            for name in names
+        ]
         number = {name: k for k, name in enumerate(model.frame.moving)}
         # what is not among the moving bodies comes after them, and stands still
         self._body = np.array([number.get(body, len(number)) for body, _ in found], np.intp)
         self._position = _columns([position for _, position in found], 3)
-        self._arm = _columns([tuple(model.frame.arm(body, position)) for body, position in found], 3)
-        self._frame = _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
+        self._arm = _columns(
+            [tuple(model.frame.arm(body, position)) for body, position in found], 3
+        )
+        self._frame = (
+            _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
+        )
 
     def _taken(self, at: Sequence[Stand]) -> list[Array]:
-        """What their motion follows from: poses, rates and accelerations of their bodies, shapes (7 or 6, stands, names)."""
+        """What their motion follows from: poses, rates and accelerations of their bodies, shapes (7
+        or 6, stands, names).
+        """
         n, found = self._model.bodies, list[Array]()
-        for rows, each in ((7, [k.state for k in at]), (6, [k.rates for k in at]), (6, [k.accelerations for k in at])):
+        for rows, each in (
+            (7, [k.state for k in at]),
+            (6, [k.rates for k in at]),
+            (6, [k.accelerations for k in at]),
+        ):
             whole = np.zeros((rows, len(at), n + 1))
             whole[:, :, :n] = np.array(each)[:, : rows * n].reshape(len(at), rows, n).swapaxes(0, 1)
             found.append(whole)
@@ -84,18 +106,24 @@ class _Wanted:
         return [each[:, :, self._body] for each in found]
 
     def motions(self, at: Sequence[Stand]) -> Array:
-        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape (stands, components, names)."""
+        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape
+        (stands, components, names).
+        """
         poses, rates, accelerations = self._taken(at)
         moving = (
             Pose.of(vec([*poses[:3]]), quat(poses[3:])),
             Twist(vec([*rates[:3]]), vec([*rates[3:]])),
             Acceleration(vec([*accelerations[:3]]), vec([*accelerations[3:]])),
         )
-        found: list[Vec3 | Quat] = [*motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)]
+        found: list[Vec3 | Quat] = [
+            *motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)
+        ]
         if self._frame is not None:
             found += motion_of_frame(quat(self._frame), *moving)
         shape = len(at), len(self.names)
-        return np.stack([np.broadcast_to(component, shape) for each in found for component in each], axis=1)
+        return np.stack(
+            [np.broadcast_to(component, shape) for each in found for component in each], axis=1
+        )
 
 
 def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
@@ -104,7 +132,9 @@ def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
 
 @dataclass
 class _Sweep:
-    """A path through a model, and what is found along it; refused: by sample, how uncertain what is found there is."""
+    """A path through a model, and what is found along it; refused: by sample, how uncertain what is
+    found there is.
+    """
 
     model: SparseModel
     path: Path
@@ -127,12 +157,17 @@ class _Sweep:
         path, n = self.path, len(self.path.times)
         stands = {name: np.full(n, np.nan) for name in ("closure", "leftover", "iterations")}
         wanted = (self.points, self.bodies)
-        found = [np.full((n, size, len(each.names)), np.nan) for each, size in zip(wanted, (9, 19), strict=True)]
+        found = [
+            np.full((n, size, len(each.names)), np.nan)
+            for each, size in zip(wanted, (9, 19), strict=True)
+        ]
         departure = self._departure()
         for side in outwards(path.times, self.start.time):
             if departure is None or not len(side):
                 continue
-            followed = zip(self._follow(departure, path, path.times[side]), side.tolist(), strict=False)
+            followed = zip(
+                self._follow(departure, path, path.times[side]), side.tolist(), strict=False
+            )
             certain = self._certain(followed)
             while some := list(islice(certain, AT_ONCE)):
                 reached = [k for _, k in some]
@@ -161,7 +196,9 @@ class _Sweep:
             return None
 
     def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
-        """Where the motion stands at each of the times, outwards, until it ends; then there is a message."""
+        """Where the motion stands at each of the times, outwards, until it ends; then there is a
+        message.
+        """
         drives, many = self.model.drives(path, times), len(times) >= WORTH
         self.by = self.model
         before: deque[Stand] = deque([here], REMEMBERED)
@@ -210,7 +247,8 @@ class _Sweep:
         return here, TOO_MANY
 
     def _part(self, here: Stand, path: Path, time: float) -> Stand:
-        """Go a part of the way to a time that could not be reached, the longest that can be along with its half (see `longest`).
+        """Go a part of the way to a time that could not be reached, the longest that can be along
+        with its half (see `longest`).
 
         Raises:
             FailedError: there is none.
@@ -229,7 +267,8 @@ class _Sweep:
         raise last
 
     def _certain(self, followed: Iterable[tuple[Stand, int]]) -> Iterator[tuple[Stand, int]]:
-        """Samples, each as soon as the motion stands there, without those that residuals leave uncertain.
+        """Samples, each as soon as the motion stands there, without those that residuals leave
+        uncertain.
 
         That pivots are small is no reason to refuse one: in large mechanisms many are.
         """
@@ -248,12 +287,20 @@ class _Sweep:
         if self.refused:
             worst = max(self.refused, key=self.refused.__getitem__)
             there = self.path.where(float(self.path.times[worst]))
-            where = f"by up to {self.refused[worst]:.2g} (at {there}), allowed {AMPLIFIED * self.tol:.2g}"
-            why = f"so near a singular pose that residuals leave the pose or its rates uncertain, {where}"
+            where = (
+                f"by up to {self.refused[worst]:.2g} (at {there}), allowed"
+                f" {AMPLIFIED * self.tol:.2g}"
+            )
+            why = (
+                "so near a singular pose that residuals leave the pose or its rates uncertain,"
+                f" {where}"
+            )
             self.messages.append(f"refused at {len(self.refused)} samples {why}; keep away from it")
 
     def _by_better_rows(self, here: Stand, path: Path) -> Stand:
-        """Where it stands; by other rows, where its own are much nearer to singular than they were and others are not."""
+        """Where it stands; by other rows, where its own are much nearer to singular than they were
+        and others are not.
+        """
         if not (here.sigmas < LOW * here.high).any():
             return here
         found = self.by.anew(here, self._drives(path, here.time), self.known)
@@ -270,18 +317,28 @@ class _Sweep:
     def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
         self.smallest_pivot = min(self.smallest_pivot, here.pivot)
         reason += f"; smallest pivot there {here.pivot:.3g} (zero at a lock-up or dead centre)"
-        self.messages.append(path.ended(here.time, float(times[k]), float(times[k - 1]) if k else None, reason))
+        self.messages.append(
+            path.ended(here.time, float(times[k]), float(times[k - 1]) if k else None, reason)
+        )
 
     def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array]) -> Trajectory:
         (points, bodies), unit, order = found, self.model.frame.unit, self.order
         solved: NDArray[np.bool_] = ~np.isnan(tests["closure"])
-        closure, leftover = (largest_found(tests[name][solved]) * unit for name in ("closure", "leftover"))
+        closure, leftover = (
+            largest_found(tests[name][solved]) * unit for name in ("closure", "leftover")
+        )
         # rates of place and of rotation stand side by side
-        rates = [np.concatenate([bodies[:, k : k + 3], bodies[:, k + 10 : k + 13]], axis=1) for k in (3, 6)]
+        rates = [
+            np.concatenate([bodies[:, k : k + 3], bodies[:, k + 10 : k + 13]], axis=1)
+            for k in (3, 6)
+        ]
         series = [points[:, 3 * k : 3 * k + 3] for k in range(order + 1)]
         missing = [None] * (2 - order)
         return Trajectory(
-            points={name: PointMotion(*(each[:, :, k] for each in series), *missing) for k, name in enumerate(self.points.names)},
+            points={
+                name: PointMotion(*(each[:, :, k] for each in series), *missing)
+                for k, name in enumerate(self.points.names)
+            },
             solved=solved,
             iterations=np.where(solved, tests["iterations"], 0.0).astype(np.int64),
             residual=closure,
@@ -293,7 +350,12 @@ class _Sweep:
                 **({"rows_chosen_anew": self.renewed} if self.renewed else {}),
             },
             bodies={
-                name: BodyMotion(bodies[:, :3, k], bodies[:, 9:13, k], *(each[:, :, k] for each in rates[:order]), *missing)
+                name: BodyMotion(
+                    bodies[:, :3, k],
+                    bodies[:, 9:13, k],
+                    *(each[:, :, k] for each in rates[:order]),
+                    *missing,
+                )
                 for k, name in enumerate(self.bodies.names)
             },
         )

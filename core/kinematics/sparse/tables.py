@@ -1,4 +1,6 @@
-"""All that is done for several poses of a sparse system, as tables: elements, elimination and steps linked over one memory."""
+"""All that is done for several poses of a sparse system, as tables: elements, elimination and steps
+linked over one memory.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,8 @@ from .rotation_update import BY, TO, turned
 class SparseTables:
     """Numbers of as many poses as a vector has lanes, a row for each, and what is done with them.
 
-    There are the state (see `Numbering`) and then the drives, rates, accelerations and a step of the unknowns, and the results of
-    all elements with their parts.
+    There are the state (see `Numbering`) and then the drives, rates, accelerations and a step of
+    the unknowns, and the results of all elements with their parts.
 
     Attributes:
         width: how many poses.
@@ -31,11 +33,18 @@ class SparseTables:
         self._link, self._interpret = Linker(self.width), interpreter(self.width)
         numbering, given = elements.numbering, Memory()
         self._zero, self._one = (given.take(1).start for _ in range(2))
-        sizes = {"state": numbering.state, "drives": 5 * elements.drivers, "results": len(elements.results)}
+        sizes = {
+            "state": numbering.state,
+            "drives": 5 * elements.drivers,
+            "results": len(elements.results),
+        }
         sizes |= dict.fromkeys(("rates", "accelerations", "step"), numbering.unknowns)
         self._rows = {name: given.take(size) for name, size in sizes.items()}
         results = self._rows["results"].start
-        self._rows |= {name: slice(results + part.start, results + part.stop) for name, part in elements.parts.items()}
+        self._rows |= {
+            name: slice(results + part.start, results + part.stop)
+            for name, part in elements.parts.items()
+        }
         geometry: list[tuple[slice, Array]] = []
         programs: dict[str, list[Words]] = {WHERE: [], HOW: []}
         for kind, starts in zip(elements.kinds, elements.starts, strict=True):
@@ -56,7 +65,8 @@ class SparseTables:
     def _slots(self, kind: ElementType, outputs: dict[str, Indices], geometry: slice) -> Indices:
         """Rows of the slots of each constraint of a kind."""
         found = np.zeros((len(kind.plan.slots), kind.lanes), np.intp)
-        found[kind.inputs[WHERE]] = self._rows["state"].start + kind.read[WHERE]  # the drives come next
+        # the drives come next
+        found[kind.inputs[WHERE]] = self._rows["state"].start + kind.read[WHERE]
         found[kind.inputs[HOW]] = self._rows["rates"].start + kind.read[HOW]
         end = kind.geometry_at + len(kind.geometry)
         found[kind.geometry_at : end] = numbers(geometry).reshape(-1, kind.lanes)
@@ -70,7 +80,10 @@ class SparseTables:
         q, pi = state[3 * n : 7 * n], step[3 * n : 6 * n]
         slots = np.zeros((TO.stop, n), np.intp)
         slots[BY], slots[TO] = np.concatenate([q, pi]).reshape(-1, n), new.reshape(-1, n)
-        added, by = np.append(state[: 3 * n], state[7 * n :]), np.append(step[: 3 * n], step[6 * n :])
+        added, by = (
+            np.append(state[: 3 * n], state[7 * n :]),
+            np.append(step[: 3 * n], step[6 * n :]),
+        )
         return [
             self._link.lanes(turned(), slots, given),
             self._link.operations("copy", q, new),
@@ -86,8 +99,14 @@ class SparseTables:
         given, link = Memory(), self._link
         given.take(self._base)
         fixed = FixedOrder(order.rows.tolist(), order.columns.tolist(), len(rows))
-        factors, inverse, right, self._sums = (given.take(size) for size in (fixed.count, *[len(rows)] * 3))
-        self._factor = joined(fixed.factor(link, self._at("entries")[entries], factors, inverse, (self._zero, self._one)))
+        factors, inverse, right, self._sums = (
+            given.take(size) for size in (fixed.count, *[len(rows)] * 3)
+        )
+        self._factor = joined(
+            fixed.factor(
+                link, self._at("entries")[entries], factors, inverse, (self._zero, self._one)
+            )
+        )
         solve, into = fixed.solve(link, factors, inverse, right), numbers(right)
 
         def solved(quantity: str, op: str, found: str) -> Words:
@@ -97,9 +116,24 @@ class SparseTables:
         self._newton, self._velocity = solved("phi", "neg", "step"), solved("nu", "copy", "rates")
         self._acceleration = solved("gamma", "copy", "accelerations")
         self._place, step, sums = order.row, self._at("step"), numbers(self._sums)
-        there, back = fixed.solve(link, factors, inverse, right, transposed=True), fixed.solve(link, factors, inverse, right)
-        self._transposed = joined([link.operations("copy", into[order.column], step), *there, link.operations("copy", sums, into)])
-        self._solved = joined([link.operations("copy", into, sums), *back, link.operations("copy", step, into[order.column])])
+        there, back = (
+            fixed.solve(link, factors, inverse, right, transposed=True),
+            fixed.solve(link, factors, inverse, right),
+        )
+        self._transposed = joined(
+            [
+                link.operations("copy", into[order.column], step),
+                *there,
+                link.operations("copy", sums, into),
+            ]
+        )
+        self._solved = joined(
+            [
+                link.operations("copy", into, sums),
+                *back,
+                link.operations("copy", step, into[order.column]),
+            ]
+        )
         self._pivots: Indices = factors.start + fixed.pivots
         self._multipliers: Indices = factors.start + fixed.multipliers
         memory = aligned(given.count * self.width).reshape(-1, self.width)
@@ -110,7 +144,9 @@ class SparseTables:
         return numbers(self._rows[name])
 
     def __getitem__(self, name: str) -> Array:
-        """Numbers of all poses, shape (numbers, width), to be read and written: of the state and what else has rows."""
+        """Numbers of all poses, shape (numbers, width), to be read and written: of the state and
+        what else has rows.
+        """
         return self._memory[self._rows[name]]
 
     @property
@@ -121,7 +157,9 @@ class SparseTables:
 
     @property
     def growth(self) -> Array:
-        """The largest entry of L, shape (width,): by how much rounding errors may grow; NaN where there is one."""
+        """The largest entry of L, shape (width,): by how much rounding errors may grow; NaN where
+        there is one.
+        """
         found: Array = self._memory.take(self._multipliers, axis=0)
         return np.abs(found).max(axis=0, initial=0.0)
 
@@ -148,7 +186,9 @@ class SparseTables:
             self._go(table)
 
     def solve(self, b: Array) -> Array:
-        """By the factors as they are, of all poses: shape (n, width), in the order of the rows that are solved."""
+        """By the factors as they are, of all poses: shape (n, width), in the order of the rows that
+        are solved.
+        """
         self._memory[self._sums][self._place] = b
         self._go(self._solved)
         return self["step"].copy()

@@ -1,8 +1,10 @@
-"""A large mechanism in components: sets of bodies that can be solved one after the other, each with those before it given.
+"""A large mechanism in components: sets of bodies that can be solved one after the other, each with
+those before it given.
 
-Found by matching rows with bodies' columns and the strongly connected sets of bodies that follow from it (block-triangular form). A
-component becomes a mechanism of its own, a section, with names by number: components that are built alike are then equal but for
-their geometry, and share programs.
+Found by matching rows with bodies' columns and the strongly connected sets of bodies that follow
+from it (block-triangular form). A component becomes a mechanism of its own, a section, with names
+by number: components that are built alike are then equal but for their geometry, and share
+programs.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection
 from .redundancy import independent_rows
 
 ORIGIN = "origin "
-"""Before the name of a body: the point of a section that is its internal origin and nothing else."""
+"""Before the name of a body: the point of a section that is its internal origin and nothing
+else.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,15 +87,27 @@ class Section:
     def frame(self, mechanism: Mechanism) -> Frames:
         """How the section is measured, or the same section with its geometry known only later."""
         value = places(mechanism)
-        fixed = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
-        moving = {name: (1.0 / self.unit) * vec(value[place]) for name, place in self.origins.items()}
-        return Frames(self.unit, fixed | moving, tuple(body.name for body in mechanism.moving if body.name not in self.given))
+        fixed = dict.fromkeys(
+            (GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO
+        )
+        moving = {
+            name: (1.0 / self.unit) * vec(value[place]) for name, place in self.origins.items()
+        }
+        return Frames(
+            self.unit,
+            fixed | moving,
+            tuple(body.name for body in mechanism.moving if body.name not in self.given),
+        )
 
 
 def _besides_geometry(joint: Joint) -> list[object]:
     """Further fields of a joint, and which of its optional lengths are given."""
     values = [(each, getattr(joint, each.name)) for each in fields(joint)]
-    return [value is None if "kind" in each.metadata else value for each, value in values if each.name != "name"]
+    return [
+        value is None if "kind" in each.metadata else value
+        for each, value in values
+        if each.name != "name"
+    ]
 
 
 def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
@@ -101,7 +117,9 @@ def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
         SolveError: couplers tie joints together, or the rows cannot be matched with the unknowns.
     """
     if mechanism.couplers:
-        raise SolveError(f"mechanism {mechanism.name!r}: couplers tie its components together; solve it as one")
+        raise SolveError(
+            f"mechanism {mechanism.name!r}: couplers tie its components together; solve it as one"
+        )
     formulation = Cartesian.of(mechanism, frame)
     order = _order(mechanism, formulation)
     level = {name: k for k, bodies in enumerate(order) for name in bodies}
@@ -121,7 +139,9 @@ def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
     for driver in mechanism.drivers:
         drivers[place(_bodies(mechanism, driver))].append(driver)
     parts = zip(order, given, joints, drivers, strict=True)
-    return [Component(bodies, tuple(others), tuple(js), tuple(ds)) for bodies, others, js, ds in parts]
+    return [
+        Component(bodies, tuple(others), tuple(js), tuple(ds)) for bodies, others, js, ds in parts
+    ]
 
 
 def _bodies(mechanism: Mechanism, driver: Driver) -> tuple[str, ...]:
@@ -132,19 +152,35 @@ def _bodies(mechanism: Mechanism, driver: Driver) -> tuple[str, ...]:
 
 def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]]:
     """Sets of bodies, first what can be solved first."""
-    sparse, graphs = (importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph"))
+    sparse, graphs = (
+        importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph")
+    )
     rows = formulation.rows(formulation.configuration(formulation.design))
     n = formulation.unknowns
     at = [(k, column) for k, row in enumerate(rows) for column in row]
-    pattern = sparse.coo_array((np.ones(len(at)), tuple(np.array(at).T)), shape=(len(rows), n)).tocsr()
+    pattern = sparse.coo_array(
+        (np.ones(len(at)), tuple(np.array(at).T)), shape=(len(rows), n)
+    ).tocsr()
     row_of: list[int] = graphs.maximum_bipartite_matching(pattern, perm_type="row").tolist()
     if min(row_of) < 0:
-        raise SolveError(f"mechanism {mechanism.name!r}: its rows cannot be matched with its unknowns; it is not driven enough")
+        raise SolveError(
+            f"mechanism {mechanism.name!r}: its rows cannot be matched with its unknowns; it is not"
+            " driven enough"
+        )
     # a joint's own coordinate goes with the body that its joint is solved with
-    owner = {name: mechanism.joint(name.rsplit(".", 1)[0]).bodies for name in formulation.coordinates}
+    owner = {
+        name: mechanism.joint(name.rsplit(".", 1)[0]).bodies for name in formulation.coordinates
+    }
     body_of = [k // COLUMNS for k in range(COLUMNS * len(formulation.bodies))]
-    body_of += [next(formulation.columns[b] // COLUMNS for b in owner[name][::-1] if b in formulation.columns) for name in owner]
-    needs = {(body_of[column], body_of[other]) for column, k in enumerate(row_of) for other in rows[k]}
+    body_of += [
+        next(
+            formulation.columns[b] // COLUMNS for b in owner[name][::-1] if b in formulation.columns
+        )
+        for name in owner
+    ]
+    needs = {
+        (body_of[column], body_of[other]) for column, k in enumerate(row_of) for other in rows[k]
+    }
     shape = (len(formulation.bodies),) * 2
     graph = sparse.coo_array((np.ones(len(needs)), tuple(np.array(sorted(needs)).T)), shape=shape)
     count, set_of = graphs.connected_components(graph, directed=True, connection="strong")
@@ -159,9 +195,14 @@ def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]
 
 
 def section(
-    component: Component, unit: float, origins: Mapping[str, Vector], points: Sequence[Point], bodies: Sequence[Body]
+    component: Component,
+    unit: float,
+    origins: Mapping[str, Vector],
+    points: Sequence[Point],
+    bodies: Sequence[Body],
 ) -> Section:
-    """The component with names by number: b0, b1, ... its bodies, g0, ... those given, j0, ... its joints, p0, ... its points.
+    """The component with names by number: b0, b1, ... its bodies, g0, ... those given, j0, ... its
+    joints, p0, ... its points.
 
     Args:
         origins: internal origin of every moving body, global [m].
@@ -173,10 +214,15 @@ def section(
     joint_names = {joint.name: f"j{k}" for k, joint in enumerate(component.joints)}
     point_names = {point.name: f"p{k}" for k, point in enumerate(points)}
     joints = [
-        joint.changed(name=joint_names[joint.name], i=names.get(joint.i, GROUND), j=names.get(joint.j, GROUND))
+        joint.changed(
+            name=joint_names[joint.name], i=names.get(joint.i, GROUND), j=names.get(joint.j, GROUND)
+        )
         for joint in component.joints
     ]
-    named = [replace(point, name=point_names[point.name], body=names.get(point.body, GROUND)) for point in points]
+    named = [
+        replace(point, name=point_names[point.name], body=names.get(point.body, GROUND))
+        for point in points
+    ]
     drivers: list[Driver] = []
     for driver in component.drivers:
         if isinstance(driver, JointDriver):
@@ -185,20 +231,36 @@ def section(
             drivers.append(replace(driver, point=point_names[driver.point]))
     at: dict[str, str] = {}
     for name, body in names.items():
-        found = next((place for place, point in _joint_places(joints, body) if point == origins[name]), None)
+        found = next(
+            (place for place, point in _joint_places(joints, body) if point == origins[name]), None
+        )
         if found is None:  # an origin at no joint of the component is a point of its own
             named.append(Point(f"{ORIGIN}{body}", body, origins[name]))
             found = f"points.{ORIGIN}{body}.position"
         at[body] = found
     wanted = {body.name: body for body in bodies}
-    described = [replace(wanted[name], name=new) if name in wanted else Body(new) for name, new in names.items()]
-    return Section(Mechanism("section", described, joints, named, drivers), unit, tuple(names.values())[len(own) :], at)
+    described = [
+        replace(wanted[name], name=new) if name in wanted else Body(new)
+        for name, new in names.items()
+    ]
+    return Section(
+        Mechanism("section", described, joints, named, drivers),
+        unit,
+        tuple(names.values())[len(own) :],
+        at,
+    )
 
 
 def _joint_places(joints: Sequence[Joint], body: str) -> list[tuple[str, tuple[float, ...]]]:
     """Places of the points that joints have on a body."""
-    parts = [(joint.name, part) for joint in joints if body in joint.bodies for part in joint.parts(body)]
-    return [(f"joints.{owner}.{name}", value) for owner, (name, kind, value) in parts if kind is Kind.POSITION]
+    parts = [
+        (joint.name, part) for joint in joints if body in joint.bodies for part in joint.parts(body)
+    ]
+    return [
+        (f"joints.{owner}.{name}", value)
+        for owner, (name, kind, value) in parts
+        if kind is Kind.POSITION
+    ]
 
 
 def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:
@@ -212,8 +274,9 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
     names = row_names(formulation)
     if len(kept) < formulation.unknowns:
         raise SolveError(
-            f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can still move at the design "
-            f"position (rank {len(kept)} of {formulation.unknowns}): lock-up, dead centre or too few drivers; shift the design"
+            f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can"
+            f" still move at the design position (rank {len(kept)} of {formulation.unknowns}):"
+            " lock-up, dead centre or too few drivers; shift the design"
         )
     taken = set(kept)
     dropped = tuple(k for k in range(len(matrix)) if k not in taken)

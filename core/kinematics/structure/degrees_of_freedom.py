@@ -1,7 +1,7 @@
 """Degrees of freedom: the paper's count, the numerical rank, and which rows are kept.
 
-Rows that say what others say already (four spatial revolutes of a planar loop) are found once, at the design pose, and left out of
-the solution; they stay as a diagnostic, evaluated at every sample.
+Rows that say what others say already (four spatial revolutes of a planar loop) are found once, at
+the design pose, and left out of the solution; they stay as a diagnostic, evaluated at every sample.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independe
 
 COORDINATES = 7
 """Coordinates of a body in the paper's count: r and p."""
-# A body whose part of an orthonormal basis of the free motions is below this stands still: round-off of the basis is far below.
+# A body whose part of an orthonormal basis of the free motions is below this stands still:
+# round-off of the basis is far below.
 STILL = 1e-6
 
 
@@ -35,7 +36,8 @@ class FreedomAccount:
         bodies: all bodies, fixed ones included (the ground itself is none).
         coordinates: 7 per body: position and Euler parameters.
         equations: joint rows, 6 ground rows per fixed body, 1 normalisation per body.
-        moving_coordinates: 6 per moving body, 1 per joint coordinate that is coupled: the unknowns of the native formulation.
+        moving_coordinates: 6 per moving body, 1 per joint coordinate that is coupled: the unknowns
+            of the native formulation.
         rows: joint rows, and those that name and couple coordinates.
         rank: numerical rank of the joint rows.
         redundant_rows: joint rows that are left out, as "joint: primitive".
@@ -95,13 +97,20 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     return counted(mechanism, formulation.unknowns, joint_rows, redundant)
 
 
-def counted(mechanism: Mechanism, unknowns: int, rows: int, redundant_rows: Sequence[str]) -> FreedomAccount:
-    """The account of a mechanism of which so many unknowns and joint rows are known, and which rows are redundant."""
+def counted(
+    mechanism: Mechanism, unknowns: int, rows: int, redundant_rows: Sequence[str]
+) -> FreedomAccount:
+    """The account of a mechanism of which so many unknowns and joint rows are known, and which rows
+    are redundant.
+    """
     bodies, fixed = len(mechanism.bodies), len(mechanism.bodies) - len(mechanism.moving)
     return FreedomAccount(
         bodies=bodies,
         coordinates=COORDINATES * bodies,
-        equations=sum(joint.rows for joint in mechanism.joints) + len(mechanism.couplers) + COLUMNS * fixed + bodies,
+        equations=sum(joint.rows for joint in mechanism.joints)
+        + len(mechanism.couplers)
+        + COLUMNS * fixed
+        + bodies,
         moving_coordinates=unknowns,
         rows=rows,
         rank=rows - len(redundant_rows),
@@ -110,24 +119,31 @@ def counted(mechanism: Mechanism, unknowns: int, rows: int, redundant_rows: Sequ
 
 
 def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
-    """The account of a mechanism that has as many drivers as degrees of freedom; for any size there is `driven.require_driven`.
+    """The account of a mechanism that has as many drivers as degrees of freedom; for any size there
+    is `driven.require_driven`.
 
     Raises:
         SolveError: it has more or fewer, or nothing moves.
     """
     if not mechanism.moving:
-        raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
+        raise SolveError(
+            f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed"
+        )
     found = account(mechanism, frame)
     if found.dof != len(mechanism.drivers):
         raise SolveError(_mismatch(mechanism, frame, found))
     return found
 
 
-def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation, wanted: Sequence[int] = ()) -> Selection:
-    """The rows of a formulation to solve for: those wanted, or if none are those independent at the design, drivers first.
+def select_rows(
+    mechanism: Mechanism, frame: Frames, formulation: Formulation, wanted: Sequence[int] = ()
+) -> Selection:
+    """The rows of a formulation to solve for: those wanted, or if none are those independent at the
+    design, drivers first.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or a driver does not move what is free.
+        SolveError: drivers and degrees of freedom do not match, or a driver does not move what is
+            free.
     """
     found, drivers = driven_account(mechanism, frame), len(mechanism.drivers)
     matrix = jacobian(formulation)
@@ -137,29 +153,35 @@ def select_rows(mechanism: Mechanism, frame: Frames, formulation: Formulation, w
     taken = set(kept)
     dropped = tuple(k for k in range(len(matrix)) if k not in taken)
     names = row_names(formulation)
-    # taken with the drivers first, and in this formulation, the rows that are left out may be others
+    # taken with the drivers first, and in this formulation, the rows that are left out may be
+    # others
     found = replace(found, redundant_rows=tuple(names[k] for k in dropped))
     return Selection(found, tuple(kept), dropped)
 
 
 def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> str:
-    """Says which drivers do not move the mechanism at the design position, and which joints and drivers hold them."""
+    """Says which drivers do not move the mechanism at the design position, and which joints and
+    drivers hold them.
+    """
     joint_rows = len(matrix) - len(mechanism.drivers)
     rows = [*independent_rows(matrix[:joint_rows], 0), *range(joint_rows, len(matrix))]
     # the sums of rows that vanish; those of joints are independent, so there is a driver in each
     left, sizes, _ = np.linalg.svd(matrix[rows])
     sums = left[:, int((sizes > RANK_TOLERANCE * sizes.max()).sum()) :]
     share = np.linalg.norm(sums, axis=1)
-    involved = dict.fromkeys(formulation.owners[k][0] for k, x in zip(rows, share, strict=True) if x > SHARE)
+    involved = dict.fromkeys(
+        formulation.owners[k][0] for k, x in zip(rows, share, strict=True) if x > SHARE
+    )
     drivers = [repr(each.name) for each in mechanism.drivers if each.name in involved]
     joints = [repr(name) for name in involved if repr(name) not in drivers]
     many = len(drivers) > 1
     what = " and ".join([*filter(None, [", ".join(joints)]), *["each other"] * many])
     return (
-        f"mechanism {mechanism.name!r}: driver{'s' * many} {', '.join(drivers)} do{'es' * (not many)} not move it at the design "
-        f"position (lock-up or dead centre): what {'they prescribe' if many else 'it prescribes'} there follows already from "
-        f"{what}; give the design in another pose, some degrees on, and sweep from there, "
-        "or drive another coordinate"
+        f"mechanism {mechanism.name!r}: driver{'s' * many} {', '.join(drivers)}"
+        f" do{'es' * (not many)} not move it at the design position (lock-up or dead centre): what"
+        f" {'they prescribe' if many else 'it prescribes'} there follows already from {what}; give"
+        " the design in another pose, some degrees on, and sweep from there, or drive another"
+        " coordinate"
     )
 
 
@@ -172,13 +194,15 @@ def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:
     """Says how many degrees of freedom and how many drivers there are."""
     drivers = len(mechanism.drivers)
     return (
-        f"mechanism {mechanism.name!r}: {dof} degree{'s' * (dof != 1)} of freedom "
-        f"({unknowns} coordinates - rank {unknowns - dof}) but {drivers} driver{'s' * (drivers != 1)}"
+        f"mechanism {mechanism.name!r}: {dof} degree{'s' * (dof != 1)} of freedom ({unknowns}"
+        f" coordinates - rank {unknowns - dof}) but {drivers} driver{'s' * (drivers != 1)}"
     )
 
 
 def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:
-    """Says what is still free with the drivers held, by name: the bodies that move in the null space of all rows."""
+    """Says what is still free with the drivers held, by name: the bodies that move in the null
+    space of all rows.
+    """
     matrix, drivers = _matrix(mechanism, frame)[1], len(mechanism.drivers)
     head = mismatch(mechanism, found.dof, found.moving_coordinates)
     if found.dof < drivers:
@@ -190,4 +214,7 @@ def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str
         if block.max() > STILL:
             how = "move" if block[:3].max() > STILL else "turn"
             free.append(f"{body.name!r} can {how}")
-    return f"{head}; {', '.join(free)}; add a driver, or join what spins freely (a rod between two balls: use distance)"
+    return (
+        f"{head}; {', '.join(free)}; add a driver, or join what spins freely (a rod between two"
+        " balls: use distance)"
+    )

@@ -1,10 +1,11 @@
 """A large sparse matrix of fixed pattern, factored by SuperLU in an order that is found once.
 
-The order is COLAMD's, with the rows as the first factorisation pivoted them. Measured on a ring of N spatial loops, where nothing
-can be solved before anything else, and a chain, in a given order (least of 15, one Zen 4 core, N = 1,000, ring and chain): COLAMD
-2.4 and 1.7 ms, minimum degree of A^T A 3.0 and 1.6, reverse Cuthill-McKee of the bodies 2.9 and 1.5. COLAMD wins where it matters;
-finding it anew at every factorisation costs a quarter more. Minimum degree of A + A^T is not to be tried on matrices like
-these, whose diagonals mean nothing: it took 1.6 s.
+The order is COLAMD's, with the rows as the first factorisation pivoted them. Measured on a ring of
+N spatial loops, where nothing can be solved before anything else, and a chain, in a given order
+(least of 15, one Zen 4 core, N = 1,000, ring and chain): COLAMD 2.4 and 1.7 ms, minimum degree of
+A^T A 3.0 and 1.6, reverse Cuthill-McKee of the bodies 2.9 and 1.5. COLAMD wins where it matters;
+finding it anew at every factorisation costs a quarter more. Minimum degree of A + A^T is not to be
+tried on matrices like these, whose diagonals mean nothing: it took 1.6 s.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 
 Indices = NDArray[np.intp]
-# Supernodes of these matrices are a few columns wide; SuperLU's own settings (10 and 20) double the time.
+# Supernodes of these matrices are a few columns wide; SuperLU's own settings (10 and 20) double the
+# time.
 NARROW = {"relax": 4, "panel_size": 4}
-# A pivot may be this much smaller than the largest of its column, so that rows stay in the order that was found.
+# A pivot may be this much smaller than the largest of its column, so that rows stay in the order
+# that was found.
 PIVOT_THRESHOLD = 0.1
 
 
@@ -54,10 +57,14 @@ class Factors:
     def __init__(self, rows: Indices, columns: Indices, values: Array, n: int) -> None:
         sparse: Any = importlib.import_module("scipy.sparse")
         self._splu: Any = importlib.import_module("scipy.sparse.linalg").splu
-        first = self._factored(sparse.csc_matrix((values, (rows, columns)), shape=(n, n)), permc_spec="COLAMD")
+        first = self._factored(
+            sparse.csc_matrix((values, (rows, columns)), shape=(n, n)), permc_spec="COLAMD"
+        )
         self._row: Indices = first.perm_r
         self._column: Indices = first.perm_c
-        numbered = sparse.csc_matrix((np.arange(len(values)) + 1.0, (self._row[rows], self._column[columns])), shape=(n, n))
+        numbered = sparse.csc_matrix(
+            (np.arange(len(values)) + 1.0, (self._row[rows], self._column[columns])), shape=(n, n)
+        )
         numbered.sort_indices()
         self._order: Indices = numbered.data.astype(np.intp) - 1
         self._matrix = numbered
@@ -78,7 +85,9 @@ class Factors:
         """The entries in the order that the last factorisation took them in."""
         factors, by_place = self._factors, self._matrix.tocoo()
         rows, columns = factors.perm_r[by_place.row], factors.perm_c[by_place.col]
-        return Ordered(rows, columns, self._order, factors.perm_r[self._row], factors.perm_c[self._column])
+        return Ordered(
+            rows, columns, self._order, factors.perm_r[self._row], factors.perm_c[self._column]
+        )
 
     def update(self, values: Array) -> None:
         """Give the matrix other values, in the order of the first; the factors stay."""
@@ -90,11 +99,12 @@ class Factors:
 
     @property
     def signed_pivot(self) -> float:
-        """The pivot of the smallest size, with the sign of the determinant or always the opposite; costs half a factorisation.
+        """The pivot of the smallest size, with the sign of the determinant or always the opposite;
+        costs half a factorisation.
 
-        The smallest singular value, by a step of inverse iteration with these factors, says more of a small matrix, but nothing of
-        a large one: of a chain of 60 planar loops it is 1e-23 where all is well, for rows that repeat others are left out at one
-        end of it.
+        The smallest singular value, by a step of inverse iteration with these factors, says more of
+        a small matrix, but nothing of a large one: of a chain of 60 planar loops it is 1e-23 where
+        all is well, for rows that repeat others are left out at one end of it.
         """
         diagonal = self._factors.U.diagonal()
         odd = np.count_nonzero(diagonal < 0.0) + len(diagonal) - _cycles(self._factors.perm_r)
@@ -112,7 +122,9 @@ class Factors:
         return self._factors.nnz
 
     def solve(self, b: Array) -> Array:
-        """What the factors make of a right-hand side: the solution, or where they are old an approximation."""
+        """What the factors make of a right-hand side: the solution, or where they are old an
+        approximation.
+        """
         placed = np.empty_like(b)
         placed[self._row] = b
         return self._factors.solve(placed)[self._column]
@@ -129,6 +141,8 @@ def _cycles(permutation: Indices) -> int:
     n = len(permutation)
     if (permutation == np.arange(n)).all():
         return n
-    sparse, graphs = (importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph"))
+    sparse, graphs = (
+        importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph")
+    )
     graph = sparse.csr_matrix((np.ones(n), permutation, np.arange(n + 1)), shape=(n, n))
     return int(graphs.connected_components(graph, directed=False, return_labels=False))

@@ -1,11 +1,13 @@
 """A mechanism with its numbers taken exactly, and its equations as programs for ball arithmetic.
 
-Coordinates, axes and lengths are fractions: their doubles, or the decimals that print them. What joints make of them (differences,
-directions, lengths) stays a fraction until a root is taken, and is a ball from there on, so nothing is rounded unseen. A joint type
-that calls `math` itself rounds to a double there; the joint types of kincheck do not. Pi of a screw's lead is its double.
+Coordinates, axes and lengths are fractions: their doubles, or the decimals that print them. What
+joints make of them (differences, directions, lengths) stays a fraction until a root is taken, and
+is a ball from there on, so nothing is rounded unseen. A joint type that calls `math` itself rounds
+to a double there; the joint types of kincheck do not. Pi of a screw's lead is its double.
 
-Besides the residuals no equation of the primitives is used: the Jacobian is the derivative of the traced residuals, and the unit
-length of the Euler parameters is an equation of its own. Proofs therefore check rows, nu and gamma rather than rest on them.
+Besides the residuals no equation of the primitives is used: the Jacobian is the derivative of the
+traced residuals, and the unit length of the Euler parameters is an equation of its own. Proofs
+therefore check rows, nu and gamma rather than rest on them.
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ def as_double(x: float) -> Fraction:
 
 
 def as_decimal(x: float) -> Fraction:
-    """The shortest decimal that denotes the double: what a case file says, where it has 15 digits or less and is in SI units."""
+    """The shortest decimal that denotes the double: what a case file says, where it has 15 digits
+    or less and is in SI units.
+    """
     return Fraction(repr(float(x)))
 
 
@@ -59,8 +63,12 @@ class Exact:
 
     @property
     def trivial(self) -> float | None:
-        """The number as a float where it is 0, 1 or -1: products with these, and their sums, are exact in double precision."""
-        return next((x for x in (0.0, 1.0, -1.0) if not self._is_ball and self.value == int(x)), None)
+        """The number as a float where it is 0, 1 or -1: products with these, and their sums, are
+        exact in double precision.
+        """
+        return next(
+            (x for x in (0.0, 1.0, -1.0) if not self._is_ball and self.value == int(x)), None
+        )
 
     @property
     def _is_ball(self) -> bool:
@@ -92,7 +100,8 @@ class Exact:
     def __abs__(self) -> Exact:
         return Exact(abs(self.value))
 
-    # choices of a description (which axis is most nearly perpendicular) may fall either way where balls overlap
+    # choices of a description (which axis is most nearly perpendicular) may fall either way where
+    # balls overlap
     def __lt__(self, b: Any) -> bool:
         return bool((self - b).ball < 0)
 
@@ -112,7 +121,9 @@ class Exact:
         return float(self.value)
 
     def sqrt(self) -> Exact:
-        """The square root, a fraction where it is one; of a ball around zero, that of its part >= 0."""
+        """The square root, a fraction where it is one; of a ball around zero, that of its part >=
+        0.
+        """
         if not self._is_ball and self.value.p.is_square() and self.value.q.is_square():
             return Exact(self.value.sqrt())
         return Exact(self.ball.nonnegative_part().sqrt())
@@ -129,14 +140,20 @@ def _value(b: Any) -> Any:
 
 
 def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
-    """The mechanism with the numbers of joints, points, couplers and drivers as `Exact`; joints do not see those of bodies."""
+    """The mechanism with the numbers of joints, points, couplers and drivers as `Exact`; joints do
+    not see those of bodies.
+    """
 
     def read(value: Any) -> Any:
         if isinstance(value, float):
             return Exact.of(reading(value))
         if isinstance(value, tuple):
             return tuple(map(read, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-        return Exact.of(Fraction(value)) if isinstance(value, int) and not isinstance(value, bool) else value
+        return (
+            Exact.of(Fraction(value))
+            if isinstance(value, int) and not isinstance(value, bool)
+            else value
+        )
 
     def each(item: Any) -> Any:
         return replace(item, **{f.name: read(getattr(item, f.name)) for f in fields(item)})
@@ -164,13 +181,17 @@ class _Inputs:
         return [self.tape.input(slot) for slot in range(first, self.count)]
 
     def lift(self, value: Any) -> Any:
-        """A value with every exact number in it made an input of the programs, or a literal where it is trivial."""
+        """A value with every exact number in it made an input of the programs, or a literal where
+        it is trivial.
+        """
         if isinstance(value, Exact):
             return self._number(value)
         if isinstance(value, Mapping):
             return {key: self.lift(each) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
         if is_dataclass(value) and not isinstance(value, type):
-            return replace(value, **{f.name: self.lift(getattr(value, f.name)) for f in fields(value)})
+            return replace(
+                value, **{f.name: self.lift(getattr(value, f.name)) for f in fields(value)}
+            )
         if isinstance(value, float) and value not in (0.0, 1.0, -1.0):
             return self._number(Exact.of(Fraction(value)))
         return value
@@ -184,14 +205,17 @@ class _Inputs:
 
 @dataclass(frozen=True, eq=False)
 class ExactEquations:
-    """What a proof needs of a mechanism. All programs read: the state, then the drivers, then `geometry`.
+    """What a proof needs of a mechanism. All programs read: the state, then the drivers, then
+    `geometry`.
 
     Attributes:
-        state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler parameters "q BODY", coordinates
-            "x JOINT.FREEDOM" [units or rad].
-        drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its half.
+        state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler
+            parameters "q BODY", coordinates "x JOINT.FREEDOM" [units or rad].
+        drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its
+            half.
         geometry: values of the further inputs.
-        residuals: as many as there are scalars in the state: the kept rows, then the lengths of the Euler parameters.
+        residuals: as many as there are scalars in the state: the kept rows, then the lengths of the
+            Euler parameters.
         derivative: their Jacobian; the slot of an entry is row * size + column, zeros are left out.
         points: how far each point has come from the design [m], three slots each.
         tests: the rows that were left out (`left_out` of them), then the branch tests.
@@ -213,11 +237,14 @@ class ExactEquations:
         return sum(self.state.values())
 
 
-def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str], kept: Sequence[int]) -> ExactEquations:
+def equations(
+    mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str], kept: Sequence[int]
+) -> ExactEquations:
     """The programs of an exact mechanism.
 
     Args:
-        mechanism: as `exact_mechanism` gives it; called at the precision that the geometry is to have.
+        mechanism: as `exact_mechanism` gives it; called at the precision that the geometry is to
+            have.
         drivers: names of those that move.
         points: names of the points that are wanted.
         kept: the rows that are solved; the others are tested.
@@ -227,17 +254,25 @@ def equations(mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str
     parts = {name: inputs.vector(len(value)) for name, value in design.items()}
     state = [x for part in parts.values() for x in part]
     drives = {name: _drive(inputs) for name in drivers}
-    formulation = Cartesian([inputs.lift(c) for c in constraints(mechanism, frame, drives)], frame.moving)
+    formulation = Cartesian(
+        [inputs.lift(c) for c in constraints(mechanism, frame, drives)], frame.moving
+    )
     at = formulation.configuration(parts)
     phi = formulation.phi(at)
-    lengths = [0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0) for q in (quat(p) for n, p in parts.items() if n[0] == "q")]
+    lengths = [
+        0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0)
+        for q in (quat(p) for n, p in parts.items() if n[0] == "q")
+    ]
     residuals = [*(phi[k] for k in kept), *lengths]
     taken = set(kept)
     left_out = [each for k, each in enumerate(phi) if k not in taken]
     moved: list[Scalar] = []
     for name in points:
         point = mechanism.point(name)
-        pose, arm = at.poses.get(point.body, GROUND_POSE), inputs.lift(frame.arm(point.body, point.position))
+        pose, arm = (
+            at.poses.get(point.body, GROUND_POSE),
+            inputs.lift(frame.arm(point.body, point.position)),
+        )
         moved += inputs.lift(Exact.of(Fraction(frame.unit))) * (pose.u + pose.swing(arm))
     entries = {
         row * len(state) + column: value

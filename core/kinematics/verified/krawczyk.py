@@ -1,16 +1,19 @@
-"""Proofs: near an approximate pose there is exactly one solution, and here is a ball that contains it.
+"""Proofs: near an approximate pose there is exactly one solution, and here is a ball that contains
+it.
 
-Krawczyk's test. F(X) = 0 are the residuals of the traced equations over displacements, Euler parameters and coordinates, and the
-lengths of the Euler parameters. With an approximate solution X, any matrix Y near the inverse of F', and B the box of radius r
-around X, let
+Krawczyk's test. F(X) = 0 are the residuals of the traced equations over displacements, Euler
+parameters and coordinates, and the lengths of the Euler parameters. With an approximate solution X,
+any matrix Y near the inverse of F', and B the box of radius r around X, let
 
     c = |Y F(X)|,      k = |I - Y F'(B)|           (largest component, largest row sum; evaluated in balls)
 
-If c + k r < r, B holds exactly one zero of F; it is no farther from X than c / (1 - k). F' is the derivative of the traced
-residuals, so nothing rests on the rows that the solver uses. That the zero is on the intended branch is proved by the sign of the
-branch tests. Velocities and accelerations follow from F(X(t), t) = 0, expanded in the time: linear systems with the matrix F'.
+If c + k r < r, B holds exactly one zero of F; it is no farther from X than c / (1 - k). F' is the
+derivative of the traced residuals, so nothing rests on the rows that the solver uses. That the zero
+is on the intended branch is proved by the sign of the branch tests. Velocities and accelerations
+follow from F(X(t), t) = 0, expanded in the time: linear systems with the matrix F'.
 
-In a singular pose F' has no inverse, the test cannot succeed, and the sample is reported as not proved.
+In a singular pose F' has no inverse, the test cannot succeed, and the sample is reported as not
+proved.
 """
 
 from __future__ import annotations
@@ -26,7 +29,8 @@ from ...program.ball_executor import ORDER, Ball, evaluate, flint
 from ...trajectory import Array
 from .exact import ExactEquations
 
-# Radii of B that are tried, in units of the mechanism's size: the largest that succeeds says how far around the solution is alone.
+# Radii of B that are tried, in units of the mechanism's size: the largest that succeeds says how
+# far around the solution is alone.
 RADII = tuple(2.0**-k for k in (7, 14, 21, 28, 35, 42, 49))
 # A step of Newton's iteration gains three digits or more, but near a singular pose.
 MOST_STEPS = 60
@@ -39,10 +43,13 @@ class Enclosure:
     """A proved sample.
 
     Attributes:
-        points: position less that of the design [m], velocity [m/s] and acceleration [m/s^2] of each point, as balls, shape (3, 3).
-        alone: radius of the box in which the solution is the only one [units of the mechanism's size, or rad].
+        points: position less that of the design [m], velocity [m/s] and acceleration [m/s^2] of
+            each point, as balls, shape (3, 3).
+        alone: radius of the box in which the solution is the only one [units of the mechanism's
+            size, or rad].
         contraction: k of the test in that box: below one.
-        left_out: the rows that were left out, at the solution: zero where the redundant rows agree with the others.
+        left_out: the rows that were left out, at the solution: zero where the redundant rows agree
+            with the others.
         branch: the branch tests, all proved positive.
     """
 
@@ -58,14 +65,19 @@ class UnprovedError(KincheckError, ArithmeticError):
 
 
 def enclose(
-    equations: ExactEquations, points: Sequence[str], pose: Array, drives: Sequence[Sequence[Ball]], bits: int
+    equations: ExactEquations,
+    points: Sequence[str],
+    pose: Array,
+    drives: Sequence[Sequence[Ball]],
+    bits: int,
 ) -> Enclosure:
     """Prove one sample; to be called at the precision of the equations.
 
     Args:
         points: names of the points, as the equations were made for.
         pose: approximate state, shape (size,).
-        drives: for each moving driver value [units or rad], velocity and acceleration, exact or as balls.
+        drives: for each moving driver value [units or rad], velocity and acceleration, exact or as
+            balls.
         bits: the precision.
 
     Raises:
@@ -77,20 +89,28 @@ def enclose(
     moved = _float(_largest([x - x0 for x, x0 in zip(X, start, strict=True)]))
     if moved > alone:
         raise UnprovedError(
-            f"the solution that Newton's iteration reaches is {moved:.3g} of the mechanism's size from the approximate pose, and "
-            f"proved to be the only one within {alone:.3g}: it may be another one"
+            f"the solution that Newton's iteration reaches is {moved:.3g} of the mechanism's size"
+            f" from the approximate pose, and proved to be the only one within {alone:.3g}: it may"
+            " be another one"
         )
     solution = [x + _around(c / (1 - contraction)) for x in X]
     tests = sample.tests(solution)
     left_out, branch = tests[: equations.left_out], tests[equations.left_out :]
     for value in branch:
         if not value > 0:
-            raise UnprovedError(f"the solution is not on the intended branch, axes are turned over: their cosine is {value.str(5)}")
+            raise UnprovedError(
+                "the solution is not on the intended branch, axes are turned over: their cosine is"
+                f" {value.str(5)}"
+            )
     try:
         motion = sample.motion(solution)
     except ZeroDivisionError:
-        raise UnprovedError("singular pose: the Jacobian is not proved to have an inverse") from None
-    return Enclosure(dict(zip(points, motion, strict=True)), alone, _float(contraction), left_out, branch)
+        raise UnprovedError(
+            "singular pose: the Jacobian is not proved to have an inverse"
+        ) from None
+    return Enclosure(
+        dict(zip(points, motion, strict=True)), alone, _float(contraction), left_out, branch
+    )
 
 
 class _Sample:
@@ -108,7 +128,9 @@ class _Sample:
             self._moving += [moving, (moving / 2).cos(), (moving / 2).sin()]
 
     def _run(self, name: str, state: Sequence[Ball], drives: Sequence[Ball]) -> dict[int, Ball]:
-        return evaluate(getattr(self._equations, name), [*state, *drives, *self._equations.geometry])
+        return evaluate(
+            getattr(self._equations, name), [*state, *drives, *self._equations.geometry]
+        )
 
     def residuals(self, state: Sequence[Ball]) -> Any:
         """F, shape (size, 1)."""
@@ -136,18 +158,25 @@ class _Sample:
         coefficients = [list(state)]
         for order in (1, 2):  # the unknown coefficient enters its own order through F' alone
             known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
-            rest = [_coefficient(x, order) for x in self._run("residuals", known, self._moving).values()]
+            rest = [
+                _coefficient(x, order) for x in self._run("residuals", known, self._moving).values()
+            ]
             coefficients.append((-inverse * _column(rest)).entries())
         known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
         moved = [*self._run("points", known, self._moving).values()]
-        motions = [[factor * _coefficient(x, order) for x in moved] for order, factor in enumerate((1, 1, 2))]
+        motions = [
+            [factor * _coefficient(x, order) for x in moved]
+            for order, factor in enumerate((1, 1, 2))
+        ]
         return [[each[k : k + 3] for each in motions] for k in range(0, len(moved), 3)]
 
 
 def _inverse(sample: _Sample, x: Sequence[Ball]) -> Array:
     """The inverse of F' in double precision."""
     try:
-        inverse = np.linalg.inv(np.array(sample.derivative(x).tolist(), dtype=np.float64)).astype(np.float64)
+        inverse = np.linalg.inv(np.array(sample.derivative(x).tolist(), dtype=np.float64)).astype(
+            np.float64
+        )
     except np.linalg.LinAlgError:
         raise UnprovedError("singular pose: the Jacobian has no inverse") from None
     if not np.isfinite(inverse).all():
@@ -156,7 +185,9 @@ def _inverse(sample: _Sample, x: Sequence[Ball]) -> Array:
 
 
 def _refine(sample: _Sample, start: Sequence[Ball], bits: int) -> tuple[list[Ball], Ball, Array]:
-    """The pose after Newton's iteration, c there, and Y; taken anew where it gains less than three digits a step."""
+    """The pose after Newton's iteration, c there, and Y; taken anew where it gains less than three
+    digits a step.
+    """
     x, inverse, before = list(start), _inverse(sample, start), float("inf")
     for _ in range(MOST_STEPS):
         step = flint().arb_mat(inverse.tolist()) * sample.residuals(x)
@@ -170,12 +201,18 @@ def _refine(sample: _Sample, start: Sequence[Ball], bits: int) -> tuple[list[Bal
         if size > 1e-3 * before:
             inverse = _inverse(sample, x)
         before = size
-    raise _singular(f"or no solution near: Newton's iteration stops at steps of {before:.1g}", inverse)
+    raise _singular(
+        f"or no solution near: Newton's iteration stops at steps of {before:.1g}", inverse
+    )
 
 
 def _alone(sample: _Sample, inverse: Array, X: Sequence[Ball], c: Ball) -> tuple[float, Ball]:
     """The largest radius tried for which the test succeeds, and k there."""
-    Y, identity, smallest = flint().arb_mat(inverse.tolist()), flint().arb_mat(len(X), len(X), 1), float("inf")
+    Y, identity, smallest = (
+        flint().arb_mat(inverse.tolist()),
+        flint().arb_mat(len(X), len(X), 1),
+        float("inf"),
+    )
     for radius in RADII:
         box = [x + _around(flint().arb(radius)) for x in X]
         rows = (identity - Y * sample.derivative(box)).tolist()
@@ -183,12 +220,16 @@ def _alone(sample: _Sample, inverse: Array, X: Sequence[Ball], c: Ball) -> tuple
         if c + k * radius < radius:
             return radius, k
         smallest = min(smallest, _float(k))
-    raise _singular(f"or near one: contraction {smallest:.3g} in the best box, expected below 1", inverse)
+    raise _singular(
+        f"or near one: contraction {smallest:.3g} in the best box, expected below 1", inverse
+    )
 
 
 def _singular(how: str, inverse: Array) -> UnprovedError:
     smallest = 1.0 / float(np.linalg.norm(inverse, 2))
-    return UnprovedError(f"singular pose, {how}; the smallest singular value of the Jacobian is {smallest:.2g}")
+    return UnprovedError(
+        f"singular pose, {how}; the smallest singular value of the Jacobian is {smallest:.2g}"
+    )
 
 
 def _column(values: Sequence[Ball]) -> Any:

@@ -1,4 +1,6 @@
-"""Proved samples of a sweep: the native solution of each sample, and the ball that is proved to hold the true one."""
+"""Proved samples of a sweep: the native solution of each sample, and the ball that is proved to
+hold the true one.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,13 @@ class Proofs:
 
 
 def prove(
-    mechanism: Mechanism, path: Path, points: Sequence[str], drives: Drives, reading: Reading, bits: int, tol: float
+    mechanism: Mechanism,
+    path: Path,
+    points: Sequence[str],
+    drives: Drives,
+    reading: Reading,
+    bits: int,
+    tol: float,
 ) -> Proofs:
     """Prove the samples of a path.
 
@@ -67,7 +75,10 @@ def prove(
         KincheckError: python-flint is not installed.
     """
     flint()
-    model = compile_model(mechanism, Request(tuple(path.motions), tuple(points), tuple(body.name for body in mechanism.moving)))
+    model = compile_model(
+        mechanism,
+        Request(tuple(path.motions), tuple(points), tuple(body.name for body in mechanism.moving)),
+    )
     native = sweep(model, path, tol)
     poses = _states(mechanism, native, path.times, start_of(mechanism, path).time)
     samples: list[Enclosure | UnprovedError] = []
@@ -81,12 +92,21 @@ def prove(
         units = [1 if mechanism.driver(name).turns else Fraction(unit) for name in drives]
         for k, reached in enumerate(native.solved):
             started = perf_counter()
-            driven = [[_ball(x / unit) for x in drives[name][k]] for name, unit in zip(drives, units, strict=True)]
+            driven = [
+                [_ball(x / unit) for x in drives[name][k]]
+                for name, unit in zip(drives, units, strict=True)
+            ]
             try:
                 if not reached:
-                    raise UnprovedError(f"there is no approximate pose to start from: {native.message}")
+                    raise UnprovedError(
+                        f"there is no approximate pose to start from: {native.message}"
+                    )
                 change = {name: float(drives[name][k][0]) for name in drives}
-                rows = chosen_at(mechanism, change, poses[k], kept) if model.selection.dropped else kept
+                rows = (
+                    chosen_at(mechanism, change, poses[k], kept)
+                    if model.selection.dropped
+                    else kept
+                )
                 if rows not in traced:
                     traced[rows] = equations(exact, tuple(drives), points, rows)
                 if rows != kept:
@@ -104,12 +124,21 @@ def _ball(x: Fraction) -> Ball:
 
 
 def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float = 0.0) -> Array:
-    """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies, shape (n, size)."""
+    """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies,
+    shape (n, size).
+    """
     frame = frames(mechanism)
-    poses = displaced(mechanism, frame, {name: (motion.r, motion.p) for name, motion in native.bodies.items()})
+    poses = displaced(
+        mechanism, frame, {name: (motion.r, motion.p) for name, motion in native.bodies.items()}
+    )
     state = state_of(Cartesian.of(mechanism, frame), mechanism, frame, poses, {})
-    for turn in (vector[0] for name, vector in state.items() if name.startswith("x ") and name.endswith(".rotation")):
-        # turns are counted from the start outwards; a sweep so coarse that they are miscounted fails to be proved
+    for turn in (
+        vector[0]
+        for name, vector in state.items()
+        if name.startswith("x ") and name.endswith(".rotation")
+    ):
+        # turns are counted from the start outwards; a sweep so coarse that they are miscounted
+        # fails to be proved
         for side in outwards(times, start):
             outward = side[native.solved[side]]
             turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]

@@ -16,8 +16,9 @@ class Code:
     """Machine code of functions; calls of them release Python's lock.
 
     Args:
-        signatures: by function, how many arguments it takes: addresses and whole numbers. All return a whole number;
-            what those without a result return means nothing. Others are known by their address.
+        signatures: by function, how many arguments it takes: addresses and whole numbers. All
+            return a whole number; what those without a result return means nothing. Others are
+            known by their address.
 
     Attributes:
         address: where the function of a name stands.
@@ -25,13 +26,24 @@ class Code:
     """
 
     def __init__(self, code: bytes, signatures: Mapping[str, int]) -> None:
-        self.address = elf_loader.placed(elf_loader.Image(*pickle.loads(code))) if elf_loader.possible() else compiler.loaded(code)
+        self.address = (
+            elf_loader.placed(elf_loader.Image(*pickle.loads(code)))
+            if elf_loader.possible()
+            else compiler.loaded(code)
+        )
         # whole numbers are passed as addresses are: ctypes takes a third of the time for those
-        types = {name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count) for name, count in signatures.items()}
-        self.calls: dict[str, Callable[..., int]] = {name: kind(self.address(name)) for name, kind in types.items()}
+        types = {
+            name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count)
+            for name, count in signatures.items()
+        }
+        self.calls: dict[str, Callable[..., int]] = {
+            name: kind(self.address(name)) for name, kind in types.items()
+        }
 
 
-def load(content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None) -> Code:
+def load(
+    content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None
+) -> Code:
     """Compile the text, or fetch what the content meant before."""
     return Code(disk_cache.kept(told(content), lambda: _made(text())), signatures or {})
 
@@ -43,8 +55,12 @@ def find(content: str) -> Code | None:
 
 
 def told(content: str) -> bytes:
-    """What determines machine code: this for any processor and compiler, both of them, and what is made of it here."""
-    return "\n".join((*compiler.processor(), str(elf_loader.possible()), _sources(), content)).encode()
+    """What determines machine code: this for any processor and compiler, both of them, and what is
+    made of it here.
+    """
+    return "\n".join(
+        (*compiler.processor(), str(elf_loader.possible()), _sources(), content)
+    ).encode()
 
 
 @cache

@@ -1,4 +1,6 @@
-"""LLVM, as llvmlite has it: what it says of this processor, what it makes of a text, and how it loads that."""
+"""LLVM, as llvmlite has it: what it says of this processor, what it makes of a text, and how it
+loads that.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ TRAITS = b"vendor_id", b"cpu family", b"model", b"stepping", b"flags"
 
 
 class Processor(NamedTuple):
-    """What machine code is made for and by: as LLVM names the processor, what that can do, its system, and llvmlite's version."""
+    """What machine code is made for and by: as LLVM names the processor, what that can do, its
+    system, and llvmlite's version.
+    """
 
     name: str
     features: str
@@ -26,14 +30,17 @@ class Processor(NamedTuple):
 
 
 def available() -> bool:
-    """Whether llvmlite is installed, and its library could be loaded here when that was needed first."""
+    """Whether llvmlite is installed, and its library could be loaded here when that was needed
+    first.
+    """
     return importlib.util.find_spec("llvmlite") is not None and _loads()
 
 
 @cache
 def _loads() -> bool:
     try:
-        processor()  # asks LLVM only if it was never asked here: whoever has its products does without
+        # asks LLVM only if it was never asked here: whoever has its products does without
+        processor()
     except (ImportError, OSError):  # `kincheck doctor` tells it
         return False
     return True
@@ -41,7 +48,9 @@ def _loads() -> bool:
 
 @cache
 def llvm() -> Any:
-    """Its binding. Importing it takes three times as long as making a known model ready: whoever has its products does without."""
+    """Its binding. Importing it takes three times as long as making a known model ready: whoever
+    has its products does without.
+    """
     found: Any = importlib.import_module("llvmlite.binding")
     found.initialize_native_target()
     found.initialize_native_asmprinter()
@@ -50,7 +59,8 @@ def llvm() -> Any:
 
 @cache
 def processor() -> Processor:
-    """LLVM's opinion; where machine code runs without LLVM, the one it had before, of a processor that the system called the same.
+    """LLVM's opinion; where machine code runs without LLVM, the one it had before, of a processor
+    that the system called the same.
 
     An emulator that hides instructions of the processor (valgrind) needs a cache of its own.
     """
@@ -70,14 +80,24 @@ def emitted(text: str) -> bytes:
     """Machine code of a text: an object file."""
     here = processor()
     # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line code
-    options = {"opt": 1, "reloc": "pic", "codemodel": "small"} if elf_loader.possible() else {"opt": 1}
-    machine = llvm().Target.from_default_triple().create_target_machine(cpu=here.name, features=here.features, **options)
+    options = (
+        {"opt": 1, "reloc": "pic", "codemodel": "small"} if elf_loader.possible() else {"opt": 1}
+    )
+    machine = (
+        llvm()
+        .Target.from_default_triple()
+        .create_target_machine(cpu=here.name, features=here.features, **options)
+    )
     return machine.emit_object(llvm().parse_assembly(text))
 
 
 def loaded(file: bytes) -> Callable[[str], int]:
-    """Have LLVM put an object file into memory, for as long as what is returned is kept: where each function stands."""
-    engine = llvm().create_mcjit_compiler(llvm().parse_assembly(""), llvm().Target.from_default_triple().create_target_machine())
+    """Have LLVM put an object file into memory, for as long as what is returned is kept: where each
+    function stands.
+    """
+    engine = llvm().create_mcjit_compiler(
+        llvm().parse_assembly(""), llvm().Target.from_default_triple().create_target_machine()
+    )
     engine.add_object_file(llvm().ObjectFileRef.from_data(file))
     engine.finalize_object()
     return engine.get_function_address
@@ -85,12 +105,19 @@ def loaded(file: bytes) -> Callable[[str], int]:
 
 def _asked() -> bytes:
     binding = llvm()
-    features, version = binding.get_host_cpu_features().flatten(), importlib.import_module("llvmlite").__version__
-    return "\n".join((binding.get_host_cpu_name(), features, binding.get_default_triple(), version)).encode()
+    features, version = (
+        binding.get_host_cpu_features().flatten(),
+        importlib.import_module("llvmlite").__version__,
+    )
+    return "\n".join(
+        (binding.get_host_cpu_name(), features, binding.get_default_triple(), version)
+    ).encode()
 
 
 def _described() -> bytes | None:
-    """What the system says of the first processor, and which llvmlite is installed; None where that is not known."""
+    """What the system says of the first processor, and which llvmlite is installed; None where that
+    is not known.
+    """
     if not elf_loader.possible():
         return None
     found = importlib.util.find_spec("llvmlite")

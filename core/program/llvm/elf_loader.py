@@ -1,8 +1,10 @@
-"""Machine code as one piece of memory that runs wherever it stands: what an object file holds, put together once and for all.
+"""Machine code as one piece of memory that runs wherever it stands: what an object file holds, put
+together once and for all.
 
-LLVM can load what it compiled, but importing it takes three times as long as making ready a model that was known before. An image
-needs no LLVM. It is read from an ELF object for x86-64 (System V ABI with its AMD64 supplement, chapter 4), whose parts refer to
-each other by distances only, for it calls nothing outside itself.
+LLVM can load what it compiled, but importing it takes three times as long as making ready a model
+that was known before. An image needs no LLVM. It is read from an ELF object for x86-64 (System V
+ABI with its AMD64 supplement, chapter 4), whose parts refer to each other by distances only, for it
+calls nothing outside itself.
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ SECTIONS_AT, SECTIONS = 0x28, 0x3C
 PROGRAM, SYMBOLS, RELOCATIONS, ALLOCATED = 1, 2, 4, 2
 """Types of sections, and the flag of those that are in memory when the code runs."""
 DISTANCES = 2, 4
-"""Types of relocations, R_X86_64_PC32 and R_X86_64_PLT32: a distance of 32 bits from where it stands."""
+"""Types of relocations, R_X86_64_PC32 and R_X86_64_PLT32: a distance of 32 bits from where it
+stands.
+"""
 
 
 class Image(NamedTuple):
@@ -69,7 +73,9 @@ def possible() -> bool:
 
 
 def joined(file: bytes) -> Image:
-    """The image of an object file. Raises ValueError where its parts do not refer to each other by distances only."""
+    """The image of an object file. Raises ValueError where its parts do not refer to each other by
+    distances only.
+    """
     (at,), (count,) = unpack_from("<Q", file, SECTIONS_AT), unpack_from("<H", file, SECTIONS)
     sections = [_Section(*_SECTION.unpack_from(file, at + k * _SECTION.size)) for k in range(count)]
 
@@ -96,11 +102,16 @@ def joined(file: bytes) -> Image:
             kind, symbol = info & 0xFFFFFFFF, symbols[int(info) >> 32]
             if kind not in DISTANCES or symbol.section not in begins:
                 raise ValueError(
-                    f"machine code refers to {named(symbol)!r} by relocation {kind}: no distance between parts of itself"
+                    f"machine code refers to {named(symbol)!r} by relocation {kind}: no distance"
+                    " between parts of itself"
                 )
             place = begins[section.info] + offset
             pack_into("<i", code, place, begins[symbol.section] + symbol.value + addend - place)
-    places = {named(each): begins[each.section] + each.value for each in symbols if each.section in begins and each.name}
+    places = {
+        named(each): begins[each.section] + each.value
+        for each in symbols
+        if each.section in begins and each.name
+    }
     return Image(bytes(code), places)
 
 
@@ -117,9 +128,13 @@ def placed(image: Image) -> Callable[[str], int]:
 
 def _runnable(code: bytes) -> mmap.mmap:
     """Memory that holds the code, and is written no more."""
-    memory = mmap.mmap(-1, len(code), mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, mmap.PROT_READ | mmap.PROT_WRITE)
+    memory = mmap.mmap(
+        -1, len(code), mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, mmap.PROT_READ | mmap.PROT_WRITE
+    )
     memory[:] = code
-    if CDLL(None, use_errno=True).mprotect(c_void_p(_address(memory)), c_size_t(len(code)), mmap.PROT_READ | mmap.PROT_EXEC):
+    if CDLL(None, use_errno=True).mprotect(
+        c_void_p(_address(memory)), c_size_t(len(code)), mmap.PROT_READ | mmap.PROT_EXEC
+    ):
         raise OSError(get_errno(), "memory cannot be made to run")
     return memory
 

@@ -1,4 +1,6 @@
-"""Run programs by machine code over vectors of lanes: one call for a whole motion, without Python's lock."""
+"""Run programs by machine code over vectors of lanes: one call for a whole motion, without Python's
+lock.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ class LlvmExecutor:
     def __init__(self, code: LlvmCode, lanes: int) -> None:
         self.lanes, self.group, self.margin, self._code = lanes, code.width, code.width, code
         self._groups = self.groups(lanes)
-        self._memory = aligned(self._groups * code.stride * code.width).reshape(self._groups, code.stride, code.width)
+        self._memory = aligned(self._groups * code.stride * code.width).reshape(
+            self._groups, code.stride, code.width
+        )
         self.clear()
         self._address = address(self._memory)
 
@@ -92,13 +96,17 @@ class LlvmExecutor:
         """See `Executor`."""
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
         given = self._address, self._groups, samples.ctypes.data, stride, wanted
-        self._code.call("fan", "fan")(*given, out.ctypes.data, *out.shape[1:], first, step, worst.ctypes.data)
+        self._code.call("fan", "fan")(
+            *given, out.ctypes.data, *out.shape[1:], first, step, worst.ctypes.data
+        )
         self._code.count(self._groups * wanted)
 
     def fold(self, table: Array, totals: Array) -> None:
         """See `Executor`."""
         columns, room = table.shape
-        self._code.call("fold", "fold")(self._address, address(table), columns, room, address(totals))
+        self._code.call("fold", "fold")(
+            self._address, address(table), columns, room, address(totals)
+        )
         self._code.count(columns * self.groups(room))
 
     def groups(self, lanes: int) -> int:
@@ -107,10 +115,15 @@ class LlvmExecutor:
 
     def parts(self, parts: Parts) -> Callable[[int], object]:
         """See `Executor`."""
-        samples, addresses = parts.samples, [each.ctypes.data for each in (parts.taken, parts.world)]
+        samples, addresses = (
+            parts.samples,
+            [each.ctypes.data for each in (parts.taken, parts.world)],
+        )
         own = [each.ctypes.data for each in (parts.members, parts.fixed, parts.ahead, samples)]
         tables = *own, samples.shape[1], *addresses, parts.base, parts.worst.ctypes.data
-        call = partial(self._code.call("parts", "parts"), self._address, len(parts.members), *tables)
+        call = partial(
+            self._code.call("parts", "parts"), self._address, len(parts.members), *tables
+        )
 
         def count(groups: int) -> None:
             call(groups)
@@ -120,9 +133,13 @@ class LlvmExecutor:
 
 
 class LlvmTrack:
-    """See `Track`. Its tables are such that both ways from the start the vectors of samples are cache lines: two take longer."""
+    """See `Track`. Its tables are such that both ways from the start the vectors of samples are
+    cache lines: two take longer.
+    """
 
-    def __init__(self, code: LlvmCode, memory: Array, sides: Sequence[Side], start: Array, n: int) -> None:
+    def __init__(
+        self, code: LlvmCode, memory: Array, sides: Sequence[Side], start: Array, n: int
+    ) -> None:
         plan, width = code.plan, code.width
         self._start, self.anchors = start.copy(), np.tile(start, (len(sides), 1))
         self.worst = np.zeros(len(plan.largest) + len(plan.smallest))
@@ -130,22 +147,34 @@ class LlvmTrack:
         margin = width + -below % width  # a vector may be written beyond either end
         row = margin + n + width
         row += -row % LINE
-        self._shape, self._strides, self._margin = (len(plan.kept), n), (row * BYTES, BYTES), margin * BYTES
+        self._shape, self._strides, self._margin = (
+            (len(plan.kept), n),
+            (row * BYTES, BYTES),
+            margin * BYTES,
+        )
         self._room = len(plan.kept) * row + LINE
         start_at, anchors = address(self._start), [address(anchor) for anchor in self.anchors]
         # in the order of MOTION and SIDE
-        self._motion = np.array([address(memory), start_at, address(self.worst), 0, row, 1, len(sides)], np.int64)
+        self._motion = np.array(
+            [address(memory), start_at, address(self.worst), 0, row, 1, len(sides)], np.int64
+        )
         tables = [_in_lines(side.samples) for side in sides]
         told = [
             (address(table), table.shape[1], margin + side.first, side.step, side.count, anchor, 0)
             for side, table, anchor in zip(sides, tables, anchors, strict=True)
         ]
-        self._sides = np.array([*told, (0,) * len(SIDE)], np.int64)  # never empty: that has no address
+        # never empty: that has no address
+        self._sides = np.array([*told, (0,) * len(SIDE)], np.int64)
         self._counts, motion = [side.count for side in sides], address(self._motion)
         self._run = partial(code.call("follow", "run"), motion, address(self._sides))
         follow = partial(code.call("follow", "follow"), motion)
-        places = [(address(each), anchor) for each, anchor in zip(self._sides, anchors, strict=False)]
-        self._follow = [{True: partial(follow, at, start_at), False: partial(follow, at, anchor)} for at, anchor in places]
+        places = [
+            (address(each), anchor) for each, anchor in zip(self._sides, anchors, strict=False)
+        ]
+        self._follow = [
+            {True: partial(follow, at, start_at), False: partial(follow, at, anchor)}
+            for at, anchor in places
+        ]
         self._code, self._groups = code, sum(-(-side.count // width) for side in sides)
         self._alive = memory, tables  # their addresses are held
 

@@ -72,7 +72,9 @@ class _Row(Lines):
         if op == "copy":
             return self.operand(1)
         if op == "where":
-            mask = self.let(f"icmp slt <{self.width} x i64> {self.operand(1, 'i64')}, zeroinitializer")
+            mask = self.let(
+                f"icmp slt <{self.width} x i64> {self.operand(1, 'i64')}, zeroinitializer"
+            )
             return self.choose(mask, self.operand(2), self.operand(3))
         value = self.operation(op, [self.operand(k) for k in range(1, ARITY[op] + 1)])
         if op == MASK:

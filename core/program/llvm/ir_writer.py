@@ -1,7 +1,9 @@
-"""LLVM code over a vector of lanes, line by line; what is written of it is in the modules beside this one.
+"""LLVM code over a vector of lanes, line by line; what is written of it is in the modules beside
+this one.
 
-The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are reduced and summed in place. The W
-lanes of a vector stand together in memory, slot by slot: what a program touches is one stretch of a few kilobytes.
+The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are
+reduced and summed in place. The W lanes of a vector stand together in memory, slot by slot: what a
+program touches is one stretch of a few kilobytes.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ from collections.abc import Sequence
 
 from ..lowering import FUSED
 
-# The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after reduction.
+# The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after
+# reduction.
 SINE_TERMS, COSINE_TERMS = 9, 9
 # pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
 HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
@@ -60,12 +63,17 @@ class Lines:
     def spread(self, x: str) -> str:
         """A vector of W times the same number."""
         one = self.let(f"insertelement {self.vector} poison, double {x}, i64 0")
-        return self.let(f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.width} x i32> zeroinitializer")
+        return self.let(
+            f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.width} x i32>"
+            " zeroinitializer"
+        )
 
     def turned(self, x: str) -> str:
         """The lanes in the opposite order."""
         order = ", ".join(f"i32 {k}" for k in reversed(range(self.width)))
-        return self.let(f"shufflevector {self.vector} {x}, {self.vector} poison, <{self.width} x i32> <{order}>")
+        return self.let(
+            f"shufflevector {self.vector} {x}, {self.vector} poison, <{self.width} x i32> <{order}>"
+        )
 
     def slot(self, number: str | int) -> str:
         """Where a slot of the lanes stands."""
@@ -91,9 +99,11 @@ class Lines:
         return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
 
     def umax(self, a: str, b: str) -> str:
-        """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and NaN comes last.
+        """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and
+        NaN comes last.
 
-        As whole numbers with a sign, although they have none: AVX2 compares only those, and takes four instructions for others.
+        As whole numbers with a sign, although they have none: AVX2 compares only those, and takes
+        four instructions for others.
         """
         words = f"<{self.width} x i64>"
         x, y = (self.let(f"bitcast {self.vector} {each} to {words}") for each in (a, b))
@@ -134,7 +144,9 @@ class Lines:
         sine, cosine = self.arithmetic("*", y, self.polynomial(z, odd)), self.polynomial(z, even)
         turn = self.arithmetic("+", k, self.constant(quadrant))
         quarter = self.arithmetic("*", turn, self.constant(0.25))
-        q = self.arithmetic("-", turn, self.arithmetic("*", self.call("floor", quarter), self.constant(4.0)))
+        q = self.arithmetic(
+            "-", turn, self.arithmetic("*", self.call("floor", quarter), self.constant(4.0))
+        )
         half = self.arithmetic("*", q, self.constant(0.5))
         swapped = self.let(f"fcmp one {self.vector} {self.call('floor', half)}, {half}")
         negative = self.let(f"fcmp oge {self.vector} {q}, {self.constant(2.0)}")
@@ -154,13 +166,17 @@ class Lines:
         if op == "neg":
             return self.let(f"fneg {self.vector} {operands[0]}")
         if op == "larger":
-            return self.let(f"fcmp ogt {self.vector} {self.call('fabs', operands[0])}, {self.call('fabs', operands[1])}")
+            return self.let(
+                f"fcmp ogt {self.vector} {self.call('fabs', operands[0])},"
+                f" {self.call('fabs', operands[1])}"
+            )
         if op == "where":
             return self.choose(*operands)
         if op == "before":
             order = ", ".join(f"i32 {k}" for k in (self.width, *range(self.width - 1)))
             return self.let(
-                f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]}, <{self.width} x i32> <{order}>"
+                f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]},"
+                f" <{self.width} x i32> <{order}>"
             )
         return self.trigonometric(operands[0], {"sin": 0.0, "cos": 1.0}[op])
 
@@ -168,7 +184,16 @@ class Lines:
 def declarations(width: int) -> str:
     """LLVM's own vector functions that programs use."""
     vector = f"<{width} x double>"
-    one = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector})" for name in ("sqrt", "fabs", "rint", "floor"))
-    two = "\n".join(f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})" for name in ("minimum", "maximum"))
-    words, three = f"<{width} x i64>", f"declare {vector} @llvm.fmuladd.v{width}f64({vector}, {vector}, {vector})"
+    one = "\n".join(
+        f"declare {vector} @llvm.{name}.v{width}f64({vector})"
+        for name in ("sqrt", "fabs", "rint", "floor")
+    )
+    two = "\n".join(
+        f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})"
+        for name in ("minimum", "maximum")
+    )
+    words, three = (
+        f"<{width} x i64>",
+        f"declare {vector} @llvm.fmuladd.v{width}f64({vector}, {vector}, {vector})",
+    )
     return f"{one}\n{two}\n{three}\ndeclare {words} @llvm.smax.v{width}i64({words}, {words})\n"

@@ -1,4 +1,6 @@
-"""A plan that this processor can run: loops that are the same for all plans, and programs, interpreted or compiled."""
+"""A plan that this processor can run: loops that are the same for all plans, and programs,
+interpreted or compiled.
+"""
 
 from __future__ import annotations
 
@@ -27,23 +29,31 @@ from .reduce import fold
 _NEEDED = rows, settle
 LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {
     "interpret": ([interpret], {"interpret": 2}),
-    "follow": ([*_NEEDED, run, follow], {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3}),
+    "follow": (
+        [*_NEEDED, run, follow],
+        {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3},
+    ),
     "fan": ([*_NEEDED, fan], {"fan": 12}),
     "fold": ([rows, fold], {"fold": 6}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
-"""What runs the programs of any plan: what writes it, and its functions with how many arguments they take."""
+"""What runs the programs of any plan: what writes it, and its functions with how many arguments
+they take.
+"""
 OFTEN, AGAIN, OPERATIONS = 150, 20, 3000
-"""Programs of so many operations are interpreted for so many groups of lanes; longer ones, which take longer to compile, for more.
-Whoever comes back after that comes many times: a sweep of 161 samples is 21 groups of eight, and six sweeps of `kincheck run`
-are interpreted to the end. For those whose tables are in the cache somebody did come back: they are compiled after the second
+"""Programs of so many operations are interpreted for so many groups of lanes; longer ones, which
+take longer to compile, for more. Whoever comes back after that comes many times: a sweep of 161
+samples is 21 groups of eight, and six sweeps of `kincheck run` are interpreted to the end. For
+those whose tables are in the cache somebody did come back: they are compiled after the second
 number, in the first sweep."""
 _AT_ONCE = ContextVar("at once", default=False)
 
 
 @contextmanager
 def compiled_at_once() -> Generator[None]:
-    """Have programs that are made meanwhile compiled when they have run once: for whoever measures what they cost warm."""
+    """Have programs that are made meanwhile compiled when they have run once: for whoever measures
+    what they cost warm.
+    """
     before = _AT_ONCE.set(True)
     try:
         yield
@@ -52,7 +62,8 @@ def compiled_at_once() -> Generator[None]:
 
 
 class LlvmCode:
-    """A plan that this processor can run: its programs are interpreted at first, and compiled where they are run often.
+    """A plan that this processor can run: its programs are interpreted at first, and compiled where
+    they are run often.
 
     Raises ImportError where llvmlite is missing.
 
@@ -100,13 +111,19 @@ class LlvmCode:
     def _take(self, code: code_cache.Code) -> None:
         self._code = code
         for name, at in self.memory.calls.items():
-            self.memory.entries[at, 0] = code.address(name)  # a function that is compiled needs no table
+            # a function that is compiled needs no table
+            self.memory.entries[at, 0] = code.address(name)
 
     def _tables(self) -> dict[str, bytecode.Bytecode]:
         slots = len(self.plan.slots)
 
         def made() -> bytes:
-            return pickle.dumps({name: bytecode.bytecode(each, slots, self.width) for name, each in self.plan.programs.items()})
+            return pickle.dumps(
+                {
+                    name: bytecode.bytecode(each, slots, self.width)
+                    for name, each in self.plan.programs.items()
+                }
+            )
 
         return pickle.loads(disk_cache.kept(self._of_tables, made))
 
@@ -121,12 +138,18 @@ class LlvmCode:
 
 @cache
 def make_loops_ready() -> None:
-    """Compile what is needed first, if it never was, while programs are traced: the compiler does not wait for Python's lock.
+    """Compile what is needed first, if it never was, while programs are traced: the compiler does
+    not wait for Python's lock.
 
-    To import and to read files does: in a thread, beside whatever else Python does, that would take three times as long.
+    To import and to read files does: in a thread, beside whatever else Python does, that would take
+    three times as long.
     """
     width = compiler.vector_width()
-    missing = [name for name in ("interpret", "follow") if not disk_cache.known(code_cache.told(_content(name, width)))]
+    missing = [
+        name
+        for name in ("interpret", "follow")
+        if not disk_cache.known(code_cache.told(_content(name, width)))
+    ]
     if missing:
         compiler.llvm()
         Thread(target=lambda: [_loop(name, width) for name in missing]).start()

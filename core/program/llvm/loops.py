@@ -1,4 +1,5 @@
-"""The loops of plans as LLVM code: Newton's iteration, and parts of a mechanism; for motions, see `follow` and `fan`.
+"""The loops of plans as LLVM code: Newton's iteration, and parts of a mechanism; for motions, see
+`follow` and `fan`.
 
 They are the same for all plans, each of which is read from memory: see `plan`.
 """
@@ -12,7 +13,9 @@ from .plan import Rows, call, function, over
 
 
 def settle(width: int) -> str:
-    """An attempt at W lanes that are predicted, but for the test: iterate until every one has met the tolerance or is lost."""
+    """An attempt at W lanes that are predicted, but for the test: iterate until every one has met
+    the tolerance or is lost.
+    """
     vector, mask, lines = f"<{width} x double>", f"<{width} x i1>", Lines(width)
     at = {name: lines.slot(f"%plan_{name}") for name in ("residual", "iterations", "done")}
     tolerance = lines.spread("%plan_tolerance")
@@ -47,11 +50,15 @@ finish:
 
 
 def run(width: int) -> str:
-    """Functions that make an attempt, run a program, given the address of its call, or carry, on every group of W lanes."""
+    """Functions that make an attempt, run a program, given the address of its call, or carry, on
+    every group of W lanes.
+    """
     head = "void @{}(ptr %plan, ptr %memory, i64 %groups{})"
     attempt = function(head.format("attempt", ""), _over_groups(_ALONE, width))
     carry = function(head.format("carry", ""), _over_groups(over("copy", "carried"), width))
-    once = function(head.format("run_program", ", ptr %program"), _over_groups(call("once", "%program"), width))
+    once = function(
+        head.format("run_program", ", ptr %program"), _over_groups(call("once", "%program"), width)
+    )
     return attempt + carry + once
 
 
@@ -82,9 +89,16 @@ def parts(width: int) -> str:
     place = source.number("%world", source.product("%room", row))
     source.write(source.entry(), source.let(f"load <{width} x double>, ptr {place}, align 8"))
     leave = Rows(width)
-    last = leave.let(f"load double, ptr {leave.number(leave.slot(leave.entry(0, 2)), width - 1)}, align 8")
-    leave.lines.append(f"store double {last}, ptr {leave.number('%ahead', leave.entry(1, 2))}, align 8")
-    tables = "ptr %members, ptr %own_all, ptr %ahead_all, ptr %samples, i64 %room, ptr %sources_all, ptr %world"
+    last = leave.let(
+        f"load double, ptr {leave.number(leave.slot(leave.entry(0, 2)), width - 1)}, align 8"
+    )
+    leave.lines.append(
+        f"store double {last}, ptr {leave.number('%ahead', leave.entry(1, 2))}, align 8"
+    )
+    tables = (
+        "ptr %members, ptr %own_all, ptr %ahead_all, ptr %samples, i64 %room, ptr %sources_all, ptr"
+        " %world"
+    )
     body = f"""%bytes = mul i64 %plan_stride, {8 * width}
   br label %part
 part:
@@ -125,7 +139,10 @@ end_part:
   br i1 %more_parts, label %part, label %end
 end:
   ret void"""
-    head = f"void @parts(ptr %plan, ptr %memory, i64 %count, {tables}, i64 %base, ptr %worst, i64 %groups)"
+    head = (
+        f"void @parts(ptr %plan, ptr %memory, i64 %count, {tables}, i64 %base, ptr %worst, i64"
+        " %groups)"
+    )
     rows = [
         source.function("source", "ptr %rows", "ptr %world", "i64 %room"),
         leave.function("leave", "ptr %ahead"),

@@ -11,10 +11,11 @@ from .plan import TOGETHER, Rows, call, function, over
 
 
 def fan(width: int) -> str:
-    """See `Executor.fan`: every group of W motions goes through all samples while its slots are in the nearest cache.
+    """See `Executor.fan`: every group of W motions goes through all samples while its slots are in
+    the nearest cache.
 
-    A group that has come through `NODES` samples is extended by what is remembered of them. Where that fails for a motion that goes
-    on, the group goes back, and is predicted by its rates.
+    A group that has come through `NODES` samples is extended by what is remembered of them. Where
+    that fails for a motion that goes on, the group goes back, and is predicted by its rates.
     """
     vector, mask, test = f"<{width} x double>", f"<{width} x i1>", Lines(width, "test")
     accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
@@ -96,29 +97,51 @@ end:
   fence seq_cst
   ret void"""
     inputs = "ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted"
-    head = f"void @fan(ptr %plan, {inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step, ptr %worst)"
-    declared = f"declare void @llvm.prefetch.p0(ptr, i32, i32, i32)\ndeclare i1 @llvm.vector.reduce.or.v{width}i1({mask})\n"
+    head = (
+        f"void @fan(ptr %plan, {inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step,"
+        " ptr %worst)"
+    )
+    declared = (
+        "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)\ndeclare i1"
+        f" @llvm.vector.reduce.or.v{width}i1({mask})\n"
+    )
     return f"{declared}{_kept(width)}{function(head, body)}"
 
 
 def _kept(width: int) -> str:
-    """Functions that put out a sample, NaN where a motion has ended, remember it, and say so where the worst is found."""
+    """Functions that put out a sample, NaN where a motion has ended, remember it, and say so where
+    the worst is found.
+    """
     keep, lose, remember = Rows(width), Rows(width), Rows(width, TOGETHER)
-    # whole cache lines go straight to memory: to have each fetched first, only to be overwritten, takes a third of all time
+    # whole cache lines go straight to memory: to have each fetched first, only to be overwritten,
+    # takes a third of all time
     whole = width == LINE
     past_caches = ", !nontemporal !{i32 1}" if whole else ""
     place = keep.number("%numbers", keep.product("%stride", "%row"))
     value = keep.choose("%still", keep.read(keep.entry()), keep.constant(math.nan))
     keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
-    if not whole:  # parts of them are fetched a sample ahead; to put them aside until they are whole takes as long as waiting
-        keep.lines.append(f"call void @llvm.prefetch.p0(ptr {keep.number(place, '%ahead')}, i32 1, i32 3, i32 1)")
+    # parts of them are fetched a sample ahead; to put them aside until they are whole takes as long
+    # as waiting
+    if not whole:
+        keep.lines.append(
+            f"call void @llvm.prefetch.p0(ptr {keep.number(place, '%ahead')}, i32 1, i32 3, i32 1)"
+        )
     worst = lose.number("%numbers", lose.product("%stride", "%row"))
-    known = lose.choose("%still", lose.let(f"load {lose.vector}, ptr {worst}, align 8"), lose.constant(math.nan))
+    known = lose.choose(
+        "%still", lose.let(f"load {lose.vector}, ptr {worst}, align 8"), lose.constant(math.nan)
+    )
     lose.lines.append(f"store {lose.vector} {known}, ptr {worst}, align 8")
     for k in range(TOGETHER):
         remember.at = remember.sum("%row", k)
         to = remember.sum("%past", remember.entry(1, 2))
-        remember.write(to, remember.anew(f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"))
-    kept = keep.function("keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still", "i64 %ahead")
+        remember.write(
+            to,
+            remember.anew(
+                f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"
+            ),
+        )
+    kept = keep.function(
+        "keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still", "i64 %ahead"
+    )
     lost = lose.function("lose", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still")
     return kept + lost + remember.function("remember", "i64 %past")

@@ -8,17 +8,27 @@ from .ir_writer import Lines
 from .plan import Rows, call, function, over
 
 MOTION = ("ptr lane", "ptr start", "ptr worst", "ptr out", "i64 row", "i64 forget", "i64 sides")
-SIDE = ("ptr samples", "i64 stride", "i64 first", "i64 step", "i64 count", "ptr anchor", "i64 reached")
-"""What is told of a motion and of each of its sides, eight bytes each: few arguments make a quick call. A call that is told to
-forget begins the worst anew, and clears that field: the calls after it go on. `run` writes how far it came.
+SIDE = (
+    "ptr samples",
+    "i64 stride",
+    "i64 first",
+    "i64 step",
+    "i64 count",
+    "ptr anchor",
+    "i64 reached",
+)
+"""What is told of a motion and of each of its sides, eight bytes each: few arguments make a quick
+call. A call that is told to forget begins the worst anew, and clears that field: the calls after it
+go on. `run` writes how far it came.
 """
 
 
 def follow(width: int) -> str:
-    """See `Track`: W samples at a time, and on from the last one accepted. Where nobody stays at the end, no anchor is left there.
+    """See `Track`: W samples at a time, and on from the last one accepted. Where nobody stays at
+    the end, no anchor is left there.
 
-    What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends there. Of few lanes several
-    such groups come before it.
+    What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends
+    there. Of few lanes several such groups come before it.
     """
     vector, test = f"<{width} x double>", Lines(width, "test")
     accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
@@ -122,7 +132,9 @@ end:
   ret i64 %at"""
     turned = Rows(width)
     place = turned.number("%numbers", turned.product("%stride", "%row"))
-    turned.lines.append(f"store {vector} {turned.turned(turned.read(turned.entry()))}, ptr {place}, align 8")
+    turned.lines.append(
+        f"store {vector} {turned.turned(turned.read(turned.entry()))}, ptr {place}, align 8"
+    )
     places = "ptr %plan, ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop"
     stay = f"""  %at = call i64 @go({places}, i1 true)
   ret i64 %at"""
@@ -130,7 +142,10 @@ end:
 declare i64 @llvm.smin.i64(i64, i64)
 declare i64 @llvm.smax.i64(i64, i64)
 {turned.function("keep_turned", "ptr %numbers", "i64 %stride")}{_worst(width)}{_run()}""" + "".join(
-        [function(f"internal i64 @go({places}, i1 %stays)", body), function(f"i64 @follow({places})", stay)]
+        [
+            function(f"internal i64 @go({places}, i1 %stays)", body),
+            function(f"i64 @follow({places})", stay),
+        ]
     )
 
 
@@ -182,21 +197,31 @@ def _worst(width: int) -> str:
     """
     begin, update, end = (Rows(width) for _ in range(3))
     vector, words = begin.vector, f"<{width} x i64>"
-    here, *_ = [rows.let(f"getelementptr {vector}, ptr %here, i64 %row") for rows in (begin, update, end)]
+    here, *_ = [
+        rows.let(f"getelementptr {vector}, ptr %here, i64 %row") for rows in (begin, update, end)
+    ]
     new, sign = begin.let("icmp ne i64 %forget, 0"), begin.entry(1, 3, "double")
     so_far = begin.let(f"load double, ptr {begin.number('%found', '%row')}, align 8")
     so_far = begin.let(f"fmul double {so_far}, {sign}")
-    start = begin.spread(begin.let(f"select i1 {new}, double {begin.entry(2, 3, 'double')}, double {so_far}"))
+    start = begin.spread(
+        begin.let(f"select i1 {new}, double {begin.entry(2, 3, 'double')}, double {so_far}")
+    )
     begin.lines.append(f"store {vector} {start}, ptr {here}, align 64")
     numbers = ", ".join(f"i64 {k}" for k in range(width))
     one = update.let(f"insertelement {words} poison, i64 %accepted, i64 0")
-    wanted = update.let(f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer")
+    wanted = update.let(
+        f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer"
+    )
     kept = update.let(f"icmp ult {words} <{numbers}>, {wanted}")
     before = update.let(f"load {vector}, ptr {here}, align 64")
-    signed = update.arithmetic("*", update.read(update.entry(0, 3)), update.spread(update.entry(1, 3, "double")))
+    signed = update.arithmetic(
+        "*", update.read(update.entry(0, 3)), update.spread(update.entry(1, 3, "double"))
+    )
     value = update.choose(kept, signed, before)
     worse = update.let(f"fcmp ogt {vector} {value}, {before}")
-    update.lines.append(f"store {vector} {update.choose(worse, value, before)}, ptr {here}, align 64")
+    update.lines.append(
+        f"store {vector} {update.choose(worse, value, before)}, ptr {here}, align 64"
+    )
     largest = end.let(f"load {vector}, ptr {here}, align 64")
     largest = end.let(f"call nnan double @llvm.vector.reduce.fmax.v{width}f64({vector} {largest})")
     largest = end.let(f"fmul double {largest}, {end.entry(1, 3, 'double')}")

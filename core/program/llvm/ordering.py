@@ -1,8 +1,9 @@
 """In which order machine code goes through a program: first what most of the rest waits for.
 
-A processor begins several operations in each cycle, but looks only a few hundred ahead for those that need not wait. The pivots of
-an elimination wait for one another, each for a division. What else a program has to do belongs between them; it is traced before
-them, or after. This is list scheduling by the longest way to the end (Hu, Parallel sequencing and assembly line problems,
+A processor begins several operations in each cycle, but looks only a few hundred ahead for those
+that need not wait. The pivots of an elimination wait for one another, each for a division. What
+else a program has to do belongs between them; it is traced before them, or after. This is list
+scheduling by the longest way to the end (Hu, Parallel sequencing and assembly line problems,
 Operations Research 9, 1961).
 """
 
@@ -14,16 +15,22 @@ from ..straight_line import Program
 from ..tape import LEAVES, operands
 
 CYCLES = {"/": 24, "sqrt": 32, "larger": 5, "before": 3, "umax": 3, "where": 1, "abs": 1, "neg": 1}
-"""After how many cycles a result is there, of vectors of eight on Intel's Golden Cove (uops.info); of all others after four."""
+"""After how many cycles a result is there, of vectors of eight on Intel's Golden Cove (uops.info);
+of all others after four.
+"""
 OTHERS = 4
 AT_ONCE = 2
 """Operations on such vectors that begin in one cycle."""
 PART = 0.65
-"""Of the time that all operations take. Programs that wait for less gain little, and lose more: much is computed too early."""
+"""Of the time that all operations take. Programs that wait for less gain little, and lose more:
+much is computed too early.
+"""
 
 
 def ordered(program: Program) -> Program:
-    """The same program, where its operations wait for one another for much of the time; others are left as they are."""
+    """The same program, where its operations wait for one another for much of the time; others are
+    left as they are.
+    """
     nodes = program.nodes
     reads = [operands(node) for node in nodes]
     cycles = [0 if node[0] in LEAVES else CYCLES.get(node[0], OTHERS) for node in nodes]
@@ -62,5 +69,13 @@ def ordered(program: Program) -> Program:
         else:
             cycle, room = (cycle + 1 if ready else waiting[0][0]), AT_ONCE
     place = {k: number for number, k in enumerate(order)}
-    found = (nodes[k] if nodes[k][0] in LEAVES else (nodes[k][0], *(place[x] for x in reads[k])) for k in order)
-    return Program(program.name, tuple(found), {slot: place[k] for slot, k in program.outputs.items()}, program.times)
+    found = (
+        nodes[k] if nodes[k][0] in LEAVES else (nodes[k][0], *(place[x] for x in reads[k]))
+        for k in order
+    )
+    return Program(
+        program.name,
+        tuple(found),
+        {slot: place[k] for slot, k in program.outputs.items()},
+        program.times,
+    )

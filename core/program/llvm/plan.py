@@ -1,4 +1,6 @@
-"""A plan in memory, as the loops over lanes read it: whole numbers of eight bytes each, and the addresses of tables of such."""
+"""A plan in memory, as the loops over lanes read it: whole numbers of eight bytes each, and the
+addresses of tables of such.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,9 @@ from .ir_writer import Lines
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
 """Slots that loops read and write, by their names in the plan."""
 NUMBERS = ("stride", *SLOTS, "tolerance", "most", "behind", "quick", "past", "state")
-"""Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the next, and "state" is how many slots
-are remembered. Where nothing is extrapolated "behind" is zero."""
+"""Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the
+next, and "state" is how many slots are remembered. Where nothing is extrapolated "behind" is
+zero."""
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
 """Each the address of a call: that of a function of lanes and a table, and that of the table."""
 CALLS = ("after", "alone", "joined", "onward", "remaining")
@@ -33,17 +36,29 @@ TABLES: Mapping[str, int] = {
 PAGE = 64
 """Slots of vectors of eight numbers in a page of memory."""
 TOGETHER = 4
-"""Pairs of slots that are copied at a time; the last of a table is repeated until it has so many."""
+"""Pairs of slots that are copied at a time; the last of a table is repeated until it has so
+many.
+"""
 FIELDS = [*NUMBERS, *PROGRAMS, *(field for name in TABLES for field in (name, f"{name}_count"))]
 
 
 def function(head: str, body: str) -> str:
-    """A function that is told of a plan: fields that its body names, "plan_" before each, are read at its begin."""
+    """A function that is told of a plan: fields that its body names, "plan_" before each, are read
+    at its begin.
+    """
     named, lines = set(re.findall(r"%plan_(\w+)", body)), Lines(0, "plan")
     for k, name in enumerate(FIELDS):
         if name in named:
-            kind = "double" if name == "tolerance" else "ptr" if name in TABLES or name in PROGRAMS else "i64"
-            lines.lines.append(f"%plan_{name} = load {kind}, ptr {lines.number('%plan', k)}, align 8")
+            kind = (
+                "double"
+                if name == "tolerance"
+                else "ptr"
+                if name in TABLES or name in PROGRAMS
+                else "i64"
+            )
+            lines.lines.append(
+                f"%plan_{name} = load {kind}, ptr {lines.number('%plan', k)}, align 8"
+            )
     return f"""define {head} {{
 entry:
   {lines.text}
@@ -97,7 +112,10 @@ end:
 
 def over(name: str, table: str, *arguments: str) -> str:
     """Call such a function for a table of the plan."""
-    return f"call void @{name}({', '.join((f'ptr %lane, ptr %plan_{table}, i64 %plan_{table}_count', *arguments))})"
+    return (
+        "call void"
+        f" @{name}({', '.join((f'ptr %lane, ptr %plan_{table}, i64 %plan_{table}_count', *arguments))})"
+    )
 
 
 def rows(width: int) -> str:
@@ -108,19 +126,32 @@ def rows(width: int) -> str:
     calls.lines.append(call("row", calls.entry(kind="ptr")))
     for k in range(TOGETHER):
         copy.at, spread.at = copy.sum("%row", k), spread.sum("%row", k)
-        copy.write(copy.entry(1, 2), copy.anew(f"load {vector}, ptr {copy.slot(copy.entry(0, 2))}, align 8"))
+        copy.write(
+            copy.entry(1, 2),
+            copy.anew(f"load {vector}, ptr {copy.slot(copy.entry(0, 2))}, align 8"),
+        )
         number = spread.number(spread.slot(spread.entry(0, 2)), "%k")
-        spread.write(spread.entry(1, 2), spread.spread(spread.anew(f"load double, ptr {number}, align 8")))
-    here = [each.number("%numbers", each.product("%stride", "%row")) for each in (give, take, keep, put)]
+        spread.write(
+            spread.entry(1, 2), spread.spread(spread.anew(f"load double, ptr {number}, align 8"))
+        )
+    here = [
+        each.number("%numbers", each.product("%stride", "%row")) for each in (give, take, keep, put)
+    ]
     give.write(give.entry(), give.spread(give.let(f"load double, ptr {here[0]}, align 8")))
     take.write(take.entry(), take.let(f"load {vector}, ptr {here[1]}, align 8"))
     keep.lines.append(f"store {vector} {keep.read(keep.entry())}, ptr {here[2]}, align 8")
     first = put.let(f"load double, ptr {put.slot(put.entry())}, align 8")
     put.lines.append(f"store double {first}, ptr {here[3]}, align 8")
-    sign, worst = worsen.spread(worsen.entry(1, 3, "double")), worsen.number("%numbers", worsen.product("%stride", "%row"))
+    sign, worst = (
+        worsen.spread(worsen.entry(1, 3, "double")),
+        worsen.number("%numbers", worsen.product("%stride", "%row")),
+    )
     values = worsen.read(worsen.entry(0, 3)), worsen.let(f"load {vector}, ptr {worst}, align 8")
-    worse = worsen.call("maximum", *(worsen.arithmetic("*", sign, each) for each in values))  # NaN if either is
-    worsen.lines.append(f"store {vector} {worsen.arithmetic('*', sign, worse)}, ptr {worst}, align 8")
+    # NaN if either is
+    worse = worsen.call("maximum", *(worsen.arithmetic("*", sign, each) for each in values))
+    worsen.lines.append(
+        f"store {vector} {worsen.arithmetic('*', sign, worse)}, ptr {worst}, align 8"
+    )
     numbers = "ptr %numbers", "i64 %stride"
     return "".join(
         [
@@ -142,7 +173,8 @@ class PlanInMemory:
     Attributes:
         address: where it stands.
         calls: by program, its row of `entries`.
-        entries: the addresses of a function of lanes and a table, and of the table; they may be changed while programs run.
+        entries: the addresses of a function of lanes and a table, and of the table; they may be
+            changed while programs run.
     """
 
     def __init__(self, plan: Plan, width: int, stride: int) -> None:
@@ -160,12 +192,28 @@ class PlanInMemory:
         }
         vector, worst = 8 * width, [(plan.largest, 1.0, 0.0), (plan.smallest, -1.0, -np.inf)]
         self._tables: dict[str, NDArray[np.int64]] = {
-            **{name: _table([self.entry(each) for each in getattr(plan, name)], 1) for name in CALLS},
-            **{name: vector * _table([*each, *[*each[-1:]] * (-len(each) % TOGETHER)], 2) for name, each in pairs.items()},
+            **{
+                name: _table([self.entry(each) for each in getattr(plan, name)], 1)
+                for name in CALLS
+            },
+            **{
+                name: vector * _table([*each, *[*each[-1:]] * (-len(each) % TOGETHER)], 2)
+                for name, each in pairs.items()
+            },
             "targets": vector * _table([target for _, target in plan.carried], 1),
-            **{name: vector * _table(getattr(plan, name), 1) for name in ("sampled", "kept", "fixed", "taken")},
+            **{
+                name: vector * _table(getattr(plan, name), 1)
+                for name in ("sampled", "kept", "fixed", "taken")
+            },
             "left": _table([(vector * slot, k) for slot, k in plan.left], 2),
-            "worst": _table([(vector * x, _bits(sign), _bits(start)) for slots, sign, start in worst for x in slots], 3),
+            "worst": _table(
+                [
+                    (vector * x, _bits(sign), _bits(start))
+                    for slots, sign, start in worst
+                    for x in slots
+                ],
+                3,
+            ),
         }
         found = {
             "stride": stride,
@@ -189,10 +237,12 @@ class PlanInMemory:
 
 
 def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Slots that are carried, in an order in which no slot is read soon after one was written that is a page away, or several.
+    """Slots that are carried, in an order in which no slot is read soon after one was written that
+    is a page away, or several.
 
-    Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that move by up to half a page go
-    upwards, the others downwards. What stays where it is is left out, and a slot that is read and written is read first.
+    Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that
+    move by up to half a page go upwards, the others downwards. What stays where it is is left out,
+    and a slot that is read and written is read first.
     """
     targets = {target for _, target in pairs}
     first = [pair for pair in pairs if pair[0] in targets and pair[0] != pair[1]]

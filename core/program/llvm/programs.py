@@ -10,16 +10,19 @@ from ..tape import LEAVES, Node, operands, place_of
 from .ir_writer import Lines
 from .ordering import ordered
 
-# Values held at once, of 32 registers: LLVM's own schedule moves lines about. With 16, narrower vectors, LLVM does as well alone.
+# Values held at once, of 32 registers: LLVM's own schedule moves lines about. With 16, narrower
+# vectors, LLVM does as well alone.
 HELD, WIDE = 24, 8
-# So many more lines for each node, to put values away and fetch them, cost as much as waiting for divisions does.
+# So many more lines for each node, to put values away and fetch them, cost as much as waiting for
+# divisions does.
 PUT_AWAY = 0.4
 
 
 def function(program: Program, width: int) -> str:
     """A program as a function of its W lanes.
 
-    In the order in which it waits least, where there are registers for that: with 16 it takes up to half as long again.
+    In the order in which it waits least, where there are registers for that: with 16 it takes up to
+    half as long again.
     """
     program = lowered(program)
     if program.times > 1:
@@ -29,7 +32,10 @@ def function(program: Program, width: int) -> str:
         other = _Straight(waiting, width)
         if len(other.lines) - len(straight.lines) <= PUT_AWAY * len(program.nodes):
             straight = other
-    return f"define void @{program.name}(ptr noalias %lane, ptr %table) {{\n  {straight.text}\n  ret void\n}}\n"
+    return (
+        f"define void @{program.name}(ptr noalias %lane, ptr %table) {{\n  {straight.text}\n  ret"
+        " void\n}\n"
+    )
 
 
 def _repeated(program: Program, width: int) -> str:
@@ -37,12 +43,20 @@ def _repeated(program: Program, width: int) -> str:
     body, end = Lines(width, lane="%here"), Lines(width, "e")
     values = list[str]()
     for node in program.nodes:
-        known = body.read(int(node[1])) if node[0] == "input" else body.constant(float(node[1])) if node[0] == "const" else None
+        known = (
+            body.read(int(node[1]))
+            if node[0] == "input"
+            else body.constant(float(node[1]))
+            if node[0] == "const"
+            else None
+        )
         values.append(known or body.operation(node[0], [values[k] for k in operands(node)]))
     largest = list[str]()
     for k, (slot, number) in enumerate(program.outputs.items()):
         found = body.umax(f"%largest{k}", values[number])
-        largest.append(f"%largest{k} = phi {body.vector} [zeroinitializer, %entry], [{found}, %run]")
+        largest.append(
+            f"%largest{k} = phi {body.vector} [zeroinitializer, %entry], [{found}, %run]"
+        )
         end.write(slot, found)
     phis = "\n  ".join(largest)
     return f"""define void @{program.name}(ptr noalias %lane, ptr %table) {{
@@ -66,8 +80,9 @@ end:
 class _Straight(Lines):
     """The lines of a program that holds no more values at once than there are registers for.
 
-    What is too much goes to memory: that which is used again last (Belady 1966), inputs to where they came from. Left to itself,
-    LLVM's allocator takes as long for that as all else together, and its code is a few percent slower.
+    What is too much goes to memory: that which is used again last (Belady 1966), inputs to where
+    they came from. Left to itself, LLVM's allocator takes as long for that as all else together,
+    and its code is a few percent slower.
     """
 
     def __init__(self, program: Program, width: int) -> None:
@@ -103,7 +118,9 @@ class _Straight(Lines):
         self._used(k for _, k in writes)
 
     def _fetched(self, k: int, wanted: Sequence[int]) -> str:
-        """The name of a value that is not held; for it, none of those wanted with it is given up."""
+        """The name of a value that is not held; for it, none of those wanted with it is given
+        up.
+        """
         node = self._nodes[k]
         if node[0] == "const":
             return self.constant(float(node[1]))
@@ -127,7 +144,9 @@ class _Straight(Lines):
                     self._free.append(self._room)
                     self._room += 1
                 self._stacked[last] = self._free.pop()
-                self.lines.append(f"store {self.vector} {value}, ptr {self._place(self._stacked[last])}, align 8")
+                self.lines.append(
+                    f"store {self.vector} {value}, ptr {self._place(self._stacked[last])}, align 8"
+                )
         self._held[k] = name
 
     def _used(self, values: Iterable[int]) -> None:
@@ -145,7 +164,8 @@ class _Straight(Lines):
 
 
 def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, int]]]]:
-    """By value, the operations that use it, the first one last; by operation, the slots written after it, with their values.
+    """By value, the operations that use it, the first one last; by operation, the slots written
+    after it, with their values.
 
     A slot is written as soon as its value is there and nothing is to read what stood in it before.
     """
@@ -158,14 +178,25 @@ def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, 
     for k, node in enumerate(nodes):
         if node[0] in ("input", "node") and due[k]:
             last_read[int(node[1])] = max(due[k][0], last_read.get(int(node[1]), 0))
-    stands = {slot: int(nodes[k][1]) for slot, k in program.outputs.items() if nodes[k][0] in ("input", "node")}
-    # what stands in a slot is put out where it is used last anyway, if nobody reads what it overwrites
+    stands = {
+        slot: int(nodes[k][1])
+        for slot, k in program.outputs.items()
+        if nodes[k][0] in ("input", "node")
+    }
+    # what stands in a slot is put out where it is used last anyway, if nobody reads what it
+    # overwrites
     read = last_read.keys() | stands.values()
     early = {slot for slot in stands if due[program.outputs[slot]] and slot not in read}
     last_read |= {source: end for slot, source in stands.items() if slot not in early}
     writes: dict[int, list[tuple[int, int]]] = {}
     for slot, k in program.outputs.items():
-        when = due[k][0] if slot in early else end if nodes[k][0] in LEAVES else max(k, last_read.get(slot, 0))
+        when = (
+            due[k][0]
+            if slot in early
+            else end
+            if nodes[k][0] in LEAVES
+            else max(k, last_read.get(slot, 0))
+        )
         writes.setdefault(when, []).append((slot, k))
         due[k] = sorted([*due[k], when], reverse=True)
     return due, writes

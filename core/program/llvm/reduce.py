@@ -6,7 +6,9 @@ from .plan import function, over
 
 
 def fold(width: int) -> str:
-    """See `Executor.fold`: totals stay in the nearest cache, and what they are made of is read once."""
+    """See `Executor.fold`: totals stay in the nearest cache, and what they are made of is read
+    once.
+    """
     body = f"""%all = mul i64 %columns, {width}
   %step = mul i64 %plan_taken_count, {width}
   br label %column
@@ -33,4 +35,6 @@ end_column:
   br i1 %more_columns, label %column, label %end
 end:
   ret void"""
-    return function("void @fold(ptr %plan, ptr %lane, ptr %table, i64 %columns, i64 %room, ptr %out)", body)
+    return function(
+        "void @fold(ptr %plan, ptr %lane, ptr %table, i64 %columns, i64 %room, ptr %out)", body
+    )

@@ -1,4 +1,6 @@
-"""Cost against batch size: variants of a mechanism's hardpoints, solved together, lanes being variants."""
+"""Cost against batch size: variants of a mechanism's hardpoints, solved together, lanes being
+variants.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ from .peak import Peak
 from .rounds import Spread, Work, take_turns
 
 SIZES = (1, 4, 16, 64, 256, 1024, 4096)
-# Standard deviation of the hardpoints' coordinates, relative to the mechanism's size: that of a tolerance study.
+# Standard deviation of the hardpoints' coordinates, relative to the mechanism's size: that of a
+# tolerance study.
 SCATTER = 1e-3
 SEED = 943745
 
@@ -32,8 +35,10 @@ class Batch(msgspec.Struct, frozen=True, kw_only=True):
     """So many variants solved together.
 
     Attributes:
-        solved: part of all samples that were reached; retried: variants that were solved again alone.
-        error: of the first variant, which is the case itself: largest position error of the outputs that are lengths [m].
+        solved: part of all samples that were reached; retried: variants that were solved again
+            alone.
+        error: of the first variant, which is the case itself: largest position error of the outputs
+            that are lengths [m].
         us_per_sample: by sample and variant.
         flops_per_sample, gflops: of the programs, for accepted samples; and by nanosecond.
         of_peak: part of the measured peak of a core; null where that is not known.
@@ -71,13 +76,20 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
         case: with its truth.
     """
     values = places(case.mechanism)
-    varied = tuple(name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION)
+    varied = tuple(
+        name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION
+    )
     path = case.sweep.path
     model = compile_model(case.mechanism, Request(tuple(path.motions), case.points, varied=varied))
     nominal = np.array([number for name in varied for number in values[name]])
-    scatter = np.random.default_rng(SEED).normal(size=(len(nominal), max(SIZES))) * SCATTER * size(case)
+    scatter = (
+        np.random.default_rng(SEED).normal(size=(len(nominal), max(SIZES))) * SCATTER * size(case)
+    )
     scatter[:, 0] = 0.0
-    batches = {str(count): _Batch(Route(model, path), nominal[:, None] + scatter[:, :count], tol) for count in SIZES}
+    batches = {
+        str(count): _Batch(Route(model, path), nominal[:, None] + scatter[:, :count], tol)
+        for count in SIZES
+    }
     work: dict[str, Work] = {**batches}
     if peak is not None:
         work["peak"] = peak
@@ -111,7 +123,10 @@ def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float
 def _error(case: Case, model: Model, found: Variants) -> float | None:
     """Of the first variant."""
     kept = found.kept[:, :, 0]
-    points = {name: PointMotion(*(kept[model.rows[f"{label} {name}"]].T for label in QUANTITIES)) for name in case.points}
+    points = {
+        name: PointMotion(*(kept[model.rows[f"{label} {name}"]].T for label in QUANTITIES))
+        for name in case.points
+    }
     solved = found.solved[:, 0]
     whole = Trajectory(points, solved, np.zeros_like(solved, dtype=np.int64), 0.0, "", {})
     errors = [

@@ -12,13 +12,22 @@ from time import perf_counter
 from ...kinematics.solver_selection import prepare
 from .native_breakdown import Level
 
-STAGES = ("import numpy", "import kincheck", "build", "first solve", "second solve", "ten more", "solve anew")
+STAGES = (
+    "import numpy",
+    "import kincheck",
+    "build",
+    "first solve",
+    "second solve",
+    "ten more",
+    "solve anew",
+)
 FIRST = STAGES[1:4]
 """Those to the first solution, beyond numpy."""
 
 
 def first_use(clock: Sequence[float]) -> None:
-    """Build and solve the pickled case on standard input; print the seconds of all stages as a line of JSON.
+    """Build and solve the pickled case on standard input; print the seconds of all stages as a line
+    of JSON.
 
     Solved anew is what was solved before, asked for again as of `solve`.
 

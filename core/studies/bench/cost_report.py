@@ -12,14 +12,19 @@ from .scaling import exponent
 from .size import growth
 
 TIMED = (
-    "Median and quartiles over the rounds, in µs a sample: warm, contestants taking turns in one process. Errors are the largest "
-    "over samples and outputs. An outcome is by the tolerances of the case, which a coarse effort is expected to miss."
+    "Median and quartiles over the rounds, in µs a sample: warm, contestants taking turns in one"
+    " process. Errors are the largest over samples and outputs. An outcome is by the tolerances of"
+    " the case, which a coarse effort is expected to miss."
 )
 
 
 def cells(us: Spread | None) -> tuple[str, str]:
     """Median and quartiles."""
-    return ("–", "–") if us is None else (number(us.median), f"{number(us.lower)} … {number(us.upper)}")
+    return (
+        ("–", "–")
+        if us is None
+        else (number(us.median), f"{number(us.lower)} … {number(us.upper)}")
+    )
 
 
 def batches(found: Bench) -> Section:
@@ -37,11 +42,31 @@ def batches(found: Bench) -> Section:
         for each in found.batches
     ]
     notes = (
-        "All hardpoints vary by a thousandth of the mechanism's size; one core; time by sample and variant. Error: position of the "
-        "first variant, which is the case itself. Retried: variants solved again alone.",
+        (
+            "All hardpoints vary by a thousandth of the mechanism's size; one core; time by sample"
+            " and variant. Error: position of the first variant, which is the case itself. Retried:"
+            " variants solved again alone."
+        ),
     )
-    headings = ("variants", "µs", "quartiles", "Gflop/s", "of peak", "solved", "retried", "error [m]")
-    return Section(f"{found.batches[0].case}: cost against batch size", [], notes, headings, 1, rows, [batch_diagram(found)])
+    headings = (
+        "variants",
+        "µs",
+        "quartiles",
+        "Gflop/s",
+        "of peak",
+        "solved",
+        "retried",
+        "error [m]",
+    )
+    return Section(
+        f"{found.batches[0].case}: cost against batch size",
+        [],
+        notes,
+        headings,
+        1,
+        rows,
+        [batch_diagram(found)],
+    )
 
 
 def studies(found: Bench) -> Section:
@@ -58,11 +83,22 @@ def studies(found: Bench) -> Section:
     ]
     first = found.studies[0]
     notes = (
-        f"{first.variants} variants drawn, solved and reduced as kincheck sweep does it, every hardpoint by a thousandth of the "
-        "mechanism's size; µs of the whole machine by sample and variant. Times as fast: as on one thread, by round; the kernel "
-        "that measures a core's peak tells what the machine gives at that time.",
+        (
+            f"{first.variants} variants drawn, solved and reduced as kincheck sweep does it, every"
+            " hardpoint by a thousandth of the mechanism's size; µs of the whole machine by sample"
+            " and variant. Times as fast: as on one thread, by round; the kernel that measures a"
+            " core's peak tells what the machine gives at that time."
+        ),
     )
-    headings = ("threads", "µs", "quartiles", "times as\nfast", "quartiles", "of the\npeak kernel", "unsolved")
+    headings = (
+        "threads",
+        "µs",
+        "quartiles",
+        "times as\nfast",
+        "quartiles",
+        "of the\npeak kernel",
+        "unsolved",
+    )
     return Section(f"{first.case}: a tolerance study by threads", [], notes, headings, 1, rows)
 
 
@@ -88,10 +124,35 @@ def sizes(found: Bench, family: str) -> Section:
         mine = [each for each in sizes if each.engine == engine]
         if (grown := growth(mine)) is not None:
             n, m, power = grown
-            said.append(f"{engine}: from {n} to {m} {many} the cost grows as their number to the power of {power:.2f}.")
-        said += [f"{engine}, {each.loops} {many}: {each.message}" for each in mine if each.us_per_sample is None]
-    headings = ("engine", "loop", many, "bodies", "outcome", "error [m]", "residual", "µs", "quartiles")
-    return Section(f"Cost against size: {family}", said, (TIMED,), headings, 2, rows, [size_diagram(family, sizes)])
+            said.append(
+                f"{engine}: from {n} to {m} {many} the cost grows as their number to the power of"
+                f" {power:.2f}."
+            )
+        said += [
+            f"{engine}, {each.loops} {many}: {each.message}"
+            for each in mine
+            if each.us_per_sample is None
+        ]
+    headings = (
+        "engine",
+        "loop",
+        many,
+        "bodies",
+        "outcome",
+        "error [m]",
+        "residual",
+        "µs",
+        "quartiles",
+    )
+    return Section(
+        f"Cost against size: {family}",
+        said,
+        (TIMED,),
+        headings,
+        2,
+        rows,
+        [size_diagram(family, sizes)],
+    )
 
 
 def scalings(found: Bench) -> Section:
@@ -113,10 +174,30 @@ def scalings(found: Bench) -> Section:
     for mechanism in dict.fromkeys(each.mechanism for each in found.scalings):
         small, *_, large = (each for each in found.scalings if each.mechanism == mechanism)
         power = exponent(small, large)
-        said.append(f"{mechanism}: from {small.size} to {large.size} the cost grows as the unknowns to the power of {power:.2f}.")
-    notes = ("Median and quartiles, µs of a driver value: position, velocity and acceleration of one point far from the driver.",)
-    headings = ("mechanism", "size", "bodies", "unknowns", "path", "error [m]", "residual", "µs", "quartiles")
-    return Section("Cost against size: large mechanisms as one sparse system", said, notes, headings, 1, rows)
+        said.append(
+            f"{mechanism}: from {small.size} to {large.size} the cost grows as the unknowns to the"
+            f" power of {power:.2f}."
+        )
+    notes = (
+        (
+            "Median and quartiles, µs of a driver value: position, velocity and acceleration of one"
+            " point far from the driver."
+        ),
+    )
+    headings = (
+        "mechanism",
+        "size",
+        "bodies",
+        "unknowns",
+        "path",
+        "error [m]",
+        "residual",
+        "µs",
+        "quartiles",
+    )
+    return Section(
+        "Cost against size: large mechanisms as one sparse system", said, notes, headings, 1, rows
+    )
 
 
 def processes(found: Bench) -> Section:
@@ -133,9 +214,13 @@ def processes(found: Bench) -> Section:
         for each in found.processes
     ]
     notes = (
-        "Seconds of fresh processes, files warm; stages are medians, beyond numpy: those after it, to the first solution. In "
-        "the course of ten more solves programs are compiled that are not in the cache; until then they are interpreted. Memory: "
-        "the most a process held; runs are of the first case, and in one process with their engine (--jobs 0).",
+        (
+            "Seconds of fresh processes, files warm; stages are medians, beyond numpy: those after"
+            " it, to the first solution. In the course of ten more solves programs are compiled"
+            " that are not in the cache; until then they are interpreted. Memory: the most a"
+            " process held; runs are of the first case, and in one process with their engine"
+            " (--jobs 0)."
+        ),
     )
     headings = (
         "process",

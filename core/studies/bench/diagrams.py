@@ -24,21 +24,38 @@ def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:
         if (floor.case, floor.mode) == (case, mode) and finest:
             (best,) = effort(finest[-1])
             name = f"{best.engine}: floor"
-            efforts.append(replace(best, engine=name, setting=f"floor of {best.setting}", us_per_sample=floor.us_per_sample))
+            efforts.append(
+                replace(
+                    best,
+                    engine=name,
+                    setting=f"floor of {best.setting}",
+                    us_per_sample=floor.us_per_sample,
+                )
+            )
             own = next(style for style in styles if style.name == best.engine)
             styles.append(replace(own, name=name, symbol="x-thin-open", dash="3px,3px"))
             floors = " A cross is a simulator's floor: a bound, no solver."
     drawn = [each for each in efforts if each.us_per_sample > 0.0]
     caption = f"Left is faster, down is more exact; a point is one effort.{floors}"
-    plot = Plot(f"{case}-{mode}", f"{case}, {mode}: error against time per sample, both log axes", caption)
+    plot = Plot(
+        f"{case}-{mode}", f"{case}, {mode}: error against time per sample, both log axes", caption
+    )
     return Diagram(plot, precision_figure(drawn, {style.name: style for style in styles}), styles)
 
 
 def size_diagram(family: str, sizes: Sequence[Size]) -> Diagram:
     """Time against the number of loops."""
-    timed = [(each.engine, each.loops, each.us_per_sample.median) for each in sizes if each.us_per_sample is not None]
+    timed = [
+        (each.engine, each.loops, each.us_per_sample.median)
+        for each in sizes
+        if each.us_per_sample is not None
+    ]
     caption = f"A {family}; time of one driver value, position, velocity and acceleration."
-    plot = Plot(family.replace(" ", "-"), f"{family}: time per sample against their number, both log axes", caption)
+    plot = Plot(
+        family.replace(" ", "-"),
+        f"{family}: time per sample against their number, both log axes",
+        caption,
+    )
     return _against(plot, family.rpartition(" ")[2], "time per sample [µs]", timed)
 
 
@@ -68,18 +85,29 @@ def stage_diagram(found: Bench) -> Diagram:
         }
         for style in styles
     ]
-    layout: Figure = {"barmode": "stack", "xaxis": {"title": {"text": "time [s]"}}, "yaxis": {"autorange": "reversed"}}
-    plot = Plot("stages", "stages of the native engine's first use", "Medians over fresh processes.")
+    layout: Figure = {
+        "barmode": "stack",
+        "xaxis": {"title": {"text": "time [s]"}},
+        "yaxis": {"autorange": "reversed"},
+    }
+    plot = Plot(
+        "stages", "stages of the native engine's first use", "Medians over fresh processes."
+    )
     return Diagram(plot, {"data": bars, "layout": layout}, styles)
 
 
 def entries_of(found: Bench) -> list[tuple[str, str, list[Entry]]]:
     """Case and mode, and their entries: what may be compared with each other."""
     keys = dict.fromkeys((entry.case, entry.mode) for entry in found.entries)
-    return [(*key, [entry for entry in found.entries if (entry.case, entry.mode) == key]) for key in keys]
+    return [
+        (*key, [entry for entry in found.entries if (entry.case, entry.mode) == key])
+        for key in keys
+    ]
 
 
-def _against(plot: Plot, x_title: str, y_title: str, points: Sequence[tuple[str, int, float]]) -> Diagram:
+def _against(
+    plot: Plot, x_title: str, y_title: str, points: Sequence[tuple[str, int, float]]
+) -> Diagram:
     styles = _styles(name for name, *_ in points)
     curves: list[Figure] = []
     for style in styles:
@@ -92,7 +120,16 @@ def _against(plot: Plot, x_title: str, y_title: str, points: Sequence[tuple[str,
             "marker": {"size": 8, "symbol": style.symbol, "color": style.colour},
         }
         x, y = ([each[k] for each in mine] for k in range(2))
-        curves.append({"type": "scatter", "mode": "lines+markers", "x": x, "y": y, "hovertemplate": "%{x}: %{y:.3~g} µs", **look})
+        curves.append(
+            {
+                "type": "scatter",
+                "mode": "lines+markers",
+                "x": x,
+                "y": y,
+                "hovertemplate": "%{x}: %{y:.3~g} µs",
+                **look,
+            }
+        )
     axes: Figure = {
         "xaxis": ticked_axis(x_title, [x for _, x, _ in points]),
         "yaxis": ticked_axis(y_title, [y for *_, y in points]),

@@ -22,7 +22,17 @@ from ..paper.formulation import Formulation
 from . import native_breakdown, scaling
 from .batch import Batch, measure_batches
 from .peak import Peak, prepare
-from .precision import Contestant, Entry, FloorOf, Needed, contestants, efforts_of, floors, needed, with_truth
+from .precision import (
+    Contestant,
+    Entry,
+    FloorOf,
+    Needed,
+    contestants,
+    efforts_of,
+    floors,
+    needed,
+    with_truth,
+)
 from .processes import Process, measure_processes
 from .rounds import Spread, Work, take_turns
 from .scaling import Scaling
@@ -31,9 +41,12 @@ from .study_throughput import StudyRate, measure_studies
 
 NAME = "bench"
 PARTS = ("work", "batch", "study", "size", "processes")
-"""What may be measured: work against precision, cost of batches, of a study, and against mechanism size, first use and memory."""
+"""What may be measured: work against precision, cost of batches, of a study, and against mechanism
+size, first use and memory.
+"""
 
-# Sizes of chain and ring as one sparse system. A round of them takes seconds, which few interruptions are long against.
+# Sizes of chain and ring as one sparse system. A round of them takes seconds, which few
+# interruptions are long against.
 LARGE, LARGE_ROUNDS = (100, 1000), 3
 
 
@@ -58,7 +71,8 @@ class Bench(msgspec.Struct, frozen=True, kw_only=True):
     """The results of this benchmark; a part that was not asked for is empty.
 
     Attributes:
-        run: circumstances; load: of the machine, as it tells them for the last minute, before and after.
+        run: circumstances; load: of the machine, as it tells them for the last minute, before and
+            after.
         vector_width: doubles in a vector of the compiled code; null without a compiler.
         entries: engines at their efforts, on each case; levels: the native engine in detail.
     """
@@ -129,11 +143,27 @@ def measure(
             add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
     if "processes" in parts:
         tell(f"{first.name}: processes of their own")
-        names = {engine.name for engine in projections}  # variants of a simulator take the memory that it takes
-        add("processes", measure_processes(first, name, [engine for engine in engines if engine.name in names], tol, rounds))
+        # variants of a simulator take the memory that it takes
+        names = {engine.name for engine in projections}
+        add(
+            "processes",
+            measure_processes(
+                first, name, [engine for engine in engines if engine.name in names], tol, rounds
+            ),
+        )
     run = circumstances([*true.values()], started=started, tol=tol, command=command)
-    run |= {"cores": os.cpu_count(), "load_before": before, "load_after": _load(), "linear_algebra_threads": _threads()}
-    facts: dict[str, Any] = {"run": run, "rounds": rounds, "vector_width": peak and peak.width, **found}
+    run |= {
+        "cores": os.cpu_count(),
+        "load_before": before,
+        "load_after": _load(),
+        "linear_algebra_threads": _threads(),
+    }
+    facts: dict[str, Any] = {
+        "run": run,
+        "rounds": rounds,
+        "vector_width": peak and peak.width,
+        **found,
+    }
     return Bench(**facts)
 
 
@@ -146,7 +176,9 @@ def _measure_work(
     add: Callable[[str, Sequence[Any]], object],
     tell: Callable[[str], object],
 ) -> None:
-    """A case's work and precision, its floors, and the native engine in detail: all in the same rounds."""
+    """A case's work and precision, its floors, and the native engine in detail: all in the same
+    rounds.
+    """
     entering: dict[tuple[str, str], Contestant] = {}
     for engine in engines:
         for each in contestants(case, efforts_of(engine), tol):
@@ -155,7 +187,9 @@ def _measure_work(
     if detailed:
         for each in contestants(case, native_breakdown.LEVELS, tol):
             entering["levels", each.entry.setting] = each
-    work: dict[tuple[str, str], Work] = {key: each.work for key, each in entering.items() if each.work is not None}
+    work: dict[tuple[str, str], Work] = {
+        key: each.work for key, each in entering.items() if each.work is not None
+    }
     if detailed and compiler.available():
         work["levels", native_breakdown.ALONE] = native_breakdown.loops_alone(case, tol)
     if peak is not None:
@@ -168,7 +202,9 @@ def _measure_work(
     if ("levels", native_breakdown.ALONE) in seconds:
         whole = native[native_breakdown.EVERYTHING]
         alone = seconds["levels", native_breakdown.ALONE].times(1e6 / whole.samples)
-        native[native_breakdown.ALONE] = msgspec.structs.replace(whole, setting=native_breakdown.ALONE, us_per_sample=alone)
+        native[native_breakdown.ALONE] = msgspec.structs.replace(
+            whole, setting=native_breakdown.ALONE, us_per_sample=alone
+        )
     add("entries", entries)
     add("needed", needed(entries))
     add("levels", [*native.values()])
@@ -195,7 +231,9 @@ def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread)
         entry = native.get(setting)
         if entry is None or entry.us_per_sample is None:
             continue
-        flops = native_breakdown.flops_of(native_breakdown.Level().build(case).model, entry.iterations or 0.0)
+        flops = native_breakdown.flops_of(
+            native_breakdown.Level().build(case).model, entry.iterations or 0.0
+        )
         us = entry.us_per_sample.median
         rates.append(
             Rate(
@@ -220,7 +258,8 @@ def _threads() -> str:
 
 
 def efforts_in(file: Path) -> dict[str, list[Effort]]:
-    """What a file of this benchmark has for the diagrams of a run's report: error and time of each engine's efforts, by case.
+    """What a file of this benchmark has for the diagrams of a run's report: error and time of each
+    engine's efforts, by case.
 
     Raises:
         KincheckError: it cannot be read or is none.
@@ -228,7 +267,9 @@ def efforts_in(file: Path) -> dict[str, list[Effort]]:
     try:
         found = msgspec.json.decode(file.read_bytes(), type=Bench)
     except (OSError, msgspec.DecodeError) as error:
-        raise KincheckError(f"--bench {file}: {error}; give a bench.json that kincheck bench wrote") from None
+        raise KincheckError(
+            f"--bench {file}: {error}; give a bench.json that kincheck bench wrote"
+        ) from None
     efforts: dict[str, list[Effort]] = {}
     for entry in found.entries:
         efforts.setdefault(entry.case, []).extend(effort(entry))
@@ -236,11 +277,15 @@ def efforts_in(file: Path) -> dict[str, list[Effort]]:
 
 
 def effort(entry: Entry) -> list[Effort]:
-    """The entry's point in a diagram of error against time; none where it has no time or no error."""
+    """The entry's point in a diagram of error against time; none where it has no time or no
+    error.
+    """
     if entry.us_per_sample is None or entry.errors.position is None:
         return []
     name = entry.engine if entry.mode == "projection" else f"{entry.engine} · {entry.mode}"
-    return [Effort(name, entry.setting, entry.errors.position, entry.us_per_sample.median, entry.mode)]
+    return [
+        Effort(name, entry.setting, entry.errors.position, entry.us_per_sample.median, entry.mode)
+    ]
 
 
 def with_formulation(found: Bench, formulation: Formulation) -> Bench:

@@ -1,4 +1,6 @@
-"""The benchmark of engines for people: tables, what follows from them, and diagrams. Modes never share a table."""
+"""The benchmark of engines for people: tables, what follows from them, and diagrams. Modes never
+share a table.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,11 @@ def report(found: Bench) -> Report:
     facts = [
         f"kincheck {run['kincheck']}, numpy {run['numpy']}, Python {run['python']}",
         f"{run['processor']}, {run['cores']} processors",
-        f"vectors of {found.vector_width} doubles" if found.vector_width else "no compiler: numpy executor",
+        (
+            f"vectors of {found.vector_width} doubles"
+            if found.vector_width
+            else "no compiler: numpy executor"
+        ),
         f"load {number(run['load_before'])} before, {number(run['load_after'])} after",
         f"linear algebra threads: {run['linear_algebra_threads']}",
         f"{found.rounds} rounds",
@@ -38,13 +44,20 @@ def report(found: Bench) -> Report:
     sections: list[Section] = []
     for case, mode, entries in entries_of(found):
         sections += [_precision(found, case, mode, entries), _needed(found, case, mode)]
-        sections += [_floors(found, case)] if mode == "projection" and any(each.case == case for each in found.floors) else []
+        sections += (
+            [_floors(found, case)]
+            if mode == "projection" and any(each.case == case for each in found.floors)
+            else []
+        )
     for case in dict.fromkeys(entry.case for entry in found.levels):
         sections.append(_levels(found, case))
     sections += [_rates(found)] if found.rates else []
     sections += [cost.batches(found)] if found.batches else []
     sections += [cost.studies(found)] if found.studies else []
-    sections += [cost.sizes(found, family) for family in dict.fromkeys(each.mechanism for each in found.sizes)]
+    sections += [
+        cost.sizes(found, family)
+        for family in dict.fromkeys(each.mechanism for each in found.sizes)
+    ]
     sections += [cost.scalings(found)] if found.scalings else []
     sections += [cost.processes(found)] if found.processes else []
     sections += formulation_report(found.formulation).sections if found.formulation else []
@@ -65,13 +78,23 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         for entry in entries
     ]
     truths = [entry.against.split(", ") for entry in entries if entry.against]
-    said = [f"Errors are against: {', '.join(map(against, truths[0]))}." if truths else "There was nothing to compare with."]
+    said = [
+        (
+            f"Errors are against: {', '.join(map(against, truths[0]))}."
+            if truths
+            else "There was nothing to compare with."
+        )
+    ]
     said += [
-        f"{loop}: {', '.join(dict.fromkeys(entry.engine for entry in entries if entry.loop == loop))}: the loop runs {words}."
+        f"{loop}:"
+        f" {', '.join(dict.fromkeys(entry.engine for entry in entries if entry.loop == loop))}: the"
+        f" loop runs {words}."
         for loop, words in LOOPS_RUN.items()
         if any(entry.loop == loop for entry in entries)
     ]
-    said += [f"{each.engine}: {each.outcome}: {each.message}" for each in entries if each.solved is None]
+    said += [
+        f"{each.engine}: {each.outcome}: {each.message}" for each in entries if each.solved is None
+    ]
     counted = "iterations" if mode == "projection" else "steps"
     headings = (
         "engine",
@@ -81,8 +104,20 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         *(f"{name}\n[{motion_unit('m', name)}]" for name in QUANTITIES),
         f"{counted}\na sample",
     )
-    diagrams = [precision_diagram(found, case, mode)] if any(entry.us_per_sample for entry in entries) else []
-    return Section(f"{case}, {mode}: work and precision", said, (TIMED,), (*headings, "µs", "quartiles"), 4, rows, diagrams)
+    diagrams = (
+        [precision_diagram(found, case, mode)]
+        if any(entry.us_per_sample for entry in entries)
+        else []
+    )
+    return Section(
+        f"{case}, {mode}: work and precision",
+        said,
+        (TIMED,),
+        (*headings, "µs", "quartiles"),
+        4,
+        rows,
+        diagrams,
+    )
 
 
 def _needed(found: Bench, case: str, mode: str) -> Section:
@@ -91,26 +126,40 @@ def _needed(found: Bench, case: str, mode: str) -> Section:
     for engine in dict.fromkeys(each.engine for each in mine):
         here = [each for each in mine if each.engine == engine]
         rows.append((engine, here[0].loop, *(_time_needed(each) for each in here)))
-    notes = ("µs a sample of the fastest effort whose largest position error is not above, all samples reached, and that effort.",)
+    notes = (
+        (
+            "µs a sample of the fastest effort whose largest position error is not above, all"
+            " samples reached, and that effort."
+        ),
+    )
     headings = ("engine", "loop", *(f"{required:g} m" for required in REQUIRED))
     said = _faster(mine) if mode == "projection" else []
     return Section(f"{case}, {mode}: time at a required error", said, notes, headings, 2, rows)
 
 
 def _time_needed(each: Needed) -> str:
-    return "none" if each.us_per_sample is None else f"{number(each.us_per_sample)} · {each.setting}"
+    return (
+        "none" if each.us_per_sample is None else f"{number(each.us_per_sample)} · {each.setting}"
+    )
 
 
 def _faster(mine: Sequence[Needed]) -> list[str]:
     """The native engine against the fastest other at each error."""
     said: list[str] = []
     for required in REQUIRED:
-        times = {each.engine: each.us_per_sample for each in mine if each.required == required and each.us_per_sample is not None}
+        times = {
+            each.engine: each.us_per_sample
+            for each in mine
+            if each.required == required and each.us_per_sample is not None
+        }
         ours = times.pop(NATIVE, None)
         if ours is None or not times:
             continue
         best = min(times, key=lambda name: times[name])
-        said.append(f"At {required:g} m the native engine is {times[best] / ours:.0f} times as fast as the fastest other, {best}.")
+        said.append(
+            f"At {required:g} m the native engine is {times[best] / ours:.0f} times as fast as the"
+            f" fastest other, {best}."
+        )
     return said
 
 
@@ -129,15 +178,30 @@ def _floors(found: Bench, case: str) -> Section:
         rows.append((floor.engine, number(beside), number(floor.us_per_sample), number(ratio)))
         said.append(f"{floor.counted}.")
     notes = (
-        "A floor is what the simulator's compiled code alone needs for a sample at its finest effort: a bound from below for any "
-        "loop around it, in any language; the adapter's time beside it has its loop in Python. The last column: the floor by what "
-        f"the native loops alone take{'' if alone is None else f', {number(alone)} µs'}, all bodies and tests included.",
+        (
+            "A floor is what the simulator's compiled code alone needs for a sample at its finest"
+            " effort: a bound from below for any loop around it, in any language; the adapter's"
+            " time beside it has its loop in Python. The last column: the floor by what the native"
+            f" loops alone take{'' if alone is None else f', {number(alone)} µs'}, all bodies and"
+            " tests included."
+        ),
     )
-    return Section(f"{case}: floors", said, notes, ("engine", "adapter [µs]", "floor [µs]", "floor / native loops"), 1, rows)
+    return Section(
+        f"{case}: floors",
+        said,
+        notes,
+        ("engine", "adapter [µs]", "floor [µs]", "floor / native loops"),
+        1,
+        rows,
+    )
 
 
 def _level(found: Bench, case: str, setting: str) -> float | None:
-    times = [e.us_per_sample.median for e in found.levels if (e.case, e.setting) == (case, setting) and e.us_per_sample]
+    times = [
+        e.us_per_sample.median
+        for e in found.levels
+        if (e.case, e.setting) == (case, setting) and e.us_per_sample
+    ]
     return times[0] if times else None
 
 
@@ -148,7 +212,9 @@ def _levels(found: Bench, case: str) -> Section:
         us = entry.us_per_sample
         part = None if us is None or whole is None else us.median / whole
         errors = (number(getattr(entry.errors, name)) for name in QUANTITIES)
-        rows.append((entry.setting, entry.loop, str(entry.outcome), *errors, *cells(us), number(part)))
+        rows.append(
+            (entry.setting, entry.loop, str(entry.outcome), *errors, *cells(us), number(part))
+        )
     headings = (
         "asked for",
         "loop",
@@ -158,29 +224,54 @@ def _levels(found: Bench, case: str) -> Section:
         "quartiles",
         "part",
     )
-    notes = ("Whole calls, Python included, but for the loops alone; of the same rounds as the engines. Part: of the first line.",)
+    notes = (
+        (
+            "Whole calls, Python included, but for the loops alone; of the same rounds as the"
+            " engines. Part: of the first line."
+        ),
+    )
     others = [
         (e.us_per_sample, e)
         for e in found.needed
-        if (e.case, e.mode, e.required) == (case, "projection", REQUIRED[-1]) and e.engine != NATIVE and e.us_per_sample is not None
+        if (e.case, e.mode, e.required) == (case, "projection", REQUIRED[-1])
+        and e.engine != NATIVE
+        and e.us_per_sample is not None
     ]
     said: list[str] = []
     if others and whole is not None:
         us, best = min(others, key=lambda each: each[0])
         said.append(
-            f"With every body asked for it is {us / whole:.0f} times as fast as the fastest other engine that reaches "
-            f"{best.required:g} m, which gives the compared points only: {best.engine}, {best.setting}."
+            f"With every body asked for it is {us / whole:.0f} times as fast as the fastest other"
+            f" engine that reaches {best.required:g} m, which gives the compared points only:"
+            f" {best.engine}, {best.setting}."
         )
     return Section(f"{case}: the native engine in detail", said, notes, headings, 3, rows)
 
 
 def _rates(found: Bench) -> Section:
     rows = [
-        (e.case, e.what, number(e.us_per_sample), number(e.flops_per_sample), number(e.gflops), f"{100 * e.of_peak:.1f} %")
+        (
+            e.case,
+            e.what,
+            number(e.us_per_sample),
+            number(e.flops_per_sample),
+            number(e.gflops),
+            f"{100 * e.of_peak:.1f} %",
+        )
         for e in found.rates
     ]
     notes = (
-        "Operations of the programs for samples that were accepted, roots, comparisons and signs included; a fused multiplication "
-        "and addition are two. The peak is measured in the same rounds.",
+        (
+            "Operations of the programs for samples that were accepted, roots, comparisons and"
+            " signs included; a fused multiplication and addition are two. The peak is measured in"
+            " the same rounds."
+        ),
     )
-    return Section("Arithmetic", [], notes, ("case", "", "µs a sample", "flops a sample", "Gflop/s", "of peak"), 2, rows)
+    return Section(
+        "Arithmetic",
+        [],
+        notes,
+        ("case", "", "µs a sample", "flops a sample", "Gflop/s", "of peak"),
+        2,
+        rows,
+    )

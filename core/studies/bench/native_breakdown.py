@@ -1,4 +1,6 @@
-"""The native engine in detail: by what is asked of it, by executor, and with and without the Python around its loops."""
+"""The native engine in detail: by what is asked of it, by executor, and with and without the Python
+around its loops.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,11 @@ class Level:
     @property
     def settings(self) -> Mapping[str, Any]:
         """What is asked for, and the executor."""
-        return {"order": self.order, "every_body": self.bodies, "executor": "llvm" if self.loop == "compiled" else "numpy"}
+        return {
+            "order": self.order,
+            "every_body": self.bodies,
+            "executor": "llvm" if self.loop == "compiled" else "numpy",
+        }
 
     def version(self) -> str | None:
         """Version of kincheck."""
@@ -61,7 +67,9 @@ class Level:
     def request(self, case: Case) -> Request:
         """What is asked."""
         bodies = tuple(body.name for body in case.mechanism.moving) if self.bodies else ()
-        return Request(tuple(case.sweep.path.motions), case.points, bodies, self.order, compiled=self.compiled)
+        return Request(
+            tuple(case.sweep.path.motions), case.points, bodies, self.order, compiled=self.compiled
+        )
 
     def build(self, case: Case) -> Route:
         """The programs for what is asked, and the samples laid out."""
@@ -89,7 +97,8 @@ SAMPLES, MOTIONS = ("extrapolate", *acceptance.JOINED), ("extend", *acceptance.A
 
 
 def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
-    """The executor's loops over all samples, everything asked for: no Python but two calls, no result made of the numbers.
+    """The executor's loops over all samples, everything asked for: no Python but two calls, no
+    result made of the numbers.
 
     It is to the native engine what a floor is to a simulator, tests and copying included.
 
@@ -103,19 +112,25 @@ def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
         kept = track.begin()
         for went, side in zip(track.run(), route.sides, strict=True):
             if went < side.count:
-                raise SolveError(f"case {case.name!r}: the loops alone end after {went} of {side.count} samples on one side")
+                raise SolveError(
+                    f"case {case.name!r}: the loops alone end after {went} of {side.count} samples"
+                    " on one side"
+                )
         return kept
 
     return work
 
 
 def flops_of(model: Model, iterations: float, lanes: Sequence[str] = SAMPLES) -> float:
-    """Floating-point operations of a sample: predictor, Newton's iterations, rates, outputs and the test of a solution.
+    """Floating-point operations of a sample: predictor, Newton's iterations, rates, outputs and the
+    test of a solution.
 
-    Those of lanes that were computed and not accepted, or iterated on because a neighbour did, do not count.
+    Those of lanes that were computed and not accepted, or iterated on because a neighbour did, do
+    not count.
 
     Args:
-        lanes: what predicts and tests lanes that are `SAMPLES` of a motion, or `MOTIONS`; of the first few other programs do.
+        lanes: what predicts and tests lanes that are `SAMPLES` of a motion, or `MOTIONS`; of the
+            first few other programs do.
     """
     sizes = {name: each["flops"] for name, each in model.sizes.items()}
     return iterations * sizes["newton"] + sum(sizes[name] for name in ("outputs", *lanes))

@@ -1,6 +1,8 @@
-"""The most arithmetic one core can do: independent multiplications and additions of vectors, fused where the processor can.
+"""The most arithmetic one core can do: independent multiplications and additions of vectors, fused
+where the processor can.
 
-The code is made as that of the programs is, for the same width, by the same compiler; it loads and stores nothing in its loop.
+The code is made as that of the programs is, for the same width, by the same compiler; it loads and
+stores nothing in its loop.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from ...program.llvm import code_cache, compiler
 from ...trajectory import Array
 from .rounds import Spread
 
-# As many as hide the latency of two units (2 x 4 cycles), and no more than fit into 16 registers beside two factors.
+# As many as hide the latency of two units (2 x 4 cycles), and no more than fit into 16 registers
+# beside two factors.
 CHAINS = 12
 STEPS = 20_000
 """Of a call: about a hundred microseconds."""

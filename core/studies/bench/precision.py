@@ -1,4 +1,6 @@
-"""Work and precision: what each engine reaches on a case at each of its efforts, judged as a run judges, and by how much work."""
+"""Work and precision: what each engine reaches on a case at each of its efforts, judged as a run
+judges, and by how much work.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ REQUIRED = (1e-3, 1e-6, 1e-9, 1e-12)
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True):
-    """Largest errors over all samples and all outputs that are lengths [m, m/s, m/s^2]; null where nothing was compared."""
+    """Largest errors over all samples and all outputs that are lengths [m, m/s, m/s^2]; null where
+    nothing was compared.
+    """
 
     position: float | None = None
     velocity: float | None = None
@@ -38,7 +42,8 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         setting: the effort, in words; settings: all that the engine says of itself.
-        outcome, message: as in a run, by the tolerances of the case: a coarse effort is expected to fail them.
+        outcome, message: as in a run, by the tolerances of the case: a coarse effort is expected to
+            fail them.
         against: what the errors are of.
         residual: the engine's own largest constraint residual [m or -].
         iterations: by sample: Newton's; in simulate mode, steps.
@@ -93,7 +98,9 @@ class FloorOf(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Contestant:
-    """An entry, and its work: one warm solve of all samples. None where there is nothing to be timed."""
+    """An entry, and its work: one warm solve of all samples. None where there is nothing to be
+    timed.
+    """
 
     entry: Entry
     work: Callable[[], Trajectory] | None
@@ -102,7 +109,9 @@ class Contestant:
         """The entry with the time of its work."""
         if seconds is None:
             return self.entry
-        return msgspec.structs.replace(self.entry, us_per_sample=seconds.times(1e6 / self.entry.samples))
+        return msgspec.structs.replace(
+            self.entry, us_per_sample=seconds.times(1e6 / self.entry.samples)
+        )
 
 
 def with_truth(case: Case, tol: float) -> Case:
@@ -133,7 +142,9 @@ def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[C
     for setting, engine in engines.items():
         (record,) = run([case], [engine], tol=tol, residuals=False).records
         entry = _entry(case, record, setting)
-        found.append(Contestant(entry, _work(case, engine, tol) if record.us_per_step is not None else None))
+        found.append(
+            Contestant(entry, _work(case, engine, tol) if record.us_per_step is not None else None)
+        )
         if record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
             break
     return found
@@ -167,7 +178,9 @@ def _entry(case: Case, record: Record, setting: str) -> Entry:
         solved=record.solved,
         samples=len(case.sweep.values),
         residual=record.residual_max,
-        iterations=record.iterations / record.solved if record.iterations is not None and record.solved else None,
+        iterations=record.iterations / record.solved
+        if record.iterations is not None and record.solved
+        else None,
     )
 
 
@@ -183,9 +196,19 @@ def needed(entries: Sequence[Entry]) -> list[Needed]:
 
 def _fastest(mine: Sequence[Entry], required: float) -> Needed:
     timed = [(e.us_per_sample.median, e) for e in mine if e.us_per_sample is not None]
-    meeting = [(us, e) for us, e in timed if e.errors.position is not None and e.errors.position <= required]
+    meeting = [
+        (us, e)
+        for us, e in timed
+        if e.errors.position is not None and e.errors.position <= required
+    ]
     first = mine[0]
-    of: dict[str, Any] = {"case": first.case, "engine": first.engine, "mode": first.mode, "loop": first.loop, "required": required}
+    of: dict[str, Any] = {
+        "case": first.case,
+        "engine": first.engine,
+        "mode": first.mode,
+        "loop": first.loop,
+        "required": required,
+    }
     if meeting:
         us, best = min(meeting, key=lambda each: each[0])
         return Needed(**of, setting=best.setting, us_per_sample=us)
@@ -203,7 +226,11 @@ def floors(case: Case, engines: Iterable[Engine]) -> list[FloorOf]:
     """The floors of those engines that have one on the case."""
     found: list[FloorOf] = []
     for engine in engines:
-        if not isinstance(engine, Measurable) or engine.version() is None or engine.unsupported(case):
+        if (
+            not isinstance(engine, Measurable)
+            or engine.version() is None
+            or engine.unsupported(case)
+        ):
             continue
         if (floor := engine.floor(case)) is None:
             continue

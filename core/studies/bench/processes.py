@@ -1,4 +1,6 @@
-"""What the first use costs, and memory: each figure is that of a fresh process, the kinds of processes taking turns."""
+"""What the first use costs, and memory: each figure is that of a fresh process, the kinds of
+processes taking turns.
+"""
 
 from __future__ import annotations
 
@@ -88,8 +90,11 @@ class _Kind:
     status: int = 0
 
 
-def measure_processes(case: Case, name: str, engines: Sequence[Engine], tol: float, rounds: int) -> list[Process]:
-    """Start processes: importing numpy, the first use of the native engine, and `kincheck run` with each engine.
+def measure_processes(
+    case: Case, name: str, engines: Sequence[Engine], tol: float, rounds: int
+) -> list[Process]:
+    """Start processes: importing numpy, the first use of the native engine, and `kincheck run` with
+    each engine.
 
     Args:
         name: of the case, as on the command line.
@@ -107,8 +112,16 @@ def measure_processes(case: Case, name: str, engines: Sequence[Engine], tol: flo
             mode = "" if engine.mode == "projection" else f" --mode {engine.mode}"
             asked = f"--engine {engine.name}{mode}"
             arguments = ["run", name, *asked.split(), "--jobs", "0"]
-            kinds.append(_Kind(f"kincheck run {asked}", _RUN, arguments, rounds=rounds if engine.name == "native" else 1))
-        _once(_Kind(CACHED, _FIRST_USE, given=given, folder=kept), kept)  # fills the cache, and the system's of files
+            kinds.append(
+                _Kind(
+                    f"kincheck run {asked}",
+                    _RUN,
+                    arguments,
+                    rounds=rounds if engine.name == "native" else 1,
+                )
+            )
+        # fills the cache, and the system's of files
+        _once(_Kind(CACHED, _FIRST_USE, given=given, folder=kept), kept)
         for turn in range(rounds):
             for kind in kinds:
                 if turn < kind.rounds:
@@ -122,13 +135,20 @@ def _once(kind: _Kind, cache: Path) -> None:
         environment["XDG_CACHE_HOME"] = str(cache)
     begin = perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", kind.code, *kind.arguments], input=kind.given, capture_output=True, env=environment, check=False
+        [sys.executable, "-c", kind.code, *kind.arguments],
+        input=kind.given,
+        capture_output=True,
+        env=environment,
+        check=False,
     )
     kind.seconds.append(perf_counter() - begin)
     kind.status = done.returncode
     lines = done.stdout.decode("utf-8", "replace").splitlines()
     if done.returncode not in (0, 1) or not lines:
-        raise RuntimeError(f"{kind.what}: exit status {done.returncode}\n{done.stderr.decode('utf-8', 'replace')[-2000:]}")
+        raise RuntimeError(
+            f"{kind.what}: exit status"
+            f" {done.returncode}\n{done.stderr.decode('utf-8', 'replace')[-2000:]}"
+        )
     kind.peaks.append(float(lines[-1]) / 1024.0 if lines[-1] else None)
     if kind.given:
         kind.stages.append(json.loads(lines[-2]))
@@ -140,6 +160,10 @@ def _process(kind: _Kind) -> Process:
         what=kind.what,
         seconds=spread(kind.seconds),
         status=kind.status,
-        stages={name: spread([each[name] for each in kind.stages]) for name in STAGES} if kind.stages else {},
+        stages=(
+            {name: spread([each[name] for each in kind.stages]) for name in STAGES}
+            if kind.stages
+            else {}
+        ),
         peak_mb=max(peaks, default=None),
     )

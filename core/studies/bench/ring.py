@@ -11,12 +11,16 @@ from ...mechanism.mechanism import Body, Mechanism, Point, Vector
 LEAN = 0.3
 """Of the cranks at design [rad]; a quarter turn from upright the ring is singular."""
 BEFORE, AFTER = 1.0, 0.25
-"""Heights of a plate's pins above its ball [m]; were they alike, errors would grow by the square of the ring's length."""
+"""Heights of a plate's pins above its ball [m]; were they alike, errors would grow by the square of
+the ring's length.
+"""
 UP: Vector = (0.0, 0.0, 1.0)
 
 
 def pivot(k: int, cranks: int) -> float:
-    """Where the pivot of a crank is along x [m]: out in steps of two, and back between them, so that the last is near the first."""
+    """Where the pivot of a crank is along x [m]: out in steps of two, and back between them, so
+    that the last is near the first.
+    """
     return 2.0 * k if 2 * k < cranks else 2.0 * (cranks - k) - 1.0
 
 
@@ -26,15 +30,21 @@ def tip(k: int, cranks: int, turn: float = 0.0) -> Vector:
 
 
 def ring(cranks: int) -> Mechanism:
-    """N parallel unit cranks in a ring, three or more, all but the first tied to both neighbours by a plate; the first is driven.
+    """N parallel unit cranks in a ring, three or more, all but the first tied to both neighbours by
+    a plate; the first is driven.
 
-    A plate holds a ball of its crank, and by two pins in grooves along the tips of the cranks before and after it. Ball and pins
-    leave one equation between three angles, BEFORE d_k+1 = -AFTER d_k between their differences at design, so that none of the
-    2 N - 2 loops can be solved before the others. There are 12 N - 6 unknowns and as many rows. As the chain of IFToMM's benchmark
-    A02, made of parallelograms, it moves in a known way: every crank turns as the first, every plate goes round without turning.
+    A plate holds a ball of its crank, and by two pins in grooves along the tips of the cranks
+    before and after it. Ball and pins leave one equation between three angles, BEFORE d_k+1 =
+    -AFTER d_k between their differences at design, so that none of the 2 N - 2 loops can be solved
+    before the others. There are 12 N - 6 unknowns and as many rows. As the chain of IFToMM's
+    benchmark A02, made of parallelograms, it moves in a known way: every crank turns as the first,
+    every plate goes round without turning.
     """
     tips = [tip(k, cranks) for k in range(cranks)]
-    joints: list[Joint] = [Revolute(f"pivot{k}", "ground", f"crank{k}", (pivot(k, cranks), 0.0, 0.0), UP) for k in range(cranks)]
+    joints: list[Joint] = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (pivot(k, cranks), 0.0, 0.0), UP)
+        for k in range(cranks)
+    ]
     for k in range(1, cranks):
         joints.append(Spherical(f"ball{k}", f"crank{k}", f"plate{k}", tips[k]))
         for which, to, height in (("before", k - 1, BEFORE), ("after", (k + 1) % cranks, AFTER)):
@@ -42,7 +52,10 @@ def ring(cranks: int) -> Mechanism:
             joints.append(Inline(f"{which}{k}", f"crank{to}", f"plate{k}", (x, y, height), UP))
     return Mechanism(
         f"ring of {cranks} cranks",
-        [*(Body(f"crank{k}") for k in range(cranks)), *(Body(f"plate{k}") for k in range(1, cranks))],
+        [
+            *(Body(f"crank{k}") for k in range(cranks)),
+            *(Body(f"plate{k}") for k in range(1, cranks)),
+        ],
         joints,
         [Point(f"tip{k}", f"crank{k}", tips[k]) for k in range(cranks)],
         [JointAngle("turn", "pivot0")],

@@ -1,4 +1,6 @@
-"""Times that can be compared: contestants take turns in one process, so that what else the machine does meets all of them."""
+"""Times that can be compared: contestants take turns in one process, so that what else the machine
+does meets all of them.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,11 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
-# A turn is long against the clock's resolution and short against what interrupts a process: quick work is done several times.
+# A turn is long against the clock's resolution and short against what interrupts a process: quick
+# work is done several times.
 TURN = 2e-3
-# Of the first calls one is as quick as all that follow, if programs are compiled at once. What is slow is called less [s].
+# Of the first calls one is as quick as all that follow, if programs are compiled at once. What is
+# slow is called less [s].
 FIRST, PATIENCE = 16, 0.5
 
 Key = TypeVar("Key")
@@ -30,8 +34,12 @@ class Spread(msgspec.Struct, frozen=True, kw_only=True):
     rounds: int
 
     def times(self, factor: float) -> Spread:
-        """Return the same spread in another unit, or of another amount: all times multiplied by the factor."""
-        least, median, lower, upper = (factor * each for each in (self.least, self.median, self.lower, self.upper))
+        """Return the same spread in another unit, or of another amount: all times multiplied by the
+        factor.
+        """
+        least, median, lower, upper = (
+            factor * each for each in (self.least, self.median, self.lower, self.upper)
+        )
         return Spread(least=least, median=median, lower=lower, upper=upper, rounds=self.rounds)
 
 
@@ -44,8 +52,9 @@ def spread(values: Sequence[float]) -> Spread:
 def take_turns(contestants: Mapping[Key, Work], rounds: int) -> dict[Key, Spread]:
     """Seconds of one call of each contestant, over rounds in which every one has its turn.
 
-    Each is called before all rounds. Quick work is called once more before each of its turns, untimed: what the contestant
-    before it drove out of the caches is back then, for all alike. Python's garbage is collected between rounds only.
+    Each is called before all rounds. Quick work is called once more before each of its turns,
+    untimed: what the contestant before it drove out of the caches is back then, for all alike.
+    Python's garbage is collected between rounds only.
     """
     calls = {key: _calls(work) for key, work in contestants.items()}
     times: dict[Key, list[float]] = {key: [] for key in contestants}
@@ -68,7 +77,9 @@ def _calls(work: Work) -> int:
 
 
 def warmed(work: Work, clock: Callable[[], float] | None = None) -> float:
-    """Seconds of a call by a clock, the least of some: in the first, programs may be compiled, once for all."""
+    """Seconds of a call by a clock, the least of some: in the first, programs may be compiled, once
+    for all.
+    """
     least, begin, clock = math.inf, perf_counter(), clock or perf_counter
     for _ in range(FIRST):
         before = clock()

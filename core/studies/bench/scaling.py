@@ -1,4 +1,6 @@
-"""Cost against the size of large mechanisms: a chain of loops, and a ring where no loop can be solved before the others."""
+"""Cost against the size of large mechanisms: a chain of loops, and a ring where no loop can be
+solved before the others.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ TURN, SAMPLES = 0.8, 64
 
 
 class Scaling(msgspec.Struct, frozen=True, kw_only=True):
-    """A mechanism of one size, solved in one way: position, velocity and acceleration of one point far from the driver.
+    """A mechanism of one size, solved in one way: position, velocity and acceleration of one point
+    far from the driver.
 
     Attributes:
         size: number of loops of the chain, of cranks of the ring.
@@ -52,7 +55,10 @@ def measure(chains: Sequence[int], rings: Sequence[int], rounds: int) -> list[Sc
         mechanism = chain(n).mechanism if name == "chain" else ring(n)
         found[name, n] = mechanism, _work(mechanism, _far(name, n))
     seconds = take_turns({key: work for key, (_, work) in found.items()}, rounds)
-    return [_row(name, n, mechanism, work(), seconds[name, n]) for (name, n), (mechanism, work) in found.items()]
+    return [
+        _row(name, n, mechanism, work(), seconds[name, n])
+        for (name, n), (mechanism, work) in found.items()
+    ]
 
 
 def _far(name: str, n: int) -> str:
@@ -71,7 +77,9 @@ def _row(name: str, n: int, mechanism: Mechanism, found: Trajectory, seconds: Sp
         raise SolveError(f"bench: {name} of {n}: {found.message}")
     turns = np.linspace(-TURN, TURN, SAMPLES)
     if name == "chain":
-        expected = np.array([(n + math.sin(LEAN - turn), math.cos(LEAN - turn), 0.0) for turn in turns])
+        expected = np.array(
+            [(n + math.sin(LEAN - turn), math.cos(LEAN - turn), 0.0) for turn in turns]
+        )
     else:
         expected = np.array([tip(n // 2, n, turn) for turn in turns])
     return Scaling(

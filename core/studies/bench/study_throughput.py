@@ -1,4 +1,6 @@
-"""Cost of a tolerance study by threads: variants drawn, solved and reduced, as `kincheck sweep` does it."""
+"""Cost of a tolerance study by threads: variants drawn, solved and reduced, as `kincheck sweep`
+does it.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ from .batch import SCATTER, SEED
 from .peak import Peak
 from .rounds import Spread, spread
 
-# Chunks as large as those of a million variants, and as many for each thread to end beside the other.
+# Chunks as large as those of a million variants, and as many for each thread to end beside the
+# other.
 VARIANTS = 262_144
 # Of some seconds each: their median is known well.
 MOST_ROUNDS = 8
@@ -33,7 +36,8 @@ class StudyRate(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         us_per_sample: of the whole machine, by sample and variant.
         times: as fast as on one thread, by round; that of one thread is one.
-        peak_times: the same of the peak kernel, which needs no memory: what the machine gives; null where that is not known.
+        peak_times: the same of the peak kernel, which needs no memory: what the machine gives; null
+            where that is not known.
         unsolved: variants without a solution somewhere.
     """
 
@@ -47,14 +51,22 @@ class StudyRate(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def measure_studies(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[StudyRate]:
-    """Sweep over designs on one thread and on two, in turns; on one only where there is no second processor."""
+    """Sweep over designs on one thread and on two, in turns; on one only where there is no second
+    processor.
+    """
     variation, jobs = _every_hardpoint(case), range(1, 1 + min(2, os.cpu_count() or 1))
     seconds: dict[int, list[float]] = {each: [] for each in jobs}
     kernel: dict[int, list[float]] = {each: [] for each in jobs}
-    found = {each: sweep_designs(case, variation, samples=VARIANTS // 8, seed=SEED, tol=tol, jobs=each) for each in jobs}  # warm
+    # warm
+    found = {
+        each: sweep_designs(case, variation, samples=VARIANTS // 8, seed=SEED, tol=tol, jobs=each)
+        for each in jobs
+    }
     for _ in range(min(rounds, MOST_ROUNDS)):
         for each in jobs:
-            found[each] = sweep_designs(case, variation, samples=VARIANTS, seed=SEED, tol=tol, jobs=each)
+            found[each] = sweep_designs(
+                case, variation, samples=VARIANTS, seed=SEED, tol=tol, jobs=each
+            )
             seconds[each].append(found[each].measured["seconds"])
             if peak is not None:
                 kernel[each].append(_side_by_side(peak, each) / each)

@@ -1,4 +1,6 @@
-"""Diagnosis: what can be said of a case before and beside its results; why it cannot be solved, or how well."""
+"""Diagnosis: what can be said of a case before and beside its results; why it cannot be solved, or
+how well.
+"""
 
 from .diagnose import Diagnosis, diagnose
 

@@ -1,4 +1,6 @@
-"""The diagnosis of a case: freedom and rank by name, conditioning along the sweep, what its outputs depend on."""
+"""The diagnosis of a case: freedom and rank by name, conditioning along the sweep, what its outputs
+depend on.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,14 @@ from ...case.notes import notes
 from ...errors import SolveError, shortened
 from ...kinematics.diagnosis.conditioning import Conditioning, conditioning
 from ...kinematics.diagnosis.instantaneous_screws import Screw, described
-from ...kinematics.diagnosis.rank import Blocked, ComponentCount, Dependency, NamedRow, Ranks, Violation
+from ...kinematics.diagnosis.rank import (
+    Blocked,
+    ComponentCount,
+    Dependency,
+    NamedRow,
+    Ranks,
+    Violation,
+)
 from ...kinematics.formulation.parameters import places
 from ..explain import explain
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
@@ -30,14 +39,18 @@ class Freedom(msgspec.Struct, frozen=True):
 
 
 class Nearly(msgspec.Struct, frozen=True):
-    """Rows of which a combination nearly vanishes: its size, which is a singular value of the joint rows."""
+    """Rows of which a combination nearly vanishes: its size, which is a singular value of the joint
+    rows.
+    """
 
     size: float
     rows: list[NamedRow]
 
 
 class Sample(msgspec.Struct, frozen=True):
-    """How well a pose of the sweep is determined; see `PoseConditioning`. condition is null where it is singular."""
+    """How well a pose of the sweep is determined; see `PoseConditioning`. condition is null where
+    it is singular.
+    """
 
     value: float
     smallest: float
@@ -54,7 +67,8 @@ class Diagnosis(msgspec.Struct, frozen=True):
         notes: what is to be known of the joints' geometry.
         binding: numbers of the geometry that cannot be changed alone without contradiction.
         signs: the convention of the outputs that have one, in words; empty without.
-        not_derived: outputs that are not functions of the pose alone, and have no budget and sensitivities.
+        not_derived: outputs that are not functions of the pose alone, and have no budget and
+            sensitivities.
         programs: what the native engine computes, and leaves out, in lines to read.
     """
 
@@ -98,7 +112,9 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     """
     mechanism = case.mechanism
     if not mechanism.moving:
-        raise SolveError(f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed")
+        raise SolveError(
+            f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed"
+        )
     ranks = Ranks(mechanism)
     account = ranks.account
     findings = _findings(ranks)
@@ -107,8 +123,18 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     if not findings:
         try:
             programs = explain(case)
-            varied = [place for place in places(mechanism) if not place.startswith(f"points.{MARKER}")]
-            swept = conditioning(mechanism, case.sweep.path, case.sweep.values, read_points(case), varied, samples, tol)
+            varied = [
+                place for place in places(mechanism) if not place.startswith(f"points.{MARKER}")
+            ]
+            swept = conditioning(
+                mechanism,
+                case.sweep.path,
+                case.sweep.values,
+                read_points(case),
+                varied,
+                samples,
+                tol,
+            )
             findings += [swept.trajectory.message] * bool(swept.trajectory.message)
         except SolveError as error:
             findings.append(str(error))
@@ -149,7 +175,15 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
 
 def _samples(swept: Conditioning) -> list[Sample]:
     return [
-        Sample(p.value, p.smallest, p.largest, p.condition if p.smallest else None, p.orientation, p.direction) for p in swept.poses
+        Sample(
+            p.value,
+            p.smallest,
+            p.largest,
+            p.condition if p.smallest else None,
+            p.orientation,
+            p.direction,
+        )
+        for p in swept.poses
     ]
 
 
@@ -159,24 +193,27 @@ def _findings(ranks: Ranks) -> list[str]:
     count, drivers = ranks.account.dof, len(ranks.mechanism.drivers)
     if ranks.contradictions:
         found.append(
-            f"it does not close at the design: in the nearest pose these rows are off: {_violations(ranks.contradictions)}; "
-            "check the points, axes and lengths of these joints"
+            "it does not close at the design: in the nearest pose these rows are off:"
+            f" {_violations(ranks.contradictions)}; check the points, axes and lengths of these"
+            " joints"
         )
     for each in ranks.blocked:
         found.append(
-            f"driver {each.driver!r} cannot move what it drives: for each unit of it other rows would have to give way, at "
-            f"the least {_violations(each.rows)}; {_remedy(ranks)}"
+            f"driver {each.driver!r} cannot move what it drives: for each unit of it other rows"
+            f" would have to give way, at the least {_violations(each.rows)}; {_remedy(ranks)}"
         )
     if ranks.free and count > drivers:
         motions = "; ".join(described(motion) for motion in ranks.free)
         found.append(
-            f"{len(ranks.free)} motion{'s are' if len(ranks.free) > 1 else ' is'} left free with the drivers held: {motions}; add "
-            "a driver for each, or join what spins freely (a rod between two balls: use distance)"
+            f"{len(ranks.free)} motion{'s are' if len(ranks.free) > 1 else ' is'} left free with"
+            f" the drivers held: {motions}; add a driver for each, or join what spins freely (a rod"
+            " between two balls: use distance)"
         )
     elif ranks.free:
         found.append(
-            f"at the design the drivers do not determine the motion (lock-up or dead centre), it can still move: "
-            f"{'; '.join(described(motion) for motion in ranks.free)}; drive another coordinate or shift the design"
+            "at the design the drivers do not determine the motion (lock-up or dead centre), it"
+            f" can still move: {'; '.join(described(motion) for motion in ranks.free)}; drive"
+            " another coordinate or shift the design"
         )
     return found
 
@@ -185,9 +222,18 @@ def _remedy(ranks: Ranks) -> str:
     if ranks.nearly:
         size, rows = ranks.nearly[0]
         owners = ", ".join(dict.fromkeys(row.owner for row in rows))
-        return f"a combination of rows of {owners} nearly vanishes ({size:.1e}): make their geometry exactly parallel or aligned"
+        return (
+            f"a combination of rows of {owners} nearly vanishes ({size:.1e}): make their geometry"
+            " exactly parallel or aligned"
+        )
     return "remove a driver or free the mechanism"
 
 
 def _violations(rows: tuple[Violation, ...] | list[Violation], most: int = 4) -> str:
-    return shortened([f"{each.row} by {abs(each.amount):.2g} {'m' if 'along' in each.row.holds else 'rad'}" for each in rows], most)
+    return shortened(
+        [
+            f"{each.row} by {abs(each.amount):.2g} {'m' if 'along' in each.row.holds else 'rad'}"
+            for each in rows
+        ],
+        most,
+    )

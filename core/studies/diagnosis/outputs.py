@@ -1,4 +1,6 @@
-"""What outputs depend on: residuals that solvers leave, hence the tolerance that makes sense, and hardpoints."""
+"""What outputs depend on: residuals that solvers leave, hence the tolerance that makes sense, and
+hardpoints.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ from ...kinematics.diagnosis.conditioning import Conditioning, Gradient, PoseCon
 from ...kinematics.formulation.parameters import kinds
 from ...trajectory import Array
 
-# The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for accelerations, whose rows carry rates.
+# The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for
+# accelerations, whose rows carry rates.
 MARGIN = 100.0
 # Derivatives are of size one; below this they are round-off, a hundred times of a condition of 1e5.
 NOTHING = 1e-9
@@ -70,7 +73,9 @@ class Sensitivity(msgspec.Struct, frozen=True):
 
 def budgets(case: Case, found: Conditioning, tol: float, design: dict[str, Array]) -> list[Budget]:
     """The budget of every output that is a function of the pose alone."""
-    return [_budget(output, found, tol, design) for output in case.outputs if output.orders == ORDERS]
+    return [
+        _budget(output, found, tol, design) for output in case.outputs if output.orders == ORDERS
+    ]
 
 
 def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str, Array]) -> Budget:
@@ -78,28 +83,47 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
     shifts = [float(rows.sum()) for rows in by_rows]
     k = int(np.argmax(shifts))
     row = int(by_rows[k].argmax())
-    size = max(float(np.abs(_derivative(output, pose, design, "by_residuals")[0]).max()) for pose in found.poses)
+    size = max(
+        float(np.abs(_derivative(output, pose, design, "by_residuals")[0]).max())
+        for pose in found.poses
+    )
     shift = tol * shifts[k]
     suggested = _two_digits(MARGIN * shift)
     why = (
-        f"100 times what residuals of {tol:g} in every row shift it by, at most {shift:.3g} {output.unit}: 10 for rows scaled "
-        "otherwise, 10 for accelerations"
+        f"100 times what residuals of {tol:g} in every row shift it by, at most {shift:.3g}"
+        f" {output.unit}: 10 for rows scaled otherwise, 10 for accelerations"
     )
     share = float(by_rows[k][row]) / shifts[k] if shifts[k] else 0.0
     name = "{}: {}".format(*found.poses[k].owners[row])
     floor = ROUND_OFF * (shifts[k] + size)
-    return Budget(output.name, output.unit, shift, floor, found.poses[k].value, name, share, suggested, why, output.atol)
+    return Budget(
+        output.name,
+        output.unit,
+        shift,
+        floor,
+        found.poses[k].value,
+        name,
+        share,
+        suggested,
+        why,
+        output.atol,
+    )
 
 
 def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> list[Sensitivity]:
     """The derivatives that are not zero throughout, the largest of each output first."""
     scales = np.array([scale for _, _, scale in found.numbers])
-    names, turning = _names(found), [place for place, kind in kinds(case.mechanism).items() if kind is Kind.DIRECTION]
+    names, turning = (
+        _names(found),
+        [place for place, kind in kinds(case.mechanism).items() if kind is Kind.DIRECTION],
+    )
     result: list[Sensitivity] = []
     for output in case.outputs:
         if output.orders != ORDERS:
             continue
-        table = np.array([_derivative(output, pose, design, "by_geometry")[1] * scales for pose in found.poses])
+        table = np.array(
+            [_derivative(output, pose, design, "by_geometry")[1] * scales for pose in found.poses]
+        )
         own: list[Sensitivity] = []
         for k, (place, _, _) in enumerate(found.numbers):
             if np.abs(table[:, k]).max() > NOTHING:
@@ -110,20 +134,32 @@ def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> 
 
 
 def binding(found: Conditioning) -> list[str]:
-    """The numbers of the geometry that cannot be changed alone: redundant rows would then contradict the others."""
-    contradicted = np.max([np.abs(pose.contradicted).max(axis=0, initial=0.0) for pose in found.poses], axis=0)
+    """The numbers of the geometry that cannot be changed alone: redundant rows would then
+    contradict the others.
+    """
+    contradicted = np.max(
+        [np.abs(pose.contradicted).max(axis=0, initial=0.0) for pose in found.poses], axis=0
+    )
     return [name for name, rate in zip(_names(found), contradicted, strict=True) if rate > NOTHING]
 
 
 def _names(found: Conditioning) -> list[str]:
     """The numbers of the geometry by name; a length has no components."""
     count = Counter(place for place, _, _ in found.numbers)
-    return [place if count[place] == 1 else f"{place} {'xyz'[component]}" for place, component, _ in found.numbers]
+    return [
+        place if count[place] == 1 else f"{place} {'xyz'[component]}"
+        for place, component, _ in found.numbers
+    ]
 
 
-def _derivative(output: Quantity, pose: PoseConditioning, design: dict[str, Array], by: str) -> tuple[Array, Array]:
+def _derivative(
+    output: Quantity, pose: PoseConditioning, design: dict[str, Array], by: str
+) -> tuple[Array, Array]:
     """Value and derivatives of an output by what its points move by."""
-    at = {name: _jets(gradient.position, getattr(gradient, by)) for name, gradient in pose.points.items()}
+    at = {
+        name: _jets(gradient.position, getattr(gradient, by))
+        for name, gradient in pose.points.items()
+    }
     still = {name: _design(gradient, design[name], by) for name, gradient in pose.points.items()}
     jet = output.of(at, still)
     return jet.x, np.broadcast_to(jet.v, next(iter(at.values())).x.v.shape)
@@ -131,13 +167,20 @@ def _derivative(output: Quantity, pose: PoseConditioning, design: dict[str, Arra
 
 def _design(gradient: Gradient, position: Array, by: str) -> Vec3:
     """Where a point is at design: residuals do not shift it, hardpoints do."""
-    moved = gradient.design_by_geometry if by == "by_geometry" else np.zeros_like(gradient.by_residuals)
+    moved = (
+        gradient.design_by_geometry if by == "by_geometry" else np.zeros_like(gradient.by_residuals)
+    )
     return _jets(position, moved)
 
 
 def _jets(position: Array, derivatives: Array) -> Vec3:
     """A position as jets, what it is derived by in the place of time."""
-    return vec([Jet(np.full_like(d, x), d, np.zeros_like(d)) for x, d in zip(position, derivatives, strict=True)])
+    return vec(
+        [
+            Jet(np.full_like(d, x), d, np.zeros_like(d))
+            for x, d in zip(position, derivatives, strict=True)
+        ]
+    )
 
 
 def _two_digits(x: float) -> float:
@@ -150,4 +193,8 @@ def _two_digits(x: float) -> float:
 
 def read_points(case: Case) -> Sequence[str]:
     """The points that outputs which are functions of the pose read."""
-    return tuple(dict.fromkeys(point for output in case.outputs if output.orders == ORDERS for point in output.points))
+    return tuple(
+        dict.fromkeys(
+            point for output in case.outputs if output.orders == ORDERS for point in output.points
+        )
+    )

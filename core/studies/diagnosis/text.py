@@ -38,7 +38,10 @@ def _parts(found: Diagnosis) -> Iterator[Text | Table]:
     if found.sensitivities:
         yield from _sensitivities(found)
     if found.not_derived and found.samples:
-        yield Text(f"not functions of the pose alone, so without tolerance and sensitivities here: {listed(found.not_derived)}")
+        yield Text(
+            "not functions of the pose alone, so without tolerance and sensitivities here:"
+            f" {listed(found.not_derived)}"
+        )
     if found.programs:
         yield _head("what the native engine computes")
         yield from map(Text, found.programs)
@@ -51,8 +54,8 @@ def _head(line: str) -> Text:
 def _freedom(found: Diagnosis) -> Iterator[Text | Table]:
     freedom = found.freedom
     yield _head(
-        f"freedom: {freedom.coordinates} coordinates - rank {freedom.rank} of {freedom.rows} joint rows = {freedom.dof}; "
-        f"drivers: {listed(freedom.drivers)}"
+        f"freedom: {freedom.coordinates} coordinates - rank {freedom.rank} of {freedom.rows} joint"
+        f" rows = {freedom.dof}; drivers: {listed(freedom.drivers)}"
     )
     yield Text(f"by the paper's count {freedom.paper}")
     table = columns("component", ">unknowns", ">rows", ">rank", ">freedom", "drivers")
@@ -67,12 +70,17 @@ def _freedom(found: Diagnosis) -> Iterator[Text | Table]:
     if found.redundant_residual is not None and found.redundant:
         yield Text(f"  along the sweep they hold to {found.redundant_residual:.1e} m")
     for each in found.nearly_redundant:
-        yield Text(f"nearly redundant ({each.size:.1e}): {', '.join(map(str, each.rows))}", "yellow")
+        yield Text(
+            f"nearly redundant ({each.size:.1e}): {', '.join(map(str, each.rows))}", "yellow"
+        )
 
 
 def _sum(terms: Sequence[tuple[float, NamedRow]]) -> str:
     if len(terms) > TERMS:
-        return f"a sum of {len(terms)} rows of {listed(list(dict.fromkeys(row.owner for _, row in terms)))}"
+        return (
+            f"a sum of {len(terms)} rows of"
+            f" {listed(list(dict.fromkeys(row.owner for _, row in terms)))}"
+        )
     parts = [f"{'-' if w < 0.0 else '+'} {abs(w):.3g} [{row}]" for w, row in terms]
     return " ".join(parts).removeprefix("+ ") or "0"
 
@@ -88,7 +96,12 @@ def _conditioning(found: Diagnosis) -> Iterator[Text | Table]:
             sign = "+" if each.orientation > 0 else "-" if each.orientation < 0 else "0"
             moving = described(each.direction, 1)
             table.add_row(
-                f"{each.value:.6g}", f"{each.smallest:.4g}", condition, sign, moving, style="bold" if each is worst else None
+                f"{each.value:.6g}",
+                f"{each.smallest:.4g}",
+                condition,
+                sign,
+                moving,
+                style="bold" if each is worst else None,
             )
     yield table
     if worst is not None:
@@ -100,15 +113,35 @@ def _changes(samples: Sequence[Sample], swept: str) -> Iterator[Text]:
     for before, after in pairwise(samples):
         if before.orientation * after.orientation < 0.0:
             where = f"between {swept} = {before.value:.6g} and {after.value:.6g}"
-            yield Text(f"the determinant changes its sign {where}: there is a singular pose", "yellow")
+            yield Text(
+                f"the determinant changes its sign {where}: there is a singular pose", "yellow"
+            )
 
 
 def _budgets(found: Diagnosis) -> Iterator[Text | Table]:
-    yield _head("round-off budget: what residuals that engines leave shift outputs by, and the tolerance that follows")
+    yield _head(
+        "round-off budget: what residuals that engines leave shift outputs by, and the tolerance"
+        " that follows"
+    )
     yield from _signs(found)
-    table = columns("output", ">shift", ">at", ">double precision", ">suggested", ">case has", "unit", "largest share")
+    table = columns(
+        "output",
+        ">shift",
+        ">at",
+        ">double precision",
+        ">suggested",
+        ">case has",
+        "unit",
+        "largest share",
+    )
     for each in found.budgets:
-        numbers = f"{each.shift:.3g}", f"{each.at:.4g}", f"{each.round_off:.1e}", f"{each.suggested:.2g}", f"{each.atol:.3g}"
+        numbers = (
+            f"{each.shift:.3g}",
+            f"{each.at:.4g}",
+            f"{each.round_off:.1e}",
+            f"{each.suggested:.2g}",
+            f"{each.atol:.3g}",
+        )
         table.add_row(each.output, *numbers, each.unit, f"{each.row} ({each.share:.0%})")
     yield table
     yield Text(f'why = "{max(found.budgets, key=lambda each: each.shift).why}"')
@@ -120,7 +153,9 @@ def _signs(found: Diagnosis) -> Iterator[Text]:
 
 
 def _sensitivities(found: Diagnosis) -> Iterator[Text | Table]:
-    yield _head(f"sensitivity of the outputs to the geometry, drivers held: the {PLACES} largest of each")
+    yield _head(
+        f"sensitivity of the outputs to the geometry, drivers held: the {PLACES} largest of each"
+    )
     yield from _signs(found)
     table = columns("output", "number", ">largest", "unit", f">at {found.swept}")
     shown: dict[str, int] = {}
@@ -134,4 +169,8 @@ def _sensitivities(found: Diagnosis) -> Iterator[Text | Table]:
     yield table
     if found.binding:
         places = dict.fromkeys(number.removesuffix(" " + number[-1]) for number in found.binding)
-        yield Text(f"changed alone, numbers of these bind (redundant rows contradict the others): {listed(list(places))}", "yellow")
+        yield Text(
+            "changed alone, numbers of these bind (redundant rows contradict the others):"
+            f" {listed(list(places))}",
+            "yellow",
+        )

@@ -1,8 +1,9 @@
-"""Where Newton's iteration ends from anywhere: on the intended branch of a joint's zeros, on another that its branch tests name, or
-on another that they do not.
+"""Where Newton's iteration ends from anywhere: on the intended branch of a joint's zeros, on
+another that its branch tests name, or on another that they do not.
 
-A pose is on the intended branch if small steps over the manifold lead from it to the design, or to a pose to which small steps
-lead from there. No step crosses a pose where the rows are nearly dependent: there branches meet.
+A pose is on the intended branch if small steps over the manifold lead from it to the design, or to
+a pose to which small steps lead from there. No step crosses a pose where the rows are nearly
+dependent: there branches meet.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ SHIFT, TURN = slice(7, 10), slice(10, POSES)
 WALKS, STRIDES = 48, 24
 # Steps at a time, how many times at most, and the progress in all below which they lead nowhere.
 STRIDE, LEGS, PROGRESS = 6, 12, 0.2 * STEP
-# An aim may be out of reach by the straightest way and still on the branch: so many others are tried.
+# An aim may be out of reach by the straightest way and still on the branch: so many others are
+# tried.
 AIMS = 24
 ARRIVED = STEP
 
@@ -39,21 +41,42 @@ def branches(s: Specimen, starts: int) -> Iterator[Finding]:
     state[TURN] = q * np.sign(q[0]) / np.linalg.norm(q, axis=0)
     state[POSES:] = rng.normal(size=(t.size - POSES, starts))
     ended, taken = newton(t, state, t.rows, ITERATIONS, MOVING)
-    closed = (taken <= ITERATIONS) & (np.abs(t.phi(ended)).max(axis=0, initial=0.0) < 1e-11) & regular(t, ended, MOVING)
+    closed = (
+        (taken <= ITERATIONS)
+        & (np.abs(t.phi(ended)).max(axis=0, initial=0.0) < 1e-11)
+        & regular(t, ended, MOVING)
+    )
     caught, right = closed & (t.branch(ended) <= 0.0), np.zeros(starts, dtype=bool)
     asked = closed & ~caught
     right[asked] = connected(s, ended[:, asked])
     uncaught = asked & ~right
-    counts = {"right": right, "caught by a branch test": caught, "uncaught": uncaught, "not converged": ~closed}
-    text = f"Newton from {starts} poses anywhere: " + ", ".join(f"{mask.sum()} {name}" for name, mask in counts.items())
+    counts = {
+        "right": right,
+        "caught by a branch test": caught,
+        "uncaught": uncaught,
+        "not converged": ~closed,
+    }
+    text = f"Newton from {starts} poses anywhere: " + ", ".join(
+        f"{mask.sum()} {name}" for name, mask in counts.items()
+    )
     if uncaught.any():
         k = int(np.flatnonzero(uncaught)[0])
-        turn, shift = (", ".join(f"{x:.3g}" for x in ended[part, k] * unit) for part, unit in ((TURN, 1.0), (SHIFT, s.place.unit)))
+        turn, shift = (
+            ", ".join(f"{x:.3g}" for x in ended[part, k] * unit)
+            for part, unit in ((TURN, 1.0), (SHIFT, s.place.unit))
+        )
         text += f"; one of them has body j at Euler parameters [{turn}], displacement [{shift}] m: "
         text += "give the primitive a branch test that is positive on the intended branch only"
     count = float(uncaught.sum())
     verdict = Verdict.FAIL if count else Verdict.PASS
-    yield Finding("spurious branches", verdict, count, 0.0, "each zero is on the intended branch, or a test says so", message=text)
+    yield Finding(
+        "spurious branches",
+        verdict,
+        count,
+        0.0,
+        "each zero is on the intended branch, or a test says so",
+        message=text,
+    )
 
 
 def connected(s: Specimen, state: Array) -> Mask:
@@ -61,7 +84,9 @@ def connected(s: Specimen, state: Array) -> Mask:
     t = s.traced
     directions = s.rng.normal(size=(t.columns, WALKS))
     directions[:COLUMNS] = 0.0
-    known = np.concatenate(walk(t, design(t, WALKS), straight(directions, STEP), STRIDES, MOVING), axis=1)
+    known = np.concatenate(
+        walk(t, design(t, WALKS), straight(directions, STEP), STRIDES, MOVING), axis=1
+    )
     there = _led(t, state, np.repeat(design(t, 1), state.shape[1], axis=1))
     for k in range(AIMS):
         astray = np.flatnonzero(~there)
@@ -95,7 +120,9 @@ def _led(t: TracedJoint, state: Array, aim: Array) -> Mask:
 
 
 def difference(t: TracedJoint, state: Array, aim: Array) -> Array:
-    """The step of body j and of the coordinates from a state to an aim, its rotation by its sine, shape (columns, lanes)."""
+    """The step of body j and of the coordinates from a state to an aim, its rotation by its sine,
+    shape (columns, lanes).
+    """
     step = np.zeros((t.columns, state.shape[1]))
     a0, a, b0, b = aim[10], aim[11:14], state[10], state[11:14]
     # vector and scalar part of aim times the conjugate of the state
@@ -110,4 +137,8 @@ def _distances(state: Array, known: Array) -> Array:
     """Squared, by pose and known pose."""
     a, b = state[:, :, None], known[:, None, :]
     cosine = (a[10:14] * b[10:14]).sum(axis=0)
-    return np.asarray(((a[7:10] - b[7:10]) ** 2).sum(axis=0) + 4.0 * (1.0 - cosine**2) + ((a[POSES:] - b[POSES:]) ** 2).sum(axis=0))
+    return np.asarray(
+        ((a[7:10] - b[7:10]) ** 2).sum(axis=0)
+        + 4.0 * (1.0 - cosine**2)
+        + ((a[POSES:] - b[POSES:]) ** 2).sum(axis=0)
+    )

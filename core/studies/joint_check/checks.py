@@ -1,8 +1,9 @@
 """The checks of a joint's equations: each a function of one specimen that gives its findings.
 
-Poses are reached from the design by small steps over the manifold, so they are on the intended branch; motions through them have
-random admissible velocities and accelerations, from the exact derivatives of phi alone. Nothing the joint says of itself (rows, nu,
-gamma, branch) takes part in making them.
+Poses are reached from the design by small steps over the manifold, so they are on the intended
+branch; motions through them have random admissible velocities and accelerations, from the exact
+derivatives of phi alone. Nothing the joint says of itself (rows, nu, gamma, branch) takes part in
+making them.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ NEAR = 2
 # Sums of some thirty products of numbers of size one, each rounded at 1e-16.
 ROUND_OFF = 1e-13
 ROUND_OFF_WHY = "round-off of sums of numbers of size one"
-# The same, divided by the smallest singular value that poses may have (a twentieth of that at design), and once more.
+# The same, divided by the smallest singular value that poses may have (a twentieth of that at
+# design), and once more.
 AMPLIFIED = 1e-10
 AMPLIFIED_WHY = "round-off over the smallest singular value, x100"
 DIFFERENCE_WHY = "truncation and round-off of differences at step 0.01 (1e-13), x1e4"
@@ -92,8 +94,18 @@ def times(jacobian: Array, rate: Array) -> Array:
 
 def composition(s: Specimen) -> Iterator[Finding]:
     """phi at the design position, and whether all numbers are finite."""
-    remedy = "phi must vanish at the design position: check the constants that primitives() makes of the geometry"
-    yield judged("design", np.abs(s.traced.phi(design(s.traced, 1))), ROUND_OFF, ROUND_OFF_WHY, s.traced.names, remedy=remedy)
+    remedy = (
+        "phi must vanish at the design position: check the constants that primitives() makes of the"
+        " geometry"
+    )
+    yield judged(
+        "design",
+        np.abs(s.traced.phi(design(s.traced, 1))),
+        ROUND_OFF,
+        ROUND_OFF_WHY,
+        s.traced.names,
+        remedy=remedy,
+    )
 
 
 def freedoms(s: Specimen) -> Iterator[Finding]:
@@ -102,16 +114,31 @@ def freedoms(s: Specimen) -> Iterator[Finding]:
     apart = f"smallest singular value {smallest(s.exact).min():.2g}, rows of size one"
     lost = np.abs(len(t.names) - found)[None, :].astype(float)
     yield judged(
-        "rank", lost, 0.0, "rows must be independent", ["rows less rank"], apart, "take out the dependent row, or repair it"
+        "rank",
+        lost,
+        0.0,
+        "rows must be independent",
+        ["rows less rank"],
+        apart,
+        "take out the dependent row, or repair it",
     )
     left = 6 - (found - len(t.coordinates))
     relations = len(s.joint.relations) if isinstance(s.joint, AxialJoint) else 0
     names, stated = s.joint.freedoms, len(s.joint.freedoms) - relations
     if s.joint.rows != t.rows_left:
-        message = f"rows = {s.joint.rows}, but the primitives have {t.rows_left} equations; do not define rows"
-        yield Finding("freedoms", Verdict.FAIL, abs(s.joint.rows - t.rows_left), 0.0, message=message)
+        message = (
+            f"rows = {s.joint.rows}, but the primitives have {t.rows_left} equations; do not define"
+            " rows"
+        )
+        yield Finding(
+            "freedoms", Verdict.FAIL, abs(s.joint.rows - t.rows_left), 0.0, message=message
+        )
     elif not names:
-        yield Finding("freedoms", Verdict.PASS, message=f"leaves {left.min()} and names none: none can be driven")
+        yield Finding(
+            "freedoms",
+            Verdict.PASS,
+            message=f"leaves {left.min()} and names none: none can be driven",
+        )
     else:
         text = f"leaves {int(left.max())}, names {stated}: {', '.join(names)}"
         wrong = np.abs(left - stated)[None, :].astype(float)
@@ -126,10 +153,16 @@ def freedoms(s: Specimen) -> Iterator[Finding]:
 
 
 def derivatives(s: Specimen) -> Iterator[Finding]:
-    """The rows against the derivative of phi: the same row space; and the two ways to differentiate against each other."""
+    """The rows against the derivative of phi: the same row space; and the two ways to differentiate
+    against each other.
+    """
     t, declared = s.traced, s.traced.rows(s.state)
     entrywise = np.abs(declared - s.exact).max(axis=2).T
-    exact = [name for name, worst in zip(t.names, entrywise.max(axis=1), strict=True) if worst <= AMPLIFIED]
+    exact = [
+        name
+        for name, worst in zip(t.names, entrywise.max(axis=1), strict=True)
+        if worst <= AMPLIFIED
+    ]
     others = [name for name in t.names if name not in exact]
     kind = f"equal to the derivative: {len(exact)} of {len(t.names)} rows" + (
         f", others equivalent: {', '.join(others)}" if others else ""
@@ -139,14 +172,27 @@ def derivatives(s: Specimen) -> Iterator[Finding]:
     remedy = "what is named is no combination of the others' rows: differentiate phi again"
     yield judged("rows", astray, AMPLIFIED, AMPLIFIED_WHY, names, kind, remedy)
     apart = np.abs(t.differences(s.state) - s.exact).max(axis=2).T
-    yield judged("differences", apart, 1e-9, DIFFERENCE_WHY, t.names, remedy="phi is not smooth: no abs, min or max in an equation")
+    yield judged(
+        "differences",
+        apart,
+        1e-9,
+        DIFFERENCE_WHY,
+        t.names,
+        remedy="phi is not smooth: no abs, min or max in an equation",
+    )
 
 
 def _outside(rows: Array, space: Array) -> Array:
-    """The part of each row (relative) that is no combination of the rows of the space, shape (rows, lanes)."""
+    """The part of each row (relative) that is no combination of the rows of the space, shape (rows,
+    lanes).
+    """
     size = np.linalg.norm(rows, axis=2).T
-    projected = np.stack([min_norm(space, times(space, rows[:, k].T)) for k in range(rows.shape[1])])
-    return np.linalg.norm(rows.transpose(1, 2, 0) - projected, axis=1) / np.where(size > 0.0, size, 1.0)
+    projected = np.stack(
+        [min_norm(space, times(space, rows[:, k].T)) for k in range(rows.shape[1])]
+    )
+    return np.linalg.norm(rows.transpose(1, 2, 0) - projected, axis=1) / np.where(
+        size > 0.0, size, 1.0
+    )
 
 
 def right_sides(s: Specimen) -> Iterator[Finding]:
@@ -154,16 +200,25 @@ def right_sides(s: Specimen) -> Iterator[Finding]:
     _, velocity, acceleration = defects(s.traced, s.state, s.rate, s.acceleration)
     names = s.traced.names
     yield judged(
-        "nu", velocity, AMPLIFIED, AMPLIFIED_WHY, names, remedy="rows . v must be nu where phi stays zero; a joint has nu = 0"
+        "nu",
+        velocity,
+        AMPLIFIED,
+        AMPLIFIED_WHY,
+        names,
+        remedy="rows . v must be nu where phi stays zero; a joint has nu = 0",
     )
     remedy = (
-        "rows . a must be gamma where phi stays zero: differentiate rows . v = nu once more, and move all but rows . a to the right"
+        "rows . a must be gamma where phi stays zero: differentiate rows . v = nu once more, and"
+        " move all but rows . a to the right"
     )
     yield judged("gamma", acceleration, AMPLIFIED, AMPLIFIED_WHY, names, remedy=remedy)
 
 
-def defects(t: TracedJoint, state: Array, rate: Array, acceleration: Array, units: Any = 1.0) -> tuple[Array, Array, Array]:
-    """How far a motion is from the equations: position, velocity, acceleration, by row and pose, relative to the row's size.
+def defects(
+    t: TracedJoint, state: Array, rate: Array, acceleration: Array, units: Any = 1.0
+) -> tuple[Array, Array, Array]:
+    """How far a motion is from the equations: position, velocity, acceleration, by row and pose,
+    relative to the row's size.
 
     Args:
         units: of the columns of the equations in those of the rates, shape (columns, 1).
@@ -174,7 +229,11 @@ def defects(t: TracedJoint, state: Array, rate: Array, acceleration: Array, unit
     velocity = (times(jacobian, rate) - t.nu(state)) / size
     bent = (times(jacobian, acceleration) - t.gamma(state, rate * units)) / size
     speed, turn = np.linalg.norm(rate, axis=0), np.linalg.norm(acceleration, axis=0)
-    return np.abs(t.phi(state) / size), np.abs(velocity) / (1.0 + speed), np.abs(bent) / (1.0 + speed**2 + turn)
+    return (
+        np.abs(t.phi(state) / size),
+        np.abs(velocity) / (1.0 + speed),
+        np.abs(bent) / (1.0 + speed**2 + turn),
+    )
 
 
 def convergence(s: Specimen) -> Iterator[Finding]:
@@ -182,8 +241,18 @@ def convergence(s: Specimen) -> Iterator[Finding]:
     off = s.rng.normal(size=s.rate.shape)
     start = s.traced.retract(s.state, 1e-3 * off / np.linalg.norm(off, axis=0))
     _, taken = newton(s.traced, start, s.traced.rows, 20)
-    remedy = "the rows have the right space but not the size or sign of the derivative, so a step is too long or too short"
-    yield judged("newton", taken[None, :].astype(float), 6.0, NEWTON_WHY, ["iterations from 1e-3"], remedy=remedy)
+    remedy = (
+        "the rows have the right space but not the size or sign of the derivative, so a step is too"
+        " long or too short"
+    )
+    yield judged(
+        "newton",
+        taken[None, :].astype(float),
+        6.0,
+        NEWTON_WHY,
+        ["iterations from 1e-3"],
+        remedy=remedy,
+    )
 
 
 def intended_branch(s: Specimen) -> Iterator[Finding]:
@@ -194,15 +263,25 @@ def intended_branch(s: Specimen) -> Iterator[Finding]:
         return
     refused = (s.traced.branch(s.near) <= 0.0).astype(float)
     far = int((s.traced.branch(s.state) <= 0.0).sum())
-    text = f"{tests} declared" + f"; {far} of {s.lanes} poses far from the design are refused" * (far > 0)
+    text = f"{tests} declared" + f"; {far} of {s.lanes} poses far from the design are refused" * (
+        far > 0
+    )
     remedy = "a test must be positive on the branch of the design position: turn its sign"
     yield judged(
-        "branch tests", refused, 0.0, f"poses within {NEAR * STEP:g} of the design are on its branch", ["refused"], text, remedy
+        "branch tests",
+        refused,
+        0.0,
+        f"poses within {NEAR * STEP:g} of the design are on its branch",
+        ["refused"],
+        text,
+        remedy,
     )
 
 
 def cost(s: Specimen) -> Iterator[Finding]:
-    """Operations of the traced equations, beside those of the conventional form where there is one."""
+    """Operations of the traced equations, beside those of the conventional form where there is
+    one.
+    """
 
     def flops(t: TracedJoint) -> dict[str, int]:
         return {name: t.programs[name].flops for name in ("phi", "rows", "gamma")}
@@ -210,7 +289,9 @@ def cost(s: Specimen) -> Iterator[Finding]:
     own, other = flops(s.traced), _conventional(s)
     text = ", ".join(f"{name} {count}" for name, count in own.items())
     if other is not None:
-        text += "; in conventional form " + ", ".join(f"{name} {count}" for name, count in flops(other).items())
+        text += "; in conventional form " + ", ".join(
+            f"{name} {count}" for name, count in flops(other).items()
+        )
     yield Finding("operations", Verdict.PASS, float(sum(own.values())), message=f"flops {text}")
 
 
@@ -222,17 +303,26 @@ def _conventional(s: Specimen) -> TracedJoint | None:
 
 
 def round_off(s: Specimen) -> Iterator[Finding]:
-    """Rounding errors: the same operations with 40 digits, at the poses and very near the design."""
+    """Rounding errors: the same operations with 40 digits, at the poses and very near the
+    design.
+    """
     try:
         kind, lift = precise(40)
     except ModuleNotFoundError:
-        yield Finding("round-off", Verdict.SKIP, message="mpmath is not installed: pip install mpmath")
+        yield Finding(
+            "round-off", Verdict.SKIP, message="mpmath is not installed: pip install mpmath"
+        )
         return
 
     def error(t: TracedJoint, state: Array) -> Array:
         true = execute(t.programs["phi"], kind, lift(state), lift)
         return np.abs(
-            np.array([np.broadcast_to(lift(a) - b, state.shape[1:]) for a, b in zip(t.phi(state), true, strict=True)]).astype(float)
+            np.array(
+                [
+                    np.broadcast_to(lift(a) - b, state.shape[1:])
+                    for a, b in zip(t.phi(state), true, strict=True)
+                ]
+            ).astype(float)
         )
 
     few = s.state[:, :8]
@@ -242,7 +332,9 @@ def round_off(s: Specimen) -> Iterator[Finding]:
     other = _conventional(s) if not s.traced.coordinates else None
     if other is not None:
         lost["in conventional form"] = error(other, near).max() / tiny
-    text = f"of a displacement of {tiny:g} from the design phi loses " + ", ".join(f"{x:.1g} {where}" for where, x in lost.items())
+    text = f"of a displacement of {tiny:g} from the design phi loses " + ", ".join(
+        f"{x:.1g} {where}" for where, x in lost.items()
+    )
     yield judged(
         "round-off",
         error(s.traced, few),

@@ -28,9 +28,11 @@ class Finding:
     """One check.
 
     Attributes:
-        figure: the worst number found, and `limit` the largest accepted one; None where there is nothing to measure or to exceed.
+        figure: the worst number found, and `limit` the largest accepted one; None where there is
+            nothing to measure or to exceed.
         why: the reason of the limit.
-        specimen, pose: numbers of the specimen and of the pose at which the worst was found; the seed reproduces them.
+        specimen, pose: numbers of the specimen and of the pose at which the worst was found; the
+            seed reproduces them.
         row: the equation it was found in, as "Dot11 row 2".
         message: what the figure does not say; of a failure, what to do.
     """
@@ -53,9 +55,16 @@ class Finding:
 
 
 def judged(
-    check: str, figures: Array, limit: float, why: str, names: Sequence[str] = ("",), message: str = "", remedy: str = ""
+    check: str,
+    figures: Array,
+    limit: float,
+    why: str,
+    names: Sequence[str] = ("",),
+    message: str = "",
+    remedy: str = "",
 ) -> Finding:
-    """The finding of figures by row and pose, shape (len(names), poses); what is not a number fails.
+    """The finding of figures by row and pose, shape (len(names), poses); what is not a number
+    fails.
 
     Args:
         message: said whatever the verdict.
@@ -68,7 +77,15 @@ def judged(
     where = int(pose) if worst else None
     said = "; ".join(each for each in (message, "" if good else remedy) if each)
     return Finding(
-        check, Verdict.PASS if good else Verdict.FAIL, worst, limit, why, None, where, names[int(row)] if worst else "", said
+        check,
+        Verdict.PASS if good else Verdict.FAIL,
+        worst,
+        limit,
+        why,
+        None,
+        where,
+        names[int(row)] if worst else "",
+        said,
     )
 
 
@@ -115,12 +132,22 @@ class Report:
         console = terminal.console(file)
         table = Table(box=None, pad_edge=False, header_style="bold")
         for name in ("check", "verdict", "worst", "limit", "at"):
-            table.add_column(name, justify="right" if name in ("worst", "limit") else "left", no_wrap=name != "at")
+            table.add_column(
+                name,
+                justify="right" if name in ("worst", "limit") else "left",
+                no_wrap=name != "at",
+            )
         table.add_column("limit because", overflow="fold")
         colours = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIP: "yellow"}
         for each in self.findings:
             numbers = ("–" if x is None else f"{x:.3g}" for x in (each.figure, each.limit))
-            table.add_row(each.check, Text(each.verdict, colours[each.verdict]), *numbers, _where(each), each.why)
+            table.add_row(
+                each.check,
+                Text(each.verdict, colours[each.verdict]),
+                *numbers,
+                _where(each),
+                each.why,
+            )
         console.print(table)
         for each in self.findings:
             if each.message:
@@ -128,7 +155,9 @@ class Report:
         for k, specimen in enumerate(self.specimens):
             console.print(Text(f"specimen {k}: {specimen}"), soft_wrap=True)
         counts = Counter(each.verdict for each in self.findings)
-        summary = ", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict])
+        summary = ", ".join(
+            f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict]
+        )
         console.print(Text(f"{self.joint}: {summary} (seed {self.seed})"))
 
 

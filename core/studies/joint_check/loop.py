@@ -1,4 +1,6 @@
-"""A joint in a small closed loop: solved natively, and by every engine given, on the joint itself or on its equivalent."""
+"""A joint in a small closed loop: solved natively, and by every engine given, on the joint itself
+or on its equivalent.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +23,11 @@ from ...trajectory import Array, Trajectory
 from .checks import ROUND_OFF
 from .findings import Finding, Verdict, judged
 
-# Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates, x1000.
+# Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
+# x1000.
 TOL = 1e-12
-# The probe's rods may lock a joint that they were not chosen for before the end of its sweep: others are tried, and where all do
-# it is halved, so often.
+# The probe's rods may lock a joint that they were not chosen for before the end of its sweep:
+# others are tried, and where all do it is halved, so often.
 HALVINGS = 3
 # Weights of sixth-order differences over seven samples.
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
@@ -41,11 +44,21 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
     except Exception as error:  # whatever the joint's own code raises
         yield Finding("loop", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
         return
-    solved = f"{native.solved.sum()} of {len(native.solved)} samples solved, to {case.sweep.values.max():.3g} rad"
+    solved = (
+        f"{native.solved.sum()} of {len(native.solved)} samples solved, to"
+        f" {case.sweep.values.max():.3g} rad"
+    )
     if not native.solved.all():
         yield Finding("loop", Verdict.FAIL, message=f"{solved}: {native.message}")
         return
-    yield Finding("loop", Verdict.PASS, native.residual, TOL, "round-off of metre-sized coordinates, x1000", message=solved)
+    yield Finding(
+        "loop",
+        Verdict.PASS,
+        native.residual,
+        TOL,
+        "round-off of metre-sized coordinates, x1000",
+        message=solved,
+    )
     yield from _rates(case)
     reference = {output.name: output_series(case, output, native) for output in case.outputs}
     other: Case | None = None
@@ -56,7 +69,9 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
             yield _compared("loop: native, equivalent", other, _solved(other), reference)
     except Exception as error:
         other, without = None, "equivalent() fails, see native"
-        yield Finding("loop: native, equivalent", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+        yield Finding(
+            "loop: native, equivalent", Verdict.FAIL, message=f"{type(error).__name__}: {error}"
+        )
     if not engines:
         yield Finding("loop: simulators", Verdict.SKIP, message="no engines were given")
     for engine in engines:
@@ -67,7 +82,10 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
 def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
     """The first probe that is solved whole; the last that was tried, if none is."""
     first, *others = alternatives(tested)
-    shorter = [replace(first, sweep=replace(first.sweep, values=0.5**k * first.sweep.values)) for k in range(1, HALVINGS + 1)]
+    shorter = [
+        replace(first, sweep=replace(first.sweep, values=0.5**k * first.sweep.values))
+        for k in range(1, HALVINGS + 1)
+    ]
     case, native = first, _solved(first)
     for other in (*others, *shorter):
         if native.solved.all():
@@ -77,23 +95,37 @@ def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
 
 
 def _solved(case: Case) -> Trajectory:
-    return solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate, tol=TOL)
+    return solve(
+        case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate, tol=TOL
+    )
 
 
 def _rates(case: Case) -> Iterator[Finding]:
-    """Velocities and accelerations against differences, which know nothing of rows and right-hand sides."""
+    """Velocities and accelerations against differences, which know nothing of rows and right-hand
+    sides.
+    """
     first, *_, last = grid = case.sweep.values.tolist()
     values: Array = np.linspace(first, last, FINER * (len(grid) - 1) + 1, dtype=np.float64)
     fine = solve(case.mechanism, case.sweep.driver, values, rate=case.sweep.rate, tol=TOL)
     dt, motion = float(values[1] - values[0]) / case.sweep.rate, fine.points[case.points[0]]
     assert motion.velocity is not None
     assert motion.acceleration is not None
-    pairs = ((motion.position, motion.velocity, "velocity"), (motion.velocity, motion.acceleration, "acceleration"))
+    pairs = (
+        (motion.position, motion.velocity, "velocity"),
+        (motion.velocity, motion.acceleration, "acceleration"),
+    )
     for before, rates, name in pairs:
         slopes, coarse = _differences(before, dt), _differences(before[::2], 2.0 * dt)
         limit = float(np.abs(coarse - slopes[3:-3:2]).max()) + ROUND_OFF / dt
         remedy = "the solution's rates are not those of its positions: see rows, nu and gamma"
-        yield judged(f"loop: {name}", np.abs(slopes - rates[3:-3]).max(axis=1), limit, RATES_WHY, [name], remedy=remedy)
+        yield judged(
+            f"loop: {name}",
+            np.abs(slopes - rates[3:-3]).max(axis=1),
+            limit,
+            RATES_WHY,
+            [name],
+            remedy=remedy,
+        )
 
 
 def _differences(values: Array, dt: float) -> Array:
@@ -102,19 +134,27 @@ def _differences(values: Array, dt: float) -> Array:
 
 
 def _equivalent(case: Case) -> Case | None:
-    """The case with the tested joint replaced by the bodies and joints it says it is equivalent to."""
+    """The case with the tested joint replaced by the bodies and joints it says it is equivalent
+    to.
+    """
     tested = next(joint for joint in case.mechanism.joints if joint.type == case.name)
     offered = getattr(tested, "equivalent", None)
     if offered is None:
         return None
     bodies, joints = offered()
     others = [joint for joint in case.mechanism.joints if joint is not tested]
-    mechanism = replace(case.mechanism, bodies=[*case.mechanism.bodies, *bodies], joints=[*others, *joints])
+    mechanism = replace(
+        case.mechanism, bodies=[*case.mechanism.bodies, *bodies], joints=[*others, *joints]
+    )
     return replace(case, name=f"{case.name}_equivalent", mechanism=mechanism)
 
 
-def _simulated(engine: Engine, case: Case, other: Case | str, reference: dict[str, Series]) -> Finding:
-    """An engine's answer compared with the native one, or why there is none; `other` is the equivalent, or why there is none."""
+def _simulated(
+    engine: Engine, case: Case, other: Case | str, reference: dict[str, Series]
+) -> Finding:
+    """An engine's answer compared with the native one, or why there is none; `other` is the
+    equivalent, or why there is none.
+    """
     name = f"loop: {engine.name}"
     if engine.version() is None:
         return Finding(name, Verdict.SKIP, message="not installed")
@@ -140,11 +180,17 @@ def _simulated(engine: Engine, case: Case, other: Case | str, reference: dict[st
 def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Series]) -> Finding:
     """Positions, velocities and accelerations against the native ones of the joint itself."""
     if not found.solved.all():
-        return Finding(name, Verdict.FAIL, message=f"{found.solved.sum()} of {len(found.solved)} samples solved: {found.message}")
+        return Finding(
+            name,
+            Verdict.FAIL,
+            message=f"{found.solved.sum()} of {len(found.solved)} samples solved: {found.message}",
+        )
     worst: tuple[float, str, str, Deviation] | None = None
     for output in case.outputs:
         standards = [(NATIVE, reference[output.name])]
-        for quantity, deviation in deviations(case, output, output_series(case, output, found), standards).items():
+        for quantity, deviation in deviations(
+            case, output, output_series(case, output, found), standards
+        ).items():
             figure = deviation.max_abs / deviation.tolerance
             if worst is None or figure > worst[0]:
                 worst = figure, output.name, quantity, deviation
@@ -152,6 +198,22 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
     if above := excess(case, found.residual, TOL):
         return Finding(name, Verdict.FAIL, message=above)
     figure, output_name, quantity, deviation = worst
-    message = "" if figure <= 1.0 else describe(output_name, quantity, deviation, case.sweep.driver, case.sweep.values.tolist())
+    message = (
+        ""
+        if figure <= 1.0
+        else describe(
+            output_name, quantity, deviation, case.sweep.driver, case.sweep.values.tolist()
+        )
+    )
     verdict = Verdict.PASS if figure <= 1.0 else Verdict.FAIL
-    return Finding(name, verdict, figure, 1.0, AGREE_WHY, None, deviation.worst_step, f"{output_name} {quantity}", message)
+    return Finding(
+        name,
+        verdict,
+        figure,
+        1.0,
+        AGREE_WHY,
+        None,
+        deviation.worst_step,
+        f"{output_name} {quantity}",
+        message,
+    )

@@ -1,4 +1,5 @@
-"""Programs run over any kind of scalar: lanes of real or complex numbers, jets, numbers of any precision.
+"""Programs run over any kind of scalar: lanes of real or complex numbers, jets, numbers of any
+precision.
 
 A kind is a table of what the operations of a program are for it.
 """
@@ -38,14 +39,24 @@ def _ordered(key: Operation) -> dict[str, Operation]:
 
 
 _SUMS: dict[str, Any] = {"+": operator.add, "-": operator.sub, "neg": operator.neg}
-_PRODUCTS: dict[str, Any] = {"*": operator.mul, "/": np.true_divide, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos}
+_PRODUCTS: dict[str, Any] = {
+    "*": operator.mul,
+    "/": np.true_divide,
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 NUMBERS: Mapping[str, Operation] = {**_SUMS, **_PRODUCTS, **_ordered(np.real)}
-"""Arrays of numbers. Complex ones are ordered by their real parts, so that their imaginary parts stay derivatives."""
+"""Arrays of numbers. Complex ones are ordered by their real parts, so that their imaginary parts
+stay derivatives.
+"""
 
 
 def _product(a: Array, b: Array) -> Array:
-    return np.stack([a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]])
+    return np.stack(
+        [a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]]
+    )
 
 
 def _quotient(a: Array, b: Array) -> Array:
@@ -77,7 +88,8 @@ JETS: Mapping[str, Operation] = {
 
 
 def precise(digits: int) -> tuple[Mapping[str, Operation], Operation]:
-    """The operations of numbers of that many digits, in arrays of objects; and what makes such arrays of floats.
+    """The operations of numbers of that many digits, in arrays of objects; and what makes such
+    arrays of floats.
 
     Raises:
         ModuleNotFoundError: mpmath is not installed.
@@ -86,12 +98,21 @@ def precise(digits: int) -> tuple[Mapping[str, Operation], Operation]:
     context = mpmath.MPContext()
     context.dps = digits
     array_of: Any = np.frompyfunc
-    functions: dict[str, Operation] = {name: array_of(getattr(context, name), 1, 1) for name in ("sqrt", "sin", "cos")}
+    functions: dict[str, Operation] = {
+        name: array_of(getattr(context, name), 1, 1) for name in ("sqrt", "sin", "cos")
+    }
     return {**NUMBERS, **functions}, array_of(context.mpf, 1, 1)
 
 
-def execute(program: Program, kind: Mapping[str, Operation], inputs: Any, lift: Callable[[float], Any] = float) -> list[Any]:
-    """Run a program over a kind of scalar: inputs by slot; the outputs in order. Constants are lifted to the kind."""
+def execute(
+    program: Program,
+    kind: Mapping[str, Operation],
+    inputs: Any,
+    lift: Callable[[float], Any] = float,
+) -> list[Any]:
+    """Run a program over a kind of scalar: inputs by slot; the outputs in order. Constants are
+    lifted to the kind.
+    """
     values: list[Any] = []
     for op, *rest in program.nodes:
         if op in ("input", "const"):

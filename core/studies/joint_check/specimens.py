@@ -1,4 +1,6 @@
-"""Specimens of a joint type, made from the kinds of its fields; and the same specimen moved, drawn larger or from longer axes."""
+"""Specimens of a joint type, made from the kinds of its fields; and the same specimen moved, drawn
+larger or from longer axes.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,12 @@ from .traced import BODIES, Place
 
 # A usual size of a joint [m].
 SIZE = 0.1
-# Coordinates are whole multiples of this [m], so that they can be moved a thousand kilometres without rounding.
+# Coordinates are whole multiples of this [m], so that they can be moved a thousand kilometres
+# without rounding.
 GRID = 2.0**-30
-# Angles [degrees] of the two directions of a pair: the cross of a universal joint (over a right angle by round-off, so that what
-# wants a positive cosine refuses it), then shafts that point the same way on.
+# Angles [degrees] of the two directions of a pair: the cross of a universal joint (over a right
+# angle by round-off, so that what wants a positive cosine refuses it), then shafts that point the
+# same way on.
 ANGLES = (90.0 + 1e-8, 40.0)
 
 
@@ -28,7 +32,8 @@ class SpecimenError(KincheckError):
 
 
 def specimens(joint_class: type[Joint], rng: np.random.Generator, count: int) -> list[Joint]:
-    """Instances of a joint type between bodies i and j: what its classmethod `specimens` offers, else that many random ones.
+    """Instances of a joint type between bodies i and j: what its classmethod `specimens` offers,
+    else that many random ones.
 
     Raises:
         SpecimenError: the class refuses what its fields' kinds say, or has a field of no kind.
@@ -44,13 +49,21 @@ def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
     if not is_dataclass(joint_class) or getattr(joint_class, "__abstractmethods__", None):
         missing = ", ".join(sorted(getattr(joint_class, "__abstractmethods__", ()))) or "its fields"
         raise SpecimenError(f"{joint_class.__name__} is not complete: define {missing}")
-    required = [each for each in fields(joint_class) if each.default is MISSING and each.default_factory is MISSING]
-    geometry = {each.name: each.metadata.get("kind") for each in required if each.name not in ("name", *BODIES)}
+    required = [
+        each
+        for each in fields(joint_class)
+        if each.default is MISSING and each.default_factory is MISSING
+    ]
+    geometry = {
+        each.name: each.metadata.get("kind")
+        for each in required
+        if each.name not in ("name", *BODIES)
+    }
     unknown = [name for name, kind in geometry.items() if kind is None]
     if unknown:
         raise SpecimenError(
-            f"{joint_class.__name__}: field {unknown[0]!r} has no kind; declare it by position(), direction(), positions(), "
-            f"directions() or length(), or {remedy}"
+            f"{joint_class.__name__}: field {unknown[0]!r} has no kind; declare it by position(),"
+            f" direction(), positions(), directions() or length(), or {remedy}"
         )
     refused = ""
     for angle in ANGLES:
@@ -59,7 +72,9 @@ def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
             return joint_class(joint_class.__name__, *BODIES, **values)
         except MechanismError as error:
             refused = str(error)
-    raise SpecimenError(f"{joint_class.__name__}: no specimen can be made of random geometry ({refused}); {remedy}")
+    raise SpecimenError(
+        f"{joint_class.__name__}: no specimen can be made of random geometry ({refused}); {remedy}"
+    )
 
 
 def _value(kind: Any, rng: np.random.Generator, angle: float) -> Any:
@@ -73,7 +88,10 @@ def _value(kind: Any, rng: np.random.Generator, angle: float) -> Any:
         Kind.POSITION: lambda: _snapped(centre),
         Kind.POSITIONS: lambda: tuple(map(_snapped, ends)),
         Kind.DIRECTION: lambda: tuple((stretch[0] * a).tolist()),
-        Kind.DIRECTIONS: lambda: (tuple((stretch[0] * a).tolist()), tuple((stretch[1] * b).tolist())),
+        Kind.DIRECTIONS: lambda: (
+            tuple((stretch[0] * a).tolist()),
+            tuple((stretch[1] * b).tolist()),
+        ),
         Kind.LENGTH: lambda: float(rng.uniform(0.5, 1.5) * SIZE),
     }
     return makers[kind]()
@@ -83,7 +101,15 @@ def place(joint: Joint, rng: np.random.Generator) -> Place:
     """Body origins near the joint, but at none of its points, and a unit near its size."""
     points = np.array(joint.points_on()).reshape(-1, 3)
     lengths = [value for _, kind, value in joint.parts() if kind is Kind.LENGTH]
-    size = max([float(np.ptp(points, axis=0).max()) if len(points) > 1 else 0.0, *(abs(x) for x in lengths if x)]) or SIZE
+    size = (
+        max(
+            [
+                float(np.ptp(points, axis=0).max()) if len(points) > 1 else 0.0,
+                *(abs(x) for x in lengths if x),
+            ]
+        )
+        or SIZE
+    )
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     origins = (_snapped(centre + size * rng.uniform(-1.0, 1.0, 3)) for _ in BODIES)
     first, second = origins

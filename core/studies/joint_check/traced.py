@@ -1,12 +1,13 @@
 """One joint between two free bodies, its equations traced once and run over any scalar.
 
-The operations that an engine runs are the ones examined here. They are run over lanes of floats, over complex numbers (an exact
-Jacobian: phi(x + i h) = phi + i h phi', without cancellation), over jets (value, first and second derivative by time) and over
-numbers of any precision.
+The operations that an engine runs are the ones examined here. They are run over lanes of floats,
+over complex numbers (an exact Jacobian: phi(x + i h) = phi + i h phi', without cancellation), over
+jets (value, first and second derivative by time) and over numbers of any precision.
 
-A state is an array (size, lanes): displacement and Euler parameters of body i, of body j, then the joint's named coordinates if it
-relates any; a rate is (unknowns, lanes): v and w of body i, of body j, rates of the coordinates. Lengths are in the unit of the
-frame, so that a joint of any size has numbers of size one.
+A state is an array (size, lanes): displacement and Euler parameters of body i, of body j, then the
+joint's named coordinates if it relates any; a rate is (unknowns, lanes): v and w of body i, of body
+j, rates of the coordinates. Lengths are in the unit of the frame, so that a joint of any size has
+numbers of size one.
 """
 
 from __future__ import annotations
@@ -31,14 +32,17 @@ BODIES = "i", "j"
 # u and q of two bodies
 POSES = 14
 COMPLEX_STEP = 1e-30
-# h f' = sum of weight * f(k h), sixth order: at h = 0.01 truncation (h^6) and round-off (1e-16 / h) are both near 1e-13.
+# h f' = sum of weight * f(k h), sixth order: at h = 0.01 truncation (h^6) and round-off (1e-16 / h)
+# are both near 1e-13.
 DIFFERENCE = 1e-2
 WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the two bodies of a joint have their origins at design [m], and the unit in which lengths are measured [m]."""
+    """Where the two bodies of a joint have their origins at design [m], and the unit in which
+    lengths are measured [m].
+    """
 
     origins: tuple[tuple[float, ...], tuple[float, ...]]
     unit: float
@@ -63,7 +67,10 @@ class TracedJoint:
 
     def __init__(self, joint: Joint, place: Place, style: Style = Style.NATIVE) -> None:
         mechanism = Mechanism("joint", [Body(name) for name in BODIES], [joint])
-        origins = {name: (1.0 / place.unit) * vec(origin) for name, origin in zip(BODIES, place.origins, strict=True)}
+        origins = {
+            name: (1.0 / place.unit) * vec(origin)
+            for name, origin in zip(BODIES, place.origins, strict=True)
+        }
         found = constraints(mechanism, Frames(place.unit, origins, BODIES), {}, style)
         equations = Cartesian(found, BODIES)
         self.coordinates = tuple(equations.coordinates)
@@ -71,27 +78,50 @@ class TracedJoint:
         self.size = POSES + len(self.coordinates)
         self.origins = np.array([[*origins[name]] for name in BODIES])
         self._trace(equations)
-        kinds = [(Relation, 1) if isinstance(each, Relation) else (type(each.primitive), each.primitive.n) for each in found]
+        kinds = [
+            (
+                (Relation, 1)
+                if isinstance(each, Relation)
+                else (type(each.primitive), each.primitive.n)
+            )
+            for each in found
+        ]
         self.names = [f"{kind.__name__} row {k + 1}" for kind, count in kinds for k in range(count)]
         if not self.names:
-            raise MechanismError(f"{joint}: has 0 rows, expected one or more; return its primitives")
+            raise MechanismError(
+                f"{joint}: has 0 rows, expected one or more; return its primitives"
+            )
         ends: list[int] = np.cumsum([count for _, count in kinds]).tolist()
         self.parts = [(end - count, end) for end, (_, count) in zip(ends, kinds, strict=True)]
         lengths = {name: len(self.programs[name].outputs) for name in ("phi", "nu", "gamma")}
         lengths["rows"] = len(self.programs["rows"].outputs) // self.columns
         if set(lengths.values()) != {len(self.names)}:
             found_them = ", ".join(f"{count} of {name}" for name, count in lengths.items())
-            raise MechanismError(f"{joint}: {found_them}, expected {len(self.names)} of each, the sum of n of its primitives")
-        if style is Style.NATIVE and any(not isinstance(each, Relation) and each.primitive.body_axes for each in found):
-            raise MechanismError(f"{joint}: its primitives have rows in body axes; write them in global axes")
+            raise MechanismError(
+                f"{joint}: {found_them}, expected {len(self.names)} of each, the sum of n of its"
+                " primitives"
+            )
+        if style is Style.NATIVE and any(
+            not isinstance(each, Relation) and each.primitive.body_axes for each in found
+        ):
+            raise MechanismError(
+                f"{joint}: its primitives have rows in body axes; write them in global axes"
+            )
 
     def _trace(self, equations: Cartesian) -> None:
         tape = Tape()
         inputs = [tape.input(slot) for slot in range(self.size + self.columns)]
-        state: dict[str, Sequence[Any]] = {"u i": inputs[:3], "q i": inputs[3:7], "u j": inputs[7:10], "q j": inputs[10:14]}
+        state: dict[str, Sequence[Any]] = {
+            "u i": inputs[:3],
+            "q i": inputs[3:7],
+            "u j": inputs[7:10],
+            "q j": inputs[10:14],
+        }
         state |= {f"x {name}": [inputs[POSES + k]] for k, name in enumerate(self.coordinates)}
         at = equations.configuration(state)
-        entries = [row.get(column, 0.0) for row in equations.rows(at) for column in range(self.columns)]
+        entries = [
+            row.get(column, 0.0) for row in equations.rows(at) for column in range(self.columns)
+        ]
         outputs: dict[str, Sequence[Any]] = {
             "phi": equations.phi(at),
             "rows": entries,
@@ -99,17 +129,23 @@ class TracedJoint:
             "gamma": equations.gamma(at, inputs[self.size :]),
             "branch": equations.branch(at),
         }
-        self.programs = {name: program(name, tape, dict(enumerate(values))) for name, values in outputs.items()}
+        self.programs = {
+            name: program(name, tape, dict(enumerate(values))) for name, values in outputs.items()
+        }
 
     @property
     def rows_left(self) -> int:
-        """Rows less named coordinates: what the joint takes of the six freedoms, if its rows are independent."""
+        """Rows less named coordinates: what the joint takes of the six freedoms, if its rows are
+        independent.
+        """
         return len(self.names) - len(self.coordinates)
 
     def _run(self, name: str, inputs: Any, shape: tuple[int, ...]) -> Array:
         with np.errstate(all="ignore"):
             found = execute(self.programs[name], NUMBERS, inputs)
-        return np.array([np.broadcast_to(each, shape) for each in found]).reshape(len(found), *shape)
+        return np.array([np.broadcast_to(each, shape) for each in found]).reshape(
+            len(found), *shape
+        )
 
     def phi(self, state: Array) -> Array:
         """Residuals, shape (rows, ...)."""
@@ -134,8 +170,11 @@ class TracedJoint:
 
     def exact(self, state: Array) -> Array:
         """The Jacobian that phi has, by complex steps, shape (lanes, rows, columns)."""
-        steps = np.repeat(np.eye(self.columns)[:, :, None], state.shape[1], axis=2) * (1j * COMPLEX_STEP)
-        moved = self._moved(state[:, None, :], steps, lambda a: a)  # the length changes by the square of the step: not at all
+        steps = np.repeat(np.eye(self.columns)[:, :, None], state.shape[1], axis=2) * (
+            1j * COMPLEX_STEP
+        )
+        # the length changes by the square of the step: not at all
+        moved = self._moved(state[:, None, :], steps, lambda a: a)
         return np.moveaxis(self.phi(moved).imag / COMPLEX_STEP, (0, 1, 2), (1, 2, 0))
 
     def differences(self, state: Array) -> Array:
@@ -143,7 +182,9 @@ class TracedJoint:
         directions = np.repeat(np.eye(self.columns)[:, :, None], state.shape[1], axis=2)
         total: Any = 0.0
         for k, weight in WEIGHTS:
-            total = total + weight * self.phi(self._moved(state[:, None, :], k * DIFFERENCE * directions, _normalised))
+            total = total + weight * self.phi(
+                self._moved(state[:, None, :], k * DIFFERENCE * directions, _normalised)
+            )
         return np.moveaxis(total / DIFFERENCE, (0, 1, 2), (1, 2, 0))
 
     def retract(self, state: Array, step: Array) -> Array:
@@ -154,18 +195,29 @@ class TracedJoint:
         parts: list[Any] = []
         for k in range(2):
             u, q = state[7 * k : 7 * k + 3], state[7 * k + 3 : 7 * k + 7]
-            dr, half = step[COLUMNS * k : COLUMNS * k + 3], 0.5 * step[COLUMNS * k + 3 : COLUMNS * (k + 1)]
+            dr, half = (
+                step[COLUMNS * k : COLUMNS * k + 3],
+                0.5 * step[COLUMNS * k + 3 : COLUMNS * (k + 1)],
+            )
             turned = Quat(1.0, vec(tuple(half))) * quat(q)
             parts += [u + dr, ended(np.stack([*turned]))]
         return np.concatenate([*parts, state[POSES:] + step[2 * COLUMNS :]])
 
     def jets(self, state: Array, rate: Array, acceleration: Array) -> Array:
-        """phi along a motion: value, first and second derivative by time, shape (3, rows, lanes)."""
+        """phi along a motion: value, first and second derivative by time, shape (3, rows,
+        lanes).
+        """
         jets: list[Array] = []
         for k in range(2):
             u, q = state[7 * k : 7 * k + 3], quat(state[7 * k + 3 : 7 * k + 7])
-            v, w = rate[COLUMNS * k : COLUMNS * k + 3], vec(tuple(rate[COLUMNS * k + 3 : COLUMNS * (k + 1)]))
-            a, w_t = acceleration[COLUMNS * k : COLUMNS * k + 3], vec(tuple(acceleration[COLUMNS * k + 3 : COLUMNS * (k + 1)]))
+            v, w = (
+                rate[COLUMNS * k : COLUMNS * k + 3],
+                vec(tuple(rate[COLUMNS * k + 3 : COLUMNS * (k + 1)])),
+            )
+            a, w_t = (
+                acceleration[COLUMNS * k : COLUMNS * k + 3],
+                vec(tuple(acceleration[COLUMNS * k + 3 : COLUMNS * (k + 1)])),
+            )
             # q' = w q / 2, q'' = w' q / 2 - |w|^2 q / 4
             q_t, turning = Quat(0.0, 0.5 * w) * q, Quat(0.0, 0.5 * w_t) * q
             q_tt = [x - 0.25 * (w @ w) * y for x, y in zip(turning, q, strict=True)]

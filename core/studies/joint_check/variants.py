@@ -1,4 +1,5 @@
-"""The same joint written differently: bodies exchanged, both moved together, drawn larger, far away, in other unknowns.
+"""The same joint written differently: bodies exchanged, both moved together, drawn larger, far
+away, in other unknowns.
 
 A motion that the one admits the other must admit too: position, velocity and acceleration.
 """
@@ -29,22 +30,37 @@ AWAY = 1e6
 def exchange(s: Specimen) -> Iterator[Finding]:
     """The same motion with both bodies exchanged."""
     if not s.joint.symmetric:
-        yield Finding("exchange", Verdict.SKIP, message="symmetric = False: geometry belongs to one of the bodies")
+        yield Finding(
+            "exchange",
+            Verdict.SKIP,
+            message="symmetric = False: geometry belongs to one of the bodies",
+        )
         return
     back = replace(s.joint.reversed(), i=s.joint.i, j=s.joint.j)
     other = TracedJoint(back, Place((s.place.origins[1], s.place.origins[0]), s.place.unit))
 
     def exchanged(a: Array, half: int) -> Array:
-        return np.concatenate([a[half : 2 * half], a[:half], -a[2 * half :]])  # a coordinate is that of body j relative to body i
+        # a coordinate is that of body j relative to body i
+        return np.concatenate([a[half : 2 * half], a[:half], -a[2 * half :]])
 
-    motion = exchanged(s.state, POSES // 2), exchanged(s.rate, COLUMNS), exchanged(s.acceleration, COLUMNS)
+    motion = (
+        exchanged(s.state, POSES // 2),
+        exchanged(s.rate, COLUMNS),
+        exchanged(s.acceleration, COLUMNS),
+    )
     yield _same(
-        "exchange", s, other, motion, "the joint is another one with its bodies exchanged: set symmetric = False, or repair it"
+        "exchange",
+        s,
+        other,
+        motion,
+        "the joint is another one with its bodies exchanged: set symmetric = False, or repair it",
     )
 
 
 def rigid_motion(s: Specimen) -> Iterator[Finding]:
-    """The same motion seen from elsewhere: both bodies turned and shifted; and residuals off the manifold."""
+    """The same motion seen from elsewhere: both bodies turned and shifted; and residuals off the
+    manifold.
+    """
     q = s.rng.normal(size=4)
     turn = quat((q / np.linalg.norm(q)).tolist())
     change = rotation_less_identity(turn)
@@ -60,14 +76,26 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
         return np.concatenate([*parts, state[POSES:]])
 
     def rates(a: Array) -> Array:
-        return np.concatenate([*(rotation @ a[3 * k : 3 * k + 3] for k in range(4)), a[2 * COLUMNS :]])
+        return np.concatenate(
+            [*(rotation @ a[3 * k : 3 * k + 3] for k in range(4)), a[2 * COLUMNS :]]
+        )
 
-    remedy = "it must not matter where the two bodies are together: check which body each arm and axis belongs to"
-    yield _same("rigid motion", s, s.traced, (pose(s.state), rates(s.rate), rates(s.acceleration)), remedy)
+    remedy = (
+        "it must not matter where the two bodies are together: check which body each arm and axis"
+        " belongs to"
+    )
+    yield _same(
+        "rigid motion", s, s.traced, (pose(s.state), rates(s.rate), rates(s.acceleration)), remedy
+    )
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     here, there = s.traced.phi(off), s.traced.phi(pose(off))
     parts = s.traced.parts
-    apart = np.array([np.abs(np.linalg.norm(here[a:b], axis=0) - np.linalg.norm(there[a:b], axis=0)) for a, b in parts])
+    apart = np.array(
+        [
+            np.abs(np.linalg.norm(here[a:b], axis=0) - np.linalg.norm(there[a:b], axis=0))
+            for a, b in parts
+        ]
+    )
     names = [s.traced.names[first].split(" row")[0] for first, _ in parts]
     yield judged("residual elsewhere", apart, ROUND_OFF, ROUND_OFF_WHY, names, remedy=remedy)
 
@@ -75,41 +103,75 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
 def axis_lengths(s: Specimen) -> Iterator[Finding]:
     """The same motion, and the same residuals where it is not met, with longer directions.
 
-    A row that is a multiple of what it was has the same solutions, until it is so small or large that nothing meets its tolerance.
+    A row that is a multiple of what it was has the same solutions, until it is so small or large
+    that nothing meets its tolerance.
     """
     long = TracedJoint(stretched(s.joint, 137.0), s.place)
     remedy = "a direction may have any length: use unit() or triad()"
     met = _same("axis lengths", s, long, (s.state, s.rate, s.acceleration), remedy)
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     apart = np.abs(s.traced.phi(off) - long.phi(off))
-    unmet = judged("axis lengths", apart, ROUND_OFF, ROUND_OFF_WHY, s.traced.names, "where it is not met", remedy)
+    unmet = judged(
+        "axis lengths",
+        apart,
+        ROUND_OFF,
+        ROUND_OFF_WHY,
+        s.traced.names,
+        "where it is not met",
+        remedy,
+    )
     yield max(met, unmet, key=lambda each: each.badness)
 
 
 def size_and_place(s: Specimen) -> Iterator[Finding]:
     """The same motion of the joint drawn larger and smaller, and far away."""
-    remedy = "a length that is not declared so is not scaled: declare it by position(), positions() or length()"
+    remedy = (
+        "a length that is not declared so is not scaled: declare it by position(), positions() or"
+        " length()"
+    )
     worst: list[Finding] = []
     for factor in FACTORS:
         large = TracedJoint(s.joint.scaled(factor), s.place.scaled(factor))
-        lengths = np.array([name.endswith(".translation") for name in s.traced.coordinates], dtype=bool)
+        lengths = np.array(
+            [name.endswith(".translation") for name in s.traced.coordinates], dtype=bool
+        )
         state, units = s.state.copy(), np.ones(s.traced.columns)
         for numbers in (state[:3], state[7:10], units[:3], units[6:9]):
             numbers *= factor * s.place.unit
         state[POSES:][lengths] *= factor * s.place.unit
         units[2 * COLUMNS :][lengths] *= factor * s.place.unit
-        worst.append(_same("size", s, large, (state, s.rate, s.acceleration), remedy, units[:, None], f"worst at x {factor:g}"))
+        worst.append(
+            _same(
+                "size",
+                s,
+                large,
+                (state, s.rate, s.acceleration),
+                remedy,
+                units[:, None],
+                f"worst at x {factor:g}",
+            )
+        )
     yield max(worst, key=lambda each: each.badness)
     (a, b), unit = s.place.origins, s.place.unit
     away = Place((tuple(x + AWAY for x in a), tuple(x + AWAY for x in b)), unit)
     remedy = "take arms from the bodies' origins: i.arm(P), j.arm(P), never P itself"
-    yield _same("place", s, TracedJoint(moved(s.joint, AWAY), away), (s.state, s.rate, s.acceleration), remedy)
+    yield _same(
+        "place",
+        s,
+        TracedJoint(moved(s.joint, AWAY), away),
+        (s.state, s.rate, s.acceleration),
+        remedy,
+    )
 
 
 def named_coordinates(s: Specimen) -> Iterator[Finding]:
-    """The same motion by the equations with the joint's coordinates as unknowns (mixed formulation)."""
+    """The same motion by the equations with the joint's coordinates as unknowns (mixed
+    formulation).
+    """
     if not isinstance(s.joint, AxialJoint):
-        yield Finding("mixed style", Verdict.SKIP, message="no AxialJoint: it has no coordinates of its own")
+        yield Finding(
+            "mixed style", Verdict.SKIP, message="no AxialJoint: it has no coordinates of its own"
+        )
         return
     mixed = TracedJoint(s.joint, s.place, Style.MIXED)
     own = slice(2 * COLUMNS, None)
@@ -119,8 +181,16 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
     rate = np.concatenate([s.rate[: 2 * COLUMNS], np.zeros_like(state[POSES:])])
     rate[own] = min_norm(jacobian, mixed.nu(state) - times(jacobian, rate), own)
     acceleration = np.concatenate([s.acceleration[: 2 * COLUMNS], np.zeros_like(state[POSES:])])
-    acceleration[own] = min_norm(jacobian, mixed.gamma(state, rate) - times(jacobian, acceleration), own)
-    yield _same("mixed style", s, mixed, (state, rate, acceleration), "mixed() must say the same as primitives(): define both")
+    acceleration[own] = min_norm(
+        jacobian, mixed.gamma(state, rate) - times(jacobian, acceleration), own
+    )
+    yield _same(
+        "mixed style",
+        s,
+        mixed,
+        (state, rate, acceleration),
+        "mixed() must say the same as primitives(): define both",
+    )
 
 
 def _same(
@@ -132,7 +202,9 @@ def _same(
     units: Any = 1.0,
     message: str = "",
 ) -> Finding:
-    """Whether a motion of the specimen satisfies other equations too, and whether these leave as many freedoms."""
+    """Whether a motion of the specimen satisfies other equations too, and whether these leave as
+    many freedoms.
+    """
     worst = np.max(defects(other, *motion, units), axis=0)
     mine = rank(s.exact) - len(s.traced.coordinates)
     theirs = rank(other.rows(motion[0]) * np.reshape(units, (1, 1, -1))) - len(other.coordinates)

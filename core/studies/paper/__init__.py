@@ -1,1 +1,3 @@
-"""The paper's claims: operation counts, round-off and run time of its rows against the textbook's."""
+"""The paper's claims: operation counts, round-off and run time of its rows against the
+textbook's.
+"""

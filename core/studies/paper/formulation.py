@@ -1,4 +1,6 @@
-"""The paper's two claims measured: fewer operations (Table 3), and less round-off. Nothing is timed."""
+"""The paper's two claims measured: fewer operations (Table 3), and less round-off. Nothing is
+timed.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,9 @@ def measure(case: Case, seed: int, states: int) -> Formulation:
     operations = bench_operations.count_operations()
     programs, sweeps = bench_whole.measure_whole(case)
     return Formulation(
-        versions={name: importlib.metadata.version(name) for name in ("kincheck", "numpy", "mpmath")},
+        versions={
+            name: importlib.metadata.version(name) for name in ("kincheck", "numpy", "mpmath")
+        },
         seed=seed,
         states=states,
         digits=DIGITS,
@@ -85,7 +89,12 @@ def measure(case: Case, seed: int, states: int) -> Formulation:
 def report(found: Formulation) -> Report:
     """The results for people."""
     facts = [f"{name} {version}" for name, version in found.versions.items()]
-    facts += [f"seed {found.seed}", f"{found.states} states", f"{found.digits} digits", f"case {found.case}"]
+    facts += [
+        f"seed {found.seed}",
+        f"{found.states} states",
+        f"{found.digits} digits",
+        f"case {found.case}",
+    ]
     sections = [
         Section(
             "Operations of Table 3",
@@ -93,12 +102,20 @@ def report(found: Formulation) -> Report:
             found.conventions,
             ("", "rows", "way", *STAGES, *(f"{stage}\nunit axes" for stage in STAGES)),
             3,
-            [(c.condition, c.rows, c.way, *_counts(c.general_axes), *_counts(c.unit_axes)) for c in found.operations],
+            [
+                (c.condition, c.rows, c.way, *_counts(c.general_axes), *_counts(c.unit_axes))
+                for c in found.operations
+            ],
         ),
         Section(
             "Operations of the whole mechanism",
             found.verdicts["programs"],
-            ("Floating-point operations of the traced programs for one sample; signs, comparisons and roots included.",),
+            (
+                (
+                    "Floating-point operations of the traced programs for one sample; signs,"
+                    " comparisons and roots included."
+                ),
+            ),
             ("row style", "Newton iteration", "velocities and accelerations"),
             1,
             [(each.style, str(each.newton), str(each.motion)) for each in found.programs],
@@ -107,13 +124,32 @@ def report(found: Formulation) -> Report:
             "Round-off of rows",
             found.verdicts["roundoff"],
             (
-                f"Absolute error of float64 against {found.digits} digits: same equations, same inputs, from Euler parameters "
-                f"on. Largest entry of the rows in each of {found.states} random states; root mean square and maximum over these. "
-                "Arms, velocities and rates are near one [m, m/s, rad/s]; dot products as printed are multiplied out.",
+                (
+                    f"Absolute error of float64 against {found.digits} digits: same equations, same"
+                    " inputs, from Euler parameters on. Largest entry of the rows in each of"
+                    f" {found.states} random states; root mean square and maximum over these. Arms,"
+                    " velocities and rates are near one [m, m/s, rad/s]; dot products as printed"
+                    " are multiplied out."
+                ),
             ),
-            ("", "rows", "way", "|r| [m]", *(f"{name}\n{kind}" for name in MEASURED for kind in ("rms", "max"))),
+            (
+                "",
+                "rows",
+                "way",
+                "|r| [m]",
+                *(f"{name}\n{kind}" for name in MEASURED for kind in ("rms", "max")),
+            ),
             4,
-            [(e.condition, e.rows, e.way, "–" if e.distance is None else f"{e.distance:.0e}", *_errors(e)) for e in found.roundoff],
+            [
+                (
+                    e.condition,
+                    e.rows,
+                    e.way,
+                    "–" if e.distance is None else f"{e.distance:.0e}",
+                    *_errors(e),
+                )
+                for e in found.roundoff
+            ],
         ),
         Section(
             "Errors of the whole sweep",
@@ -121,7 +157,10 @@ def report(found: Formulation) -> Report:
             ("Largest error over outputs and samples, against the reference of the case.",),
             ("row style", "place", *(f"{name} [{motion_unit('m', name)}]" for name in QUANTITIES)),
             2,
-            [(s.style, s.place, *(f"{getattr(s, name):.1e}" for name in QUANTITIES)) for s in found.sweeps],
+            [
+                (s.style, s.place, *(f"{getattr(s, name):.1e}" for name in QUANTITIES))
+                for s in found.sweeps
+            ],
         ),
     ]
     return Report(NAME, "Operation counts and round-off of SAE 943745, measured", facts, sections)
@@ -135,4 +174,8 @@ def _counts(found: Operations | None) -> list[str]:
 
 
 def _errors(found: RoundOff) -> list[str]:
-    return [f"{value:.1e}" for each in (found.residual, found.jacobian, found.gamma) for value in (each.rms, each.max)]
+    return [
+        f"{value:.1e}"
+        for each in (found.residual, found.jacobian, found.gamma)
+        for value in (each.rms, each.max)
+    ]

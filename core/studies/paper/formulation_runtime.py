@@ -1,4 +1,6 @@
-"""A whole mechanism in every row style: the size of its programs, and the errors of its sweep, as designed and far away."""
+"""A whole mechanism in every row style: the size of its programs, and the errors of its sweep, as
+designed and far away.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,18 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ...trajectory import QUANTITIES, Array, Trajectory
 
 FAR: Vector = (0.6e6, -0.7e6, 0.39e6)
-AT_DESIGN, AWAY, BACK, DIFFERENCE = "as designed", "1e6 m away", "moved back from there", "away less moved back"
+AT_DESIGN, AWAY, BACK, DIFFERENCE = (
+    "as designed",
+    "1e6 m away",
+    "moved back from there",
+    "away less moved back",
+)
 
 
 class ProgramSize(msgspec.Struct, frozen=True):
-    """Floating-point operations of a mechanism's programs: an iteration of Newton's, and rates with accelerations."""
+    """Floating-point operations of a mechanism's programs: an iteration of Newton's, and rates with
+    accelerations.
+    """
 
     style: str
     newton: int
@@ -31,7 +40,9 @@ class ProgramSize(msgspec.Struct, frozen=True):
 
 
 class SweepError(msgspec.Struct, frozen=True):
-    """Largest error of the outputs over a sweep [m, m/s, m/s^2]; DIFFERENCE: between the sweeps away and back."""
+    """Largest error of the outputs over a sweep [m, m/s, m/s^2]; DIFFERENCE: between the sweeps
+    away and back.
+    """
 
     style: str
     place: str
@@ -47,19 +58,33 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
         SolveError: a sweep does not reach all its samples.
     """
     away = _moved(case.mechanism, FAR)
-    back = _moved(away, (-FAR[0], -FAR[1], -FAR[2]))  # exact: what was lost in going there stays lost
+    # exact: what was lost in going there stays lost
+    back = _moved(away, (-FAR[0], -FAR[1], -FAR[2]))
     places = {AT_DESIGN: case.mechanism, AWAY: away, BACK: back}
     programs: list[ProgramSize] = []
     sweeps: list[SweepError] = []
     for style in Style:
         found = {place: _swept(case, mechanism, style) for place, mechanism in places.items()}
-        # where positions alone are asked for, rates are a program of their own: it is run where the motion begins
+        # where positions alone are asked for, rates are a program of their own: it is run where the
+        # motion begins
         size = solve(
-            case.mechanism, case.sweep.driver, [case.mechanism.design_value(case.sweep.driver)], order=0, style=style
+            case.mechanism,
+            case.sweep.driver,
+            [case.mechanism.design_value(case.sweep.driver)],
+            order=0,
+            style=style,
         ).details["program"]
         programs.append(ProgramSize(style.value, size["newton"]["flops"], size["tangent"]["flops"]))
-        outputs = {place: _outputs(replace(case, mechanism=places[place]), each) for place, each in found.items()}
-        reference = np.array([[getattr(case.reference[output.name], name) for name in QUANTITIES] for output in case.outputs])
+        outputs = {
+            place: _outputs(replace(case, mechanism=places[place]), each)
+            for place, each in found.items()
+        }
+        reference = np.array(
+            [
+                [getattr(case.reference[output.name], name) for name in QUANTITIES]
+                for output in case.outputs
+            ]
+        )
         for place in places:
             sweeps.append(SweepError(style.value, place, *_largest(outputs[place] - reference)))
         sweeps.append(SweepError(style.value, DIFFERENCE, *_largest(outputs[AWAY] - outputs[BACK])))
@@ -71,7 +96,10 @@ def _swept(case: Case, mechanism: Mechanism, style: str) -> Trajectory:
     values = sweep.change + mechanism.design_value(sweep.driver)
     found = solve(mechanism, sweep.driver, values, rate=sweep.rate, points=case.points, style=style)
     if not found.solved.all():
-        raise SolveError(f"bench formulation: case {case.name!r}, style {style!r}: {found.message}; choose a sweep it can finish")
+        raise SolveError(
+            f"bench formulation: case {case.name!r}, style {style!r}: {found.message}; choose a"
+            " sweep it can finish"
+        )
     return found
 
 
@@ -95,7 +123,9 @@ def _moved(mechanism: Mechanism, by: Vector) -> Mechanism:
     return replace(
         mechanism,
         bodies=[replace(body, origin=shifted(body.origin)) for body in mechanism.bodies],
-        joints=[replace(joint, **joint.mapped({Kind.POSITION: shifted})) for joint in mechanism.joints],
+        joints=[
+            replace(joint, **joint.mapped({Kind.POSITION: shifted})) for joint in mechanism.joints
+        ],
         points=[replace(point, position=shifted(point.position)) for point in mechanism.points],
     )
 
@@ -105,10 +135,16 @@ def verdict_on_programs(programs: Iterable[ProgramSize]) -> list[str]:
     by = {each.style: each.newton for each in programs}
     full, paper, native = (by[style] for style in ("conventional", "paper", "native"))
     return [
-        f"One Newton iteration, elimination included: {full} operations conventional, {paper} with the paper's rows "
-        f"({full / paper:.1f} times fewer), {native} with the native ones ({paper / native:.1f} times fewer again): in global axes "
-        "their blocks are constants, which the elimination makes use of.",
-        "All are traced alike: no grounded bodies, nothing twice, no arm where a body's origin is its joint. Rows alone differ.",
+        (
+            f"One Newton iteration, elimination included: {full} operations conventional, {paper}"
+            f" with the paper's rows ({full / paper:.1f} times fewer), {native} with the native"
+            f" ones ({paper / native:.1f} times fewer again): in global axes their blocks are"
+            " constants, which the elimination makes use of."
+        ),
+        (
+            "All are traced alike: no grounded bodies, nothing twice, no arm where a body's origin"
+            " is its joint. Rows alone differ."
+        ),
     ]
 
 
@@ -117,11 +153,23 @@ def verdict_on_sweeps(sweeps: Iterable[SweepError]) -> list[str]:
     sweeps = list(sweeps)
 
     def errors(place: str, pick: Callable[[Iterable[float]], float] = max) -> str:
-        values = (pick(getattr(each, name) for each in sweeps if each.place == place) for name in QUANTITIES)
-        return ", ".join(f"{each:.1e} {motion_unit('m', name)}" for each, name in zip(values, QUANTITIES, strict=True))
+        values = (
+            pick(getattr(each, name) for each in sweeps if each.place == place)
+            for name in QUANTITIES
+        )
+        return ", ".join(
+            f"{each:.1e} {motion_unit('m', name)}"
+            for each, name in zip(values, QUANTITIES, strict=True)
+        )
 
     return [
-        f"Errors of the best row style: {errors(AT_DESIGN, min)}; of the worst: {errors(AT_DESIGN)}.",
-        f"1e6 m away, at worst: {errors(AWAY)}; with the points as rounded there, moved back: {errors(BACK)}; between the two: "
-        f"{errors(DIFFERENCE)}. Rounding the points, and positions on output, costs the digits; the rows do not see the distance.",
+        (
+            f"Errors of the best row style: {errors(AT_DESIGN, min)}; of the worst:"
+            f" {errors(AT_DESIGN)}."
+        ),
+        (
+            f"1e6 m away, at worst: {errors(AWAY)}; with the points as rounded there, moved back:"
+            f" {errors(BACK)}; between the two: {errors(DIFFERENCE)}. Rounding the points, and"
+            " positions on output, costs the digits; the rows do not see the distance."
+        ),
     ]

@@ -1,7 +1,8 @@
 """Table 3 counted: multiplications and additions of the rows between two moving bodies.
 
-Two counters. One traces the rows as the solver does and counts the operations of the program: equal ones are shared, zeros and ones
-fold. The other counts each operation that is executed, and so multiplies full matrices out. For both, A of either body is given.
+Two counters. One traces the rows as the solver does and counts the operations of the program: equal
+ones are shared, zeros and ones fold. The other counts each operation that is executed, and so
+multiplies full matrices out. For both, A of either body is given.
 """
 
 from __future__ import annotations
@@ -21,24 +22,42 @@ from ...program import Tape, program
 from .textbook import Countable, Given, PrintedDot11, PrintedDot12, PrintedDot21, conditions
 
 CONVENTIONS = (
-    "Multiplications and additions for one pair of moving bodies; signs are free; A(p) of both bodies is given. "
-    "J: the rows. velocity: J and Jv. acceleration: J, gamma and Ja - gamma. gamma: that alone, from A.",
-    "dot products: d10 or d20 for each row, nothing simplified. simplified: the rows of d11, d12 and d21.",
-    "as printed: each row by itself, a vector times full matrices from the left, zeros of skew matrices included; only d, the line "
-    "between the points, and A a are kept. multiplied out: A_i^T A_j is formed wherever it is printed (45 operations); from the "
-    "left: the vector goes through both factors (30). d12 takes A_i^T A_j as a constant that is given.",
-    "traced: the rows as the solver has them. What is equal is done once, over all rows and stages of a line; zeros and ones fold; "
-    "what constants make among themselves is done beforehand. Body axes are parallel at design, where P_i and P_j coincide. "
-    "conventional and paper's axes form A_i^T A_j once (45); native axes are global and need none.",
-    "general axes: f, g, h and the arms are general numbers. unit axes: f, g, h are the axes of the bodies.",
+    (
+        "Multiplications and additions for one pair of moving bodies; signs are free; A(p) of both"
+        " bodies is given. J: the rows. velocity: J and Jv. acceleration: J, gamma and Ja - gamma."
+        " gamma: that alone, from A."
+    ),
+    (
+        "dot products: d10 or d20 for each row, nothing simplified. simplified: the rows of d11,"
+        " d12 and d21."
+    ),
+    (
+        "as printed: each row by itself, a vector times full matrices from the left, zeros of skew"
+        " matrices included; only d, the line between the points, and A a are kept. multiplied out:"
+        " A_i^T A_j is formed wherever it is printed (45 operations); from the left: the vector"
+        " goes through both factors (30). d12 takes A_i^T A_j as a constant that is given."
+    ),
+    (
+        "traced: the rows as the solver has them. What is equal is done once, over all rows and"
+        " stages of a line; zeros and ones fold; what constants make among themselves is done"
+        " beforehand. Body axes are parallel at design, where P_i and P_j coincide. conventional"
+        " and paper's axes form A_i^T A_j once (45); native axes are global and need none."
+    ),
+    (
+        "general axes: f, g, h and the arms are general numbers. unit axes: f, g, h are the axes of"
+        " the bodies."
+    ),
 )
 
-# A figure of Table 3 is met nearly if a count differs by a few operations in a hundred: a sum or a sign counted otherwise.
+# A figure of Table 3 is met nearly if a count differs by a few operations in a hundred: a sum or a
+# sign counted otherwise.
 NEARLY = 0.03
 
 
 class Operations(msgspec.Struct, frozen=True):
-    """Multiplications and additions of each stage, as CONVENTIONS say; null where it is not known."""
+    """Multiplications and additions of each stage, as CONVENTIONS say; null where it is not
+    known.
+    """
 
     jacobian: int
     velocity: int
@@ -63,12 +82,19 @@ class Counted(msgspec.Struct, frozen=True):
 
 
 DOTS, SIMPLIFIED = "dot products", "simplified"
-TABLE_3, MULTIPLIED_OUT, FROM_THE_LEFT = "printed in Table 3", "as printed, multiplied out", "as printed, from the left"
+TABLE_3, MULTIPLIED_OUT, FROM_THE_LEFT = (
+    "printed in Table 3",
+    "as printed, multiplied out",
+    "as printed, from the left",
+)
 AXES = {"conventional": "conventional", "paper": "paper's axes", "native": "native axes"}
 TRACED = {style: f"{axes}, traced" for style, axes in AXES.items()}
-"""Row style -> how its counts are named: full products, or vector products in body axes, or those in global axes."""
+"""Row style -> how its counts are named: full products, or vector products in body axes, or those
+in global axes.
+"""
 
-# d10's velocity is printed as "-159"; d21's acceleration may have lost a zero (formulation section 8.1).
+# d10's velocity is printed as "-159"; d21's acceleration may have lost a zero (formulation section
+# 8.1).
 PRINTED = {
     "d10": Operations(150, 159, 277),
     "d11": Operations(48, 57, 137),
@@ -79,7 +105,9 @@ PRINTED = {
 
 
 class Executed:
-    """A scalar that counts what is done with it. A literal one multiplies for free, and so does a sign."""
+    """A scalar that counts what is done with it. A literal one multiplies for free, and so does a
+    sign.
+    """
 
     def __init__(self, tally: list[int]) -> None:
         self.tally = tally
@@ -123,7 +151,9 @@ class Pair:
 
 
 def executed(equations: Sequence[Countable], pair: Pair, tally: list[int]) -> Operations:
-    """Operations of rows as they are executed, one after the other; the tally is what the pair's numbers add to."""
+    """Operations of rows as they are executed, one after the other; the tally is what the pair's
+    numbers add to.
+    """
 
     def cost(values: Callable[[], Sequence[Any]]) -> tuple[int, Sequence[Any]]:
         before, found = tally[0], values()
@@ -131,7 +161,9 @@ def executed(equations: Sequence[Countable], pair: Pair, tally: list[int]) -> Op
 
     jacobian, rows = cost(lambda: [row for each in equations for row in each.rows(pair.i, pair.j)])
     velocity, _ = cost(lambda: _times(rows, pair.vi, pair.vj))
-    gamma, right = cost(lambda: [x for each in equations for x in each.gamma(pair.i, pair.j, pair.vi, pair.vj)])
+    gamma, right = cost(
+        lambda: [x for each in equations for x in each.gamma(pair.i, pair.j, pair.vi, pair.vj)]
+    )
     acceleration, _ = cost(lambda: _less(_times(rows, pair.ai, pair.aj), right))
     return Operations(jacobian, jacobian + velocity, jacobian + gamma + acceleration, gamma)
 
@@ -148,12 +180,19 @@ def traced(equations: Sequence[Countable]) -> Operations:
         found = program("counted", tape, dict(enumerate(values))).operations
         return found["+"] + found["-"] + found["*"]
 
-    velocity, acceleration = _times(rows, pair.vi, pair.vj), _less(_times(rows, pair.ai, pair.aj), gamma)
-    return Operations(cost(entries), cost([*entries, *velocity]), cost([*entries, *acceleration]), cost(gamma))
+    velocity, acceleration = (
+        _times(rows, pair.vi, pair.vj),
+        _less(_times(rows, pair.ai, pair.aj), gamma),
+    )
+    return Operations(
+        cost(entries), cost([*entries, *velocity]), cost([*entries, *acceleration]), cost(gamma)
+    )
 
 
 def _times(rows: Sequence[Row], i: Twist, j: Twist) -> list[Scalar]:
-    """The rows times the velocities or accelerations of both bodies; blocks of zeros are left out."""
+    """The rows times the velocities or accelerations of both bodies; blocks of zeros are left
+    out.
+    """
     found: list[Scalar] = []
     for row in rows:
         terms = [
@@ -168,26 +207,38 @@ def _times(rows: Sequence[Row], i: Twist, j: Twist) -> list[Scalar]:
 
 def _less(left: Sequence[Scalar], right: Sequence[Scalar]) -> list[Scalar]:
     """Differences, but for a right-hand side that is literally zero."""
-    return [a if isinstance(b, float) and b == 0.0 else a - b for a, b in zip(left, right, strict=True)]
+    return [
+        a if isinstance(b, float) and b == 0.0 else a - b for a, b in zip(left, right, strict=True)
+    ]
 
 
 def count_operations() -> list[Counted]:
     """Table 3 beside our counts, condition by condition."""
-    found = [Counted(name, SIMPLIFIED if name in ("d11", "d12", "d21") else DOTS, TABLE_3, each) for name, each in PRINTED.items()]
+    found = [
+        Counted(name, SIMPLIFIED if name in ("d11", "d12", "d21") else DOTS, TABLE_3, each)
+        for name, each in PRINTED.items()
+    ]
     tally = [0]
     pair = Pair.of(lambda: Executed(tally))
-    for name, rows, way, equations in _as_printed(lambda: Vec3(*(Executed(tally) for _ in range(3)))):
+    for name, rows, way, equations in _as_printed(
+        lambda: Vec3(*(Executed(tally) for _ in range(3)))
+    ):
         found.append(Counted(name, rows, way, executed(equations, pair, tally)))
     # general numbers: no two equal, none a sum or a product of others
     f, g, h, s_i, s_j = (Vec3(0.137 + k, -0.731 * k - 0.29, 0.457 - 1.193 * k) for k in range(5))
     for both in zip(conditions(f, g, h, s_i, s_j), conditions(X, Y, Z, s_i, s_j), strict=True):
         for style, way in TRACED.items():
-            found.append(Counted(both[0].name, DOTS, way, *(traced(each.unsimplified(style)) for each in both)))
+            found.append(
+                Counted(
+                    both[0].name, DOTS, way, *(traced(each.unsimplified(style)) for each in both)
+                )
+            )
         if both[0].is_simplified:
             for style in ("paper", "native"):
                 counts = (traced(each.simplified(style)) for each in both)
                 found.append(Counted(both[0].name, SIMPLIFIED, TRACED[style], *counts))
-    return sorted(found, key=lambda each: each.condition)  # stable: within a condition in the order in which they were counted
+    # stable: within a condition in the order in which they were counted
+    return sorted(found, key=lambda each: each.condition)
 
 
 def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Sequence[Countable]]]:
@@ -206,7 +257,9 @@ def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Seq
 def verdict(counts: Sequence[Counted]) -> list[str]:
     """What the counts say; every figure in it is one of them."""
     by = {(each.condition, each.rows, each.way): each.general_axes for each in counts}
-    simplified = [each.condition for each in counts if each.rows == SIMPLIFIED and each.way == TABLE_3]
+    simplified = [
+        each.condition for each in counts if each.rows == SIMPLIFIED and each.way == TABLE_3
+    ]
     said: list[str] = []
     products: list[float] = []
     geometry: list[float] = []
@@ -221,9 +274,16 @@ def verdict(counts: Sequence[Counted]) -> list[str]:
                 geometry += [dots / simple] if simple else []
             said.append(f"{letter} in {AXES[style]}: {', '.join(steps)}")
     return [
-        f"Full matrices multiplied out > the same dot products by vectors, nothing twice > simplified: {'; '.join(said)}.",
-        f"Not multiplying full matrices, and nothing twice, gains a factor of {min(products):.1f} to {max(products):.1f}; the "
-        f"simplification itself {min(geometry):.1f} to {max(geometry):.1f}, and everything where nothing is left (d12).",
+        (
+            "Full matrices multiplied out > the same dot products by vectors, nothing twice >"
+            f" simplified: {'; '.join(said)}."
+        ),
+        (
+            "Not multiplying full matrices, and nothing twice, gains a factor of"
+            f" {min(products):.1f} to {max(products):.1f}; the simplification itself"
+            f" {min(geometry):.1f} to {max(geometry):.1f}, and everything where nothing is left"
+            " (d12)."
+        ),
         _met(counts, by["d21", SIMPLIFIED, MULTIPLIED_OUT].gamma),
     ]
 
@@ -233,15 +293,24 @@ def _met(counts: Sequence[Counted], gamma: int | None) -> str:
     met: list[str] = []
     nearly: list[str] = []
     for name, row in PRINTED.items():
-        ours = [o for c in counts if c.condition == name and c.way != TABLE_3 for o in (c.general_axes, c.unit_axes) if o]
+        ours = [
+            o
+            for c in counts
+            if c.condition == name and c.way != TABLE_3
+            for o in (c.general_axes, c.unit_axes)
+            if o
+        ]
         for stage in ("jacobian", "velocity", "acceleration"):
             value = getattr(row, stage)
-            nearest = min((getattr(each, stage) for each in ours), key=lambda each: abs(each - value))
+            nearest = min(
+                (getattr(each, stage) for each in ours), key=lambda each: abs(each - value)
+            )
             if nearest == value:
                 met.append(f"{name} {stage} {value}")
             elif abs(nearest - value) <= NEARLY * value:
                 nearly.append(f"{name} {stage} {value} ({nearest})")
     return (
-        f"No one convention gives Table 3. Of its 15 figures some count meets {len(met)} ({', '.join(met)}), and {len(nearly)} to "
-        f"{NEARLY:.0%} ({', '.join(nearly)}). d21's acceleration, 18, is less than its Jacobian: gamma as printed takes {gamma}."
+        f"No one convention gives Table 3. Of its 15 figures some count meets {len(met)}"
+        f" ({', '.join(met)}), and {len(nearly)} to {NEARLY:.0%} ({', '.join(nearly)}). d21's"
+        f" acceleration, 18, is less than its Jacobian: gamma as printed takes {gamma}."
     )

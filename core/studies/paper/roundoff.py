@@ -1,8 +1,9 @@
-"""Round-off of rows: float64 against the same equations in 50-digit arithmetic, on exactly the same inputs.
+"""Round-off of rows: float64 against the same equations in 50-digit arithmetic, on exactly the same
+inputs.
 
-Two bodies where the condition holds, but for a tilt as it is left before Newton's last iteration, so that no product cancels
-by luck; admissible velocities of 1 m/s and 1 rad/s in size. Poses are made from Euler parameters in either arithmetic, so that the
-rounding of A(p) counts too.
+Two bodies where the condition holds, but for a tilt as it is left before Newton's last iteration,
+so that no product cancels by luck; admissible velocities of 1 m/s and 1 rad/s in size. Poses are
+made from Euler parameters in either arithmetic, so that the rounding of A(p) counts too.
 """
 
 from __future__ import annotations
@@ -25,16 +26,21 @@ from .textbook import Condition, conditions
 DIGITS = 50
 DISTANCES = (1.0, 1e3, 1e6)
 TILT = 1e-6
-# Arms and positions are on a grid that holds all of 1e6 m in 53 digits: sums and differences of them are exact, and so all ways get
-# the same inputs, be they displacements from the design or positions.
+# Arms and positions are on a grid that holds all of 1e6 m in 53 digits: sums and differences of
+# them are exact, and so all ways get the same inputs, be they displacements from the design or
+# positions.
 GRID = 2.0**32
 
 WAYS = {"printed": "as printed", **AXES}
-"""Row style -> how it is named. As printed, (22) is summed from the left; the row styles take r_j - r_i first."""
+"""Row style -> how it is named. As printed, (22) is summed from the left; the row styles take r_j -
+r_i first.
+"""
 
 
 class Error(msgspec.Struct, frozen=True):
-    """Largest absolute error over the entries of the rows of one state: root mean square and maximum over the states."""
+    """Largest absolute error over the entries of the rows of one state: root mean square and
+    maximum over the states.
+    """
 
     rms: float
     max: float
@@ -59,7 +65,9 @@ class RoundOff(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Moving:
-    """A body on its way: position, Euler parameters, velocity and angular velocity, global axes; lanes of states."""
+    """A body on its way: position, Euler parameters, velocity and angular velocity, global axes;
+    lanes of states.
+    """
 
     u: Vec3
     q: Quat
@@ -68,7 +76,11 @@ class Moving:
 
     def motion(self, body_axes: bool) -> Twist:
         """The velocities as rows take them."""
-        return Twist(self.v, Pose.of(self.u, self.q).A.T @ self.w) if body_axes else Twist(self.v, self.w)
+        return (
+            Twist(self.v, Pose.of(self.u, self.q).A.T @ self.w)
+            if body_axes
+            else Twist(self.v, self.w)
+        )
 
 
 @dataclass(frozen=True)
@@ -95,17 +107,28 @@ def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
         mpmath: Any = importlib.import_module("mpmath")
     except ImportError:
         raise KincheckError(
-            "bench formulation: mpmath is not installed, expected for the 50-digit arithmetic; pip install mpmath"
+            "bench formulation: mpmath is not installed, expected for the 50-digit arithmetic; pip"
+            " install mpmath"
         ) from None
     found: list[RoundOff] = []
     with mpmath.workdps(DIGITS):
         for number, name in enumerate(("d10", "d11", "d12", "d20", "d21")):
             for distance in DISTANCES if name in ("d20", "d21") else DISTANCES[:1]:
-                known = _states(np.random.default_rng(seed), states, distance, turning=name in ("d10", "d11"))
+                known = _states(
+                    np.random.default_rng(seed), states, distance, turning=name in ("d10", "d11")
+                )
                 for rows, style, equations in _written(known.conditions[number]):
                     j = replace(known.j, u=known.e0 + known.j.u) if style == "printed" else known.j
                     errors = _errors(equations, known.i, j, mpmath.mpf)
-                    found.append(RoundOff(name, rows, WAYS[style], distance if name in ("d20", "d21") else None, *errors))
+                    found.append(
+                        RoundOff(
+                            name,
+                            rows,
+                            WAYS[style],
+                            distance if name in ("d20", "d21") else None,
+                            *errors,
+                        )
+                    )
     return found
 
 
@@ -118,7 +141,9 @@ def _written(condition: Condition) -> Iterator[tuple[str, str, Sequence[Any]]]:
         yield SIMPLIFIED, style, condition.simplified(style)
 
 
-def _errors(equations: Sequence[Any], i: Moving, j: Moving, exact: Callable[[Any], Any]) -> list[Error]:
+def _errors(
+    equations: Sequence[Any], i: Moving, j: Moving, exact: Callable[[Any], Any]
+) -> list[Error]:
     """Errors of residual, Jacobian and gamma."""
     to_exact = cast("Callable[[Any], Any]", np.frompyfunc(exact, 1, 1))
     motions = [each.motion(equations[0].body_axes) for each in (i, j)]
@@ -133,7 +158,9 @@ def _errors(equations: Sequence[Any], i: Moving, j: Moving, exact: Callable[[Any
     return found
 
 
-def _values(equations: Sequence[Any], bodies: Sequence[Moving], motions: Sequence[Twist]) -> tuple[list[Any], ...]:
+def _values(
+    equations: Sequence[Any], bodies: Sequence[Moving], motions: Sequence[Twist]
+) -> tuple[list[Any], ...]:
     """Residuals, entries of the Jacobian and right-hand sides."""
     pair = [Pose.of(body.u, body.q) for body in bodies]
     return (
@@ -148,7 +175,10 @@ def _mapped(number: Callable[[Any], Any], value: Any) -> Any:
     if isinstance(value, list):
         return [_mapped(number, each) for each in cast("list[Any]", value)]
     if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{each.name: _mapped(number, getattr(value, each.name)) for each in fields(value)})
+        return replace(
+            value,
+            **{each.name: _mapped(number, getattr(value, each.name)) for each in fields(value)},
+        )
     return value if isinstance(value, bool) else number(value)
 
 
@@ -170,9 +200,17 @@ def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool)
     h = unit(vector())
     f = unit(cross(vector(), h))
     s_i, s_j = gridded(vector()), gridded(vector())
-    u, q = gridded(distance * unit(vector())), rotation(unit(vector()), rng.uniform(-np.pi, np.pi, n))
+    u, q = (
+        gridded(distance * unit(vector())),
+        rotation(unit(vector()), rng.uniform(-np.pi, np.pi, n)),
+    )
     i = Moving(u, q, vector(), vector())
-    angle, slide, rate, tilt = rng.uniform(-np.pi, np.pi, n), rng.normal(size=n), rng.normal(size=n), unit(vector())
+    angle, slide, rate, tilt = (
+        rng.uniform(-np.pi, np.pi, n),
+        rng.normal(size=n),
+        rng.normal(size=n),
+        unit(vector()),
+    )
     turn = Pose.of(i.u, i.q).turn
     e0, axis, w, tilted = s_i - s_j, turn(h), i.w + TILT * tilt, rotation(tilt, TILT) * i.q
     if turning:
@@ -189,22 +227,41 @@ def verdict(errors: Iterable[RoundOff]) -> list[str]:
     near = (("d11", None), ("d21", DISTANCES[0]))
 
     def gain(name: str, at: float | None, quantity: str, dots: str, simplified: str) -> float:
-        rough, simple = (by[name, *key, at] for key in ((DOTS, WAYS[dots]), (SIMPLIFIED, WAYS[simplified])))
+        rough, simple = (
+            by[name, *key, at] for key in ((DOTS, WAYS[dots]), (SIMPLIFIED, WAYS[simplified]))
+        )
         return getattr(rough, quantity).rms / getattr(simple, quantity).rms
 
     def gains(dots: str, simplified: str) -> str:
-        return ", ".join(f"{name} {gain(name, at, 'gamma', dots, simplified):.1f}" for name, at in near)
+        return ", ".join(
+            f"{name} {gain(name, at, 'gamma', dots, simplified):.1f}" for name, at in near
+        )
 
-    others = [gain(name, at, quantity, "printed", "paper") for name, at in near for quantity in ("residual", "jacobian")]
-    last, first = ([by["d20", DOTS, WAYS[way], at].residual.rms for at in DISTANCES] for way in ("printed", "conventional"))
+    others = [
+        gain(name, at, quantity, "printed", "paper")
+        for name, at in near
+        for quantity in ("residual", "jacobian")
+    ]
+    last, first = (
+        [by["d20", DOTS, WAYS[way], at].residual.rms for at in DISTANCES]
+        for way in ("printed", "conventional")
+    )
     return [
-        f"rms error of gamma, dot products over simplified rows: {gains('printed', 'paper')} as printed over the paper's; by "
-        f"vector products {gains('paper', 'paper')} in paper's axes, {gains('native', 'native')} in native axes. Of residual and "
-        f"Jacobian, as printed over the paper's: {min(others):.1f} to {max(others):.1f}.",
-        f"(22) as printed, positions summed one by one, loses digits with the distance: {_told(last)} m. With r_j - r_i first: "
-        f"{_told(first)} m, unsimplified. The order of the sum keeps the digits, not the simplification.",
+        (
+            f"rms error of gamma, dot products over simplified rows: {gains('printed', 'paper')} as"
+            f" printed over the paper's; by vector products {gains('paper', 'paper')} in paper's"
+            f" axes, {gains('native', 'native')} in native axes. Of residual and Jacobian, as"
+            f" printed over the paper's: {min(others):.1f} to {max(others):.1f}."
+        ),
+        (
+            "(22) as printed, positions summed one by one, loses digits with the distance:"
+            f" {_told(last)} m. With r_j - r_i first: {_told(first)} m, unsimplified. The order of"
+            " the sum keeps the digits, not the simplification."
+        ),
     ]
 
 
 def _told(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:.0e} at {distance:.0e}" for value, distance in zip(values, DISTANCES, strict=True))
+    return ", ".join(
+        f"{value:.0e} at {distance:.0e}" for value, distance in zip(values, DISTANCES, strict=True)
+    )

@@ -1,7 +1,9 @@
-"""The rows of Tables 1 and 2 as they are printed (as corrected, formulation section 9): full matrices, multiplied from the left.
+"""The rows of Tables 1 and 2 as they are printed (as corrected, formulation section 9): full
+matrices, multiplied from the left.
 
-Nothing is shared and no zero of a skew matrix is left out. No style to solve with: the paper's operation counts and its remark on
-round-off are about these. Body axes, with A_ij = A_i^T A_j and W = skew(w):
+Nothing is shared and no zero of a skew matrix is left out. No style to solve with: the paper's
+operation counts and its remark on round-off are about these. Body axes, with A_ij = A_i^T A_j and W
+= skew(w):
 
     dot10   [ 0 | -b^T A_ji skew(a) | 0 | -a^T A_ij skew(b) ]
             gamma = -b^T [ A_ji W_i W_i + W_j W_j A_ji ] a + 2 w_j^T skew(b) A_ji skew(a) w_i
@@ -24,7 +26,19 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from ...algebra import ZERO, Mat3, Scalar, Vec3, X, Y, Z
-from ...primitives import Dot10, Dot11, Dot12, Dot20, Dot21, Pose, Primitive, Row, Twist, conventional, paper
+from ...primitives import (
+    Dot10,
+    Dot11,
+    Dot12,
+    Dot20,
+    Dot21,
+    Pose,
+    Primitive,
+    Row,
+    Twist,
+    conventional,
+    paper,
+)
 
 
 class Countable(Protocol):
@@ -53,7 +67,9 @@ def chain(row: Vec3, *factors: Mat3) -> Vec3:
 
 @dataclass(frozen=True, kw_only=True)
 class AsPrinted:
-    """formed: A_ij is multiplied out wherever it is printed; else a row goes through A_i^T and then A_j."""
+    """formed: A_ij is multiplied out wherever it is printed; else a row goes through A_i^T and then
+    A_j.
+    """
 
     body_axes: ClassVar[bool] = True
     formed: bool = True
@@ -82,7 +98,10 @@ class PrintedDot10(AsPrinted):
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """(12)."""
         a, b, W_i, W_j = self.a, self.b, skew(vi.w), skew(vj.w)
-        turning = chain(b, *self.relative(j, i), W_i, W_i) @ a + chain(b, W_j, W_j, *self.relative(j, i)) @ a
+        turning = (
+            chain(b, *self.relative(j, i), W_i, W_i) @ a
+            + chain(b, W_j, W_j, *self.relative(j, i)) @ a
+        )
         return (2.0 * (chain(vj.w, skew(b), *self.relative(j, i), skew(a)) @ vi.w) - turning,)
 
 
@@ -111,8 +130,13 @@ class PrintedDot20(AsPrinted):
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Table 2."""
         a, W_i, W_j = self.a, skew(vi.w), skew(vj.w)
-        sliding = chain(vi.w, skew(a), i.A.T) @ (vi.v - vj.v) + chain(self.s_j, W_j, *self.relative(j, i), W_i) @ a
-        turning = chain(self.s_i, W_i, W_i) @ a + chain(self.s_j, W_j, W_j, *self.relative(j, i)) @ a
+        sliding = (
+            chain(vi.w, skew(a), i.A.T) @ (vi.v - vj.v)
+            + chain(self.s_j, W_j, *self.relative(j, i), W_i) @ a
+        )
+        turning = (
+            chain(self.s_i, W_i, W_i) @ a + chain(self.s_j, W_j, W_j, *self.relative(j, i)) @ a
+        )
         return (2.0 * sliding - turning - chain(self.d(i, j), i.A, W_i, W_i) @ a,)
 
 
@@ -130,7 +154,9 @@ class PrintedDot11(AsPrinted):
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """(16)."""
-        first, second = (chain(skew(vi.w) @ a, *self.relative(i, j)) @ vj.w for a in (self.f, self.g))
+        first, second = (
+            chain(skew(vi.w) @ a, *self.relative(i, j)) @ vj.w for a in (self.f, self.g)
+        )
         return first, -second
 
 
@@ -142,7 +168,10 @@ class PrintedDot12:
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         """(21)."""
-        return tuple(Row(ZERO, e, ZERO, -c) for e, c in zip((X, Y, Z), (self.C.x, self.C.y, self.C.z), strict=True))
+        return tuple(
+            Row(ZERO, e, ZERO, -c)
+            for e, c in zip((X, Y, Z), (self.C.x, self.C.y, self.C.z), strict=True)
+        )
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Zero."""
@@ -167,7 +196,10 @@ class PrintedDot21:
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Table 2."""
         e, e_t, W_i = j.u - i.u, vj.v - vi.v, skew(vi.w)
-        return tuple(2.0 * (chain(e_t, i.A, skew(a)) @ vi.w) + chain(e, i.A, W_i, skew(a)) @ vi.w for a in (self.f, self.g))
+        return tuple(
+            2.0 * (chain(e_t, i.A, skew(a)) @ vi.w) + chain(e, i.A, W_i, skew(a)) @ vi.w
+            for a in (self.f, self.g)
+        )
 
 
 class Given(Pose):
@@ -204,7 +236,11 @@ class Condition:
 
     def simplified(self, style: str) -> tuple[Primitive, ...]:
         """The condition as the row style "native" or "paper" has it."""
-        return (self.primitive,) if style == "native" else paper.TWINS[type(self.primitive)](self.primitive)
+        return (
+            (self.primitive,)
+            if style == "native"
+            else paper.TWINS[type(self.primitive)](self.primitive)
+        )
 
     def unsimplified(self, style: str) -> tuple[Primitive, ...]:
         """The scalar products as the row style "native", "paper" or "conventional" has them."""
@@ -214,7 +250,9 @@ class Condition:
         return tuple(twin for dot in self.dots for twin in twins[type(dot)](dot))
 
     def printed(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:
-        """The scalar products as printed; the poses they see hold positions, not displacements from the design."""
+        """The scalar products as printed; the poses they see hold positions, not displacements from
+        the design.
+        """
         return tuple(
             PrintedDot10(each.a, each.b, formed=formed)
             if isinstance(each, Dot10)
@@ -224,7 +262,9 @@ class Condition:
 
 
 def conditions(f: Vec3, g: Vec3, h: Vec3, s_i: Vec3, s_j: Vec3) -> tuple[Condition, ...]:
-    """The conditions of Table 3 for a joint with axes f, g, h and arms s_i, s_j to a point common to both bodies at design."""
+    """The conditions of Table 3 for a joint with axes f, g, h and arms s_i, s_j to a point common
+    to both bodies at design.
+    """
     across = Dot20(f, s_i, s_j, ZERO), Dot20(g, s_i, s_j, ZERO)
     frames_coincide = Dot10(g, h), Dot10(h, f), Dot10(f, g)
     return (

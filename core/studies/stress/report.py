@@ -1,4 +1,6 @@
-"""The tables of a stress run: shares by family and engine, findings, proofs, and which contradictions are accepted."""
+"""The tables of a stress run: shares by family and engine, findings, proofs, and which
+contradictions are accepted.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,16 @@ SHORT = {
     Verdict.UNSUPPORTED: "unsupported",
 }
 NOTES = (
-    "Right: within 1e-14 of size times condition, of the closed form or of the motion followed from the design in extended "
-    "precision. Position, velocity, acceleration: the largest error of specimens without a silent wrong answer, over that.",
-    "Refused rightly: nothing, or a singular pose, is there, and the message says so. Not judged: nearer to the end of the motion "
-    "than the truth can tell, or behind a bifurcation. Shares are of the samples that the engine supports.",
+    (
+        "Right: within 1e-14 of size times condition, of the closed form or of the motion followed"
+        " from the design in extended precision. Position, velocity, acceleration: the largest"
+        " error of specimens without a silent wrong answer, over that."
+    ),
+    (
+        "Refused rightly: nothing, or a singular pose, is there, and the message says so. Not"
+        " judged: nearer to the end of the motion than the truth can tell, or behind a bifurcation."
+        " Shares are of the samples that the engine supports."
+    ),
 )
 
 
@@ -48,17 +56,31 @@ def report(found: Stress) -> Report:
 
 
 def headline(cells: Sequence[Cell]) -> str:
-    """Return how many of the examined samples are silently wrong, and how many were not examined."""
+    """Return how many of the examined samples are silently wrong, and how many were not
+    examined.
+    """
     count = {verdict: sum(cell.samples[verdict] for cell in cells) for verdict in Verdict}
-    apart = [f"{count[verdict]} {SHORT[verdict]}" for verdict in (Verdict.UNJUDGED, Verdict.UNSUPPORTED) if count[verdict]]
+    apart = [
+        f"{count[verdict]} {SHORT[verdict]}"
+        for verdict in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)
+        if count[verdict]
+    ]
     wrong, examined = count[Verdict.SILENTLY_WRONG], sum(map(_examined, cells))
-    said = f"{wrong or 'None'} of {examined} samples silently wrong" if examined else "No sample was examined"
+    said = (
+        f"{wrong or 'None'} of {examined} samples silently wrong"
+        if examined
+        else "No sample was examined"
+    )
     return ", ".join([said, *apart])
 
 
 def _examined(cell: Cell) -> int:
     """Return how many samples have a verdict on an answer."""
-    return sum(cell.samples.values()) - cell.samples[Verdict.UNJUDGED] - cell.samples[Verdict.UNSUPPORTED]
+    return (
+        sum(cell.samples.values())
+        - cell.samples[Verdict.UNJUDGED]
+        - cell.samples[Verdict.UNSUPPORTED]
+    )
 
 
 def idle(found: Stress) -> list[str]:
@@ -68,13 +90,20 @@ def idle(found: Stress) -> list[str]:
         cells = [cell for cell in found.cells if _engine(cell) == engine]
         if cells[0].version is not None and any(map(_examined, cells)):
             continue
-        why = "it is not installed" if cells[0].version is None else "choose other families or another engine"
+        why = (
+            "it is not installed"
+            if cells[0].version is None
+            else "choose other families or another engine"
+        )
         lines.append(f"{engine}: {headline(cells)[0].lower()}{headline(cells)[1:]}: {why}")
     return lines
 
 
 def _shares(found: Stress) -> Section:
-    rows = [[cell.family, _engine(cell), str(cell.specimens), *_counts(cell), *map(_ratio, cell.worst)] for cell in found.cells]
+    rows = [
+        [cell.family, _engine(cell), str(cell.specimens), *_counts(cell), *map(_ratio, cell.worst)]
+        for cell in found.cells
+    ]
     for engine in dict.fromkeys(map(_engine, found.cells)):
         cells = [cell for cell in found.cells if _engine(cell) == engine]
         whole = Cell(
@@ -86,14 +115,20 @@ def _shares(found: Stress) -> Section:
             specimens=sum(cell.specimens for cell in cells),
             samples={name: sum(cell.samples[name] for cell in cells) for name in cells[0].samples},
             elsewhere=sum(cell.elsewhere for cell in cells),
-            worst=[max((x for c in cells if (x := c.worst[k]) is not None), default=None) for k in range(3)],
+            worst=[
+                max((x for c in cells if (x := c.worst[k]) is not None), default=None)
+                for k in range(3)
+            ],
             bad=sum(cell.bad for cell in cells),
             seconds=sum(cell.seconds for cell in cells),
         )
-        rows.append(["all", engine, str(whole.specimens), *_counts(whole), *map(_ratio, whole.worst)])
+        rows.append(
+            ["all", engine, str(whole.specimens), *_counts(whole), *map(_ratio, whole.worst)]
+        )
     settings = {_engine(cell): cell for cell in found.cells}
     told = [
-        f"{name} {cell.version}: " + "; ".join(f"{key}: {value}" for key, value in cell.settings.items())
+        f"{name} {cell.version}: "
+        + "; ".join(f"{key}: {value}" for key, value in cell.settings.items())
         for name, cell in settings.items()
     ]
     columns = ["family", "engine", "specimens", *SHORT.values(), *QUANTITIES]
@@ -104,7 +139,9 @@ def _verdict(found: Stress) -> str:
     wrong = {_engine(cell): 0 for cell in found.cells}
     for cell in found.cells:
         wrong[_engine(cell)] += cell.samples[Verdict.SILENTLY_WRONG]
-    return "Silently wrong: " + ", ".join(f"{engine} {count}" for engine, count in wrong.items()) + "."
+    return (
+        "Silently wrong: " + ", ".join(f"{engine} {count}" for engine, count in wrong.items()) + "."
+    )
 
 
 def _counts(cell: Cell) -> list[str]:
@@ -113,8 +150,16 @@ def _counts(cell: Cell) -> list[str]:
     texts: list[str] = []
     for verdict in SHORT:
         count = cell.samples[verdict]
-        share = f" ({100 * count / supported:.3g} %)" if supported and count and verdict is not Verdict.UNSUPPORTED else ""
-        elsewhere = f", {cell.elsewhere} in another assembly" if verdict is Verdict.SILENTLY_WRONG and cell.elsewhere else ""
+        share = (
+            f" ({100 * count / supported:.3g} %)"
+            if supported and count and verdict is not Verdict.UNSUPPORTED
+            else ""
+        )
+        elsewhere = (
+            f", {cell.elsewhere} in another assembly"
+            if verdict is Verdict.SILENTLY_WRONG and cell.elsewhere
+            else ""
+        )
         texts.append(f"{count}{share}{elsewhere}")
     return texts
 
@@ -122,7 +167,12 @@ def _counts(cell: Cell) -> list[str]:
 def _families(found: Stress) -> Section:
     rows = [[name, about] for name, about in found.abouts.items()]
     return Section(
-        "Families", [], ["Made at random from the seed; a specimen is the same whatever else is run."], ["family", "what"], 2, rows
+        "Families",
+        [],
+        ["Made at random from the seed; a specimen is the same whatever else is run."],
+        ["family", "what"],
+        2,
+        rows,
     )
 
 
@@ -142,15 +192,27 @@ def _findings(findings: Sequence[Finding]) -> Section:
     ]
     columns = ["family", "engine", "outcome", "specimen", "at", "errors", "message", "case file"]
     notes = [
-        f"The smallest specimen of each; errors as above. An error beyond {ELSEWHERE:g} of the size counts as another assembly."
+        f"The smallest specimen of each; errors as above. An error beyond {ELSEWHERE:g} of the size"
+        " counts as another assembly."
     ]
-    return Section("Findings", ["Replay a file by: kincheck stress --replay FILE --engine NAME --tol X."], notes, columns, 4, rows)
+    return Section(
+        "Findings",
+        ["Replay a file by: kincheck stress --replay FILE --engine NAME --tol X."],
+        notes,
+        columns,
+        4,
+        rows,
+    )
 
 
 def _proofs(found: Stress) -> Section:
-    rows = [[p.family, str(p.tried), str(p.proved), f"{p.worst:.1e}", "; ".join(p.reasons)[:300]] for p in found.proofs]
+    rows = [
+        [p.family, str(p.tried), str(p.proved), f"{p.worst:.1e}", "; ".join(p.reasons)[:300]]
+        for p in found.proofs
+    ]
     notes = [
-        "Krawczyk's test in ball arithmetic, about the engine's equations; the distance is over what is round-off of an engine."
+        "Krawczyk's test in ball arithmetic, about the engine's equations; the distance is over"
+        " what is round-off of an engine."
     ]
     columns = ["family", "samples", "proved", "distance of the truth", "not proved"]
     return Section("The truth, proved at random samples", [], notes, columns, 1, rows)
@@ -162,7 +224,9 @@ def _acceptances(found: Stress) -> Section:
         mine = [each for each in found.acceptances if each.engine == engine]
         accepted = sorted((each for each in mine if each.accepted), key=lambda each: each.tilt)
         refused = [each.tilt for each in mine if not each.accepted]
-        told = [f"{each.told:.1e} of {each.unavoidable:.1e} m" for each in accepted if each.unavoidable]
+        told = [
+            f"{each.told:.1e} of {each.unavoidable:.1e} m" for each in accepted if each.unavoidable
+        ]
         rows.append(
             [
                 engine,
@@ -172,7 +236,14 @@ def _acceptances(found: Stress) -> Section:
             ]
         )
     columns = ["engine", "accepted up to", "refused from", "residual told, at the largest accepted"]
-    return Section("Contradictory hinges", [], ["Of what cannot be avoided, by least squares over all rows."], columns, 1, rows)
+    return Section(
+        "Contradictory hinges",
+        [],
+        ["Of what cannot be avoided, by least squares over all rows."],
+        columns,
+        1,
+        rows,
+    )
 
 
 def _engine(cell: Cell) -> str:
@@ -188,7 +259,10 @@ def markdown(made: Report) -> str:
     lines = [f"# {escaped(made.headline)}", "", escaped(" · ".join(made.facts))]
     for section in made.sections:
         lines += ["", f"## {section.title}", "", *(escaped(each) for each in section.verdict), ""]
-        lines += [row(section.columns), row(["---"] * section.labels + ["---:"] * (len(section.columns) - section.labels))]
+        lines += [
+            row(section.columns),
+            row(["---"] * section.labels + ["---:"] * (len(section.columns) - section.labels)),
+        ]
         lines += [row(map(escaped, each)) for each in section.rows]
         lines += ["", *(f"{escaped(note)}\n" for note in section.notes)]
     return "\n".join(lines) + "\n"

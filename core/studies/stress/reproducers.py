@@ -23,8 +23,11 @@ from .truth.reference_motion import Truth, followed
 from .verdicts import Judgement, Verdict, judged
 
 
-def judge(case: Case, engine: Engine, tol: float, truth: Callable[[Case], Truth] | None = followed) -> Judgement:
-    """A case of any origin with an engine, its motion followed from the design unless its truth is known better.
+def judge(
+    case: Case, engine: Engine, tol: float, truth: Callable[[Case], Truth] | None = followed
+) -> Judgement:
+    """A case of any origin with an engine, its motion followed from the design unless its truth is
+    known better.
 
     Raises:
         KincheckError: the truth cannot be had.
@@ -57,7 +60,8 @@ def save(example: Example, folder: Path) -> Finding:
     if len(case.sweep.values) < len(example.case.sweep.values):
         words.append(f"samples {len(example.case.sweep.values)} to {len(case.sweep.values)}")
     if example.verdict is Verdict.SILENTLY_WRONG or not specimen.excused:
-        # what is taken off a closed form is none of it any more: the rest is judged by following the motion
+        # what is taken off a closed form is none of it any more: the rest is judged by following
+        # the motion
         try:
             known = bad_by_itself(case)
         except KincheckError:
@@ -66,12 +70,20 @@ def save(example: Example, folder: Path) -> Finding:
             case, more = reduced(case, bad_by_itself)
             words += more
         else:
-            words.append("judged by the family's own truth only: following the motion does not lead there")
+            words.append(
+                "judged by the family's own truth only: following the motion does not lead there"
+            )
     verdict = str(example.verdict).replace(",", "").replace(" ", "_")
     name = f"{finding.family}_{finding.engine}_{finding.mode}_{finding.number}_{verdict}.toml"
     comments = [
-        f"{finding.verdict} in {finding.engine} ({finding.mode}), tolerance {finding.tol!r}: {finding.specimen}",
-        f"kincheck stress --replay {name} --engine {finding.engine} --mode {finding.mode} --tol {finding.tol!r}",
+        (
+            f"{finding.verdict} in {finding.engine} ({finding.mode}), tolerance {finding.tol!r}:"
+            f" {finding.specimen}"
+        ),
+        (
+            f"kincheck stress --replay {name} --engine {finding.engine} --mode {finding.mode} --tol"
+            f" {finding.tol!r}"
+        ),
         *words,
         *finding.message.splitlines(),
     ]

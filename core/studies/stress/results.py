@@ -11,7 +11,8 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """The smallest example of a bad outcome of an engine in a family.
 
     Attributes:
-        specimen, number: its name, and its number in the family: with the run's seed that makes it again.
+        specimen, number: its name, and its number in the family: with the run's seed that makes it
+            again.
         sample: the first bad one: its number, and the value there of what is swept [m, rad or s].
         message: what the engine said.
         tol: largest residual that was accepted.
@@ -41,7 +42,8 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         samples: by verdict.
         elsewhere: how many of the silently wrong ones are in another assembly, or in none.
-        worst: largest error of position, velocity and acceleration of samples that are right, over what is round-off.
+        worst: largest error of position, velocity and acceleration of samples that are right, over
+            what is round-off.
         bad: how many specimens have a bad sample.
     """
 
@@ -62,7 +64,8 @@ class Proofs(msgspec.Struct, frozen=True, kw_only=True):
     """Samples of a family whose truth was proved, by Krawczyk's test in ball arithmetic.
 
     Attributes:
-        worst: the largest distance of the truth from the proved ball, over what is round-off of an engine.
+        worst: the largest distance of the truth from the proved ball, over what is round-off of an
+            engine.
         reasons: why others were not proved.
     """
 
@@ -74,7 +77,9 @@ class Proofs(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
-    """A specimen of contradictory geometry: whether it was accepted, the residual told, and what could not be avoided [m]."""
+    """A specimen of contradictory geometry: whether it was accepted, the residual told, and what
+    could not be avoided [m].
+    """
 
     engine: str
     tilt: float
@@ -84,7 +89,9 @@ class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Stress(msgspec.Struct, frozen=True, kw_only=True):
-    """A run. abouts: what each family is; seconds: by what took them; unfinished: families that could not be run, and why."""
+    """A run. abouts: what each family is; seconds: by what took them; unfinished: families that
+    could not be run, and why.
+    """
 
     schema: Literal["kincheck-stress/1"] = "kincheck-stress/1"
     kincheck: str

@@ -28,7 +28,8 @@ from .verdicts import BAD, Judgement, Verdict, described_wrong, judged
 # However few samples a family gets, they are of so many specimens, and not fewer than three each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
 COARSEST = 5
-# A proof takes some ms, making its equations a hundred times as long: of small mechanisms, and every other one.
+# A proof takes some ms, making its equations a hundred times as long: of small mechanisms, and
+# every other one.
 LARGEST_PROVED = 6
 
 
@@ -91,7 +92,16 @@ def stress(
     found, seconds = _Results(), {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
     for family in families:
         try:
-            _family(family, engines, found, seconds, samples=max(1, samples // len(families)), seed=seed, prove=prove, tell=tell)
+            _family(
+                family,
+                engines,
+                found,
+                seconds,
+                samples=max(1, samples // len(families)),
+                seed=seed,
+                prove=prove,
+                tell=tell,
+            )
         except KincheckError as error:  # what the others gave is not lost
             found.unfinished[family.name] = str(error)
             tell(f"{family.name}: not finished: {error}")
@@ -139,12 +149,16 @@ def specimens(family: Family, seed: int, share: int) -> list[Made]:
     most = max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share
     found: list[Made] = []
     while (done := sum(one.samples for one in found)) < share:
-        found.append(specimen(family, seed, len(found), min(most, max(FEWEST_SAMPLES, share - done))))
+        found.append(
+            specimen(family, seed, len(found), min(most, max(FEWEST_SAMPLES, share - done)))
+        )
     return found
 
 
 def specimen(family: Family, seed: int, number: int, most: int) -> Made:
-    """Return that specimen of a family, the same mechanism whatever else is run, and samples too unless those are too many."""
+    """Return that specimen of a family, the same mechanism whatever else is run, and samples too
+    unless those are too many.
+    """
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
     # a coarse sweep leaves most to the solver, a fine one has more to judge
     fineness = float(rng.random()) ** 0.5
@@ -162,8 +176,12 @@ def _solve(family: Family, engine: Engine, made: Sequence[Made], found: _Results
     """All specimens of a family with an engine."""
     begun = perf_counter()
     there = [(one, one.case) for one in made if one.case is not None]
-    answers = solve_all([Pair(case, suited(engine, case, one.number), one.specimen.tol) for one, case in there])
-    results = {one.number: (case, answer) for (one, case), answer in zip(there, answers, strict=True)}
+    answers = solve_all(
+        [Pair(case, suited(engine, case, one.number), one.specimen.tol) for one, case in there]
+    )
+    results = {
+        one.number: (case, answer) for (one, case), answer in zip(there, answers, strict=True)
+    }
     judgements: list[tuple[Made, Judgement]] = []
     for one in made:
         if one.number not in results:
@@ -172,17 +190,33 @@ def _solve(family: Family, engine: Engine, made: Sequence[Made], found: _Results
         case, answer = results[one.number]
         judgement = judged(one.specimen, case, one.truth, answer)
         judgements.append((one, judgement))
-        missing = isinstance(answer, Failure) and answer.outcome in (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
-        if one.specimen.reported and one.truth is not None and one.truth.violated is not None and not missing:
+        missing = isinstance(answer, Failure) and answer.outcome in (
+            Outcome.UNSUPPORTED,
+            Outcome.UNAVAILABLE,
+        )
+        if (
+            one.specimen.reported
+            and one.truth is not None
+            and one.truth.violated is not None
+            and not missing
+        ):
             accepted = not isinstance(answer, Failure) and answer.solved == one.samples
             tilt = dict(one.specimen.facts).get("tilt", 0.0)
             unavoidable = float(one.truth.violated.max())
             found.acceptances.append(
-                Acceptance(engine=engine.name, tilt=tilt, accepted=accepted, told=judgement.told, unavoidable=unavoidable)
+                Acceptance(
+                    engine=engine.name,
+                    tilt=tilt,
+                    accepted=accepted,
+                    told=judgement.told,
+                    unavoidable=unavoidable,
+                )
             )
     found.cells.append(_cell(family, engine, judgements, perf_counter() - begun))
     for verdict in BAD:
-        bad = [(one, each) for one, each in judgements if each.counts[verdict] and one.case is not None]
+        bad = [
+            (one, each) for one, each in judgements if each.counts[verdict] and one.case is not None
+        ]
         if bad:
             one, judgement = min(bad, key=lambda pair: _size(pair[0]))
             found.examples.append(_example(family, engine, one, judgement, verdict))
@@ -192,11 +226,16 @@ def _size(one: Made) -> tuple[int, int]:
     return (len(one.case.mechanism.bodies), len(one.case.mechanism.joints)) if one.case else (0, 0)
 
 
-def _cell(family: Family, engine: Engine, judgements: Sequence[tuple[Made, Judgement]], seconds: float) -> Cell:
+def _cell(
+    family: Family, engine: Engine, judgements: Sequence[tuple[Made, Judgement]], seconds: float
+) -> Cell:
     worst: list[float | None] = [None, None, None]
     for _, each in judgements:
         if not each.counts[Verdict.SILENTLY_WRONG]:
-            worst = [max((x for x in pair if x is not None), default=None) for pair in zip(worst, each.worst, strict=True)]
+            worst = [
+                max((x for x in pair if x is not None), default=None)
+                for pair in zip(worst, each.worst, strict=True)
+            ]
     return Cell(
         family=family.name,
         engine=engine.name,
@@ -204,7 +243,9 @@ def _cell(family: Family, engine: Engine, judgements: Sequence[tuple[Made, Judge
         version=engine.version(),
         settings=plain(engine.settings),
         specimens=len(judgements),
-        samples={str(verdict): sum(each.counts[verdict] for _, each in judgements) for verdict in Verdict},
+        samples={
+            str(verdict): sum(each.counts[verdict] for _, each in judgements) for verdict in Verdict
+        },
         elsewhere=sum(each.elsewhere for _, each in judgements),
         worst=worst,
         bad=sum(any(each.counts[verdict] for verdict in BAD) for _, each in judgements),
@@ -212,7 +253,9 @@ def _cell(family: Family, engine: Engine, judgements: Sequence[tuple[Made, Judge
     )
 
 
-def _example(family: Family, engine: Engine, one: Made, judgement: Judgement, verdict: Verdict) -> Example:
+def _example(
+    family: Family, engine: Engine, one: Made, judgement: Judgement, verdict: Verdict
+) -> Example:
     case, sample = one.case, judgement.first(verdict)
     if case is None or sample is None:
         raise ValueError("an example needs a case and a bad sample")
@@ -238,7 +281,12 @@ def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
     reasons: list[str] = []
     for one in made[::2]:
         truth = one.truth
-        if truth is None or not truth.parts or one.case is None or len(one.case.mechanism.moving) > LARGEST_PROVED:
+        if (
+            truth is None
+            or not truth.parts
+            or one.case is None
+            or len(one.case.mechanism.moving) > LARGEST_PROVED
+        ):
             continue
         reached = np.flatnonzero(truth.reach == Reach.REACHED)
         if not len(reached):
@@ -247,6 +295,13 @@ def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
         try:
             worst = max(worst, distance_from_proof(truth, int(rng.choice(reached))))
             proved += 1
-        except (UnprovedError, SolveError) as error:  # or its equations cannot even be written, so near is it to a singular design
+        except (
+            UnprovedError,
+            SolveError,
+        ) as error:  # or its equations cannot even be written, so near is it to a singular design
             reasons.append(f"{one.specimen.name}: {error}")
-    return [Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)] if tried else []
+    return (
+        [Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)]
+        if tried
+        else []
+    )

@@ -1,4 +1,6 @@
-"""Making a bad case smaller, as long as its outcome stays as bad: fewer samples, points, bodies and digits."""
+"""Making a bad case smaller, as long as its outcome stays as bad: fewer samples, points, bodies and
+digits.
+"""
 
 from __future__ import annotations
 
@@ -41,12 +43,19 @@ def fewer_samples(case: Case, sample: int, bad: Bad) -> Case:
     still, values = _Budget(bad), case.sweep.values
     stop = float(values[sample])
     ends = [(case.sweep.design, stop), (float(values[0]), float(values[-1]))]
-    for start, end in ends if case.sweep.driver in {d.name for d in case.mechanism.drivers} else ends[1:]:
+    for start, end in (
+        ends if case.sweep.driver in {d.name for d in case.mechanism.drivers} else ends[1:]
+    ):
         if start == end:
             continue
         for count in (1, 2, 3, 4, 6, 9, 13, 19, 28, 41, 61):
             if count < len(values):
-                fewer = replace(case, sweep=replace(case.sweep, values=np.linspace(start if count > 1 else end, end, count)))
+                fewer = replace(
+                    case,
+                    sweep=replace(
+                        case.sweep, values=np.linspace(start if count > 1 else end, end, count)
+                    ),
+                )
                 if still(fewer):
                     return fewer
     return case
@@ -86,23 +95,37 @@ def _smaller(case: Case) -> Iterator[Case]:
         yield from _driven(case, _without(mechanism, body.name, (joint.name,)))
     for body in mechanism.moving:
         fixed = [replace(each, fixed=each.fixed or each is body) for each in mechanism.bodies]
-        held = [j for j in mechanism.joints if not all(mechanism.is_fixed(b) or b == body.name for b in j.bodies)]
+        held = [
+            j
+            for j in mechanism.joints
+            if not all(mechanism.is_fixed(b) or b == body.name for b in j.bodies)
+        ]
         for gone in ["", *(joint.name for joint in held)]:
-            yield from _driven(case, _parts(mechanism, fixed, [joint for joint in held if joint.name != gone]))
+            yield from _driven(
+                case, _parts(mechanism, fixed, [joint for joint in held if joint.name != gone])
+            )
 
 
 def _without(mechanism: Mechanism, body: str, joints: Sequence[str]) -> Mechanism | None:
     bodies = [each for each in mechanism.bodies if each.name != body]
-    return _parts(mechanism, bodies, [j for j in mechanism.joints if body not in j.bodies and j.name not in joints])
+    return _parts(
+        mechanism,
+        bodies,
+        [j for j in mechanism.joints if body not in j.bodies and j.name not in joints],
+    )
 
 
-def _parts(mechanism: Mechanism, bodies: Sequence[Any], joints: Sequence[Joint]) -> Mechanism | None:
+def _parts(
+    mechanism: Mechanism, bodies: Sequence[Any], joints: Sequence[Joint]
+) -> Mechanism | None:
     """What is left with these bodies and joints; None where a driver or all points are gone."""
     names, known = {"ground", *(body.name for body in bodies)}, {joint.name for joint in joints}
     points = [point for point in mechanism.points if point.body in names]
     couplers = [coupler for coupler in mechanism.couplers if set(coupler.joints) <= known]
     there = {point.name for point in points}
-    if not points or any(getattr(d, "joint", None) not in (None, *known) for d in mechanism.drivers):
+    if not points or any(
+        getattr(d, "joint", None) not in (None, *known) for d in mechanism.drivers
+    ):
         return None
     if any(getattr(d, "point", None) not in (None, *there) for d in mechanism.drivers):
         return None
@@ -134,12 +157,19 @@ def rounded(case: Case, digits: int) -> Case | None:
     """The case with its geometry to so many digits; None where that makes no sense."""
 
     def short(value: Any) -> Any:
-        return tuple(map(short, value)) if isinstance(value, tuple) else float(f"{value:.{digits - 1}e}")  # pyright: ignore
+        return (
+            tuple(map(short, value))
+            if isinstance(value, tuple)
+            else float(f"{value:.{digits - 1}e}")
+        )  # pyright: ignore
 
     mechanism = case.mechanism
     try:
         joints = [
-            replace(joint, **joint.mapped(dict.fromkeys((Kind.POSITION, Kind.DIRECTION, Kind.LENGTH), short)))
+            replace(
+                joint,
+                **joint.mapped(dict.fromkeys((Kind.POSITION, Kind.DIRECTION, Kind.LENGTH), short)),
+            )
             for joint in mechanism.joints
         ]
         points = [replace(point, position=short(point.position)) for point in mechanism.points]

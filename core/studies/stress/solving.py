@@ -1,4 +1,6 @@
-"""Having specimens solved: the native engine here, by machine code and by numpy, simulators in worker processes."""
+"""Having specimens solved: the native engine here, by machine code and by numpy, simulators in
+worker processes.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,17 @@ from ...trajectory import Trajectory
 # A simulator that takes longer for a sweep of this size hangs [s].
 PATIENCE = 60.0
 MEMORY = 4.0
-# Up to so many bodies numpy costs no more than compiling; the search around singular poses makes larger ones slow.
+# Up to so many bodies numpy costs no more than compiling; the search around singular poses makes
+# larger ones slow.
 LARGEST_INTERPRETED = 4
 MOST_INTERPRETED = 2000
 """Samples for which it is not compiled."""
 
 
 class Interpreted:
-    """The native engine with its programs run by numpy: nothing is compiled for a mechanism that is met once."""
+    """The native engine with its programs run by numpy: nothing is compiled for a mechanism that is
+    met once.
+    """
 
     name = NATIVE
     mode = "projection"
@@ -51,7 +56,12 @@ class Interpreted:
     def build(self, case: Case) -> Route:
         """Make the model that the native engine makes, without a compiler."""
         path = case.sweep.path
-        return Route(compile_model(case.mechanism, Request(tuple(path.motions), case.points, compiled=False)), path)
+        return Route(
+            compile_model(
+                case.mechanism, Request(tuple(path.motions), case.points, compiled=False)
+            ),
+            path,
+        )
 
     def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
         """March all samples."""
@@ -59,8 +69,13 @@ class Interpreted:
 
 
 def suited(engine: Engine, case: Case, number: int) -> Engine:
-    """The native engine, interpreted for every other small mechanism, so that both executors are met; simulators as they are."""
-    small = len(case.mechanism.moving) <= LARGEST_INTERPRETED and len(case.sweep.values) <= MOST_INTERPRETED
+    """The native engine, interpreted for every other small mechanism, so that both executors are
+    met; simulators as they are.
+    """
+    small = (
+        len(case.mechanism.moving) <= LARGEST_INTERPRETED
+        and len(case.sweep.values) <= MOST_INTERPRETED
+    )
     return Interpreted(engine) if engine.name == NATIVE and number % 2 and small else engine
 
 

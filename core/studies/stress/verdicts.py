@@ -1,4 +1,6 @@
-"""What became of the samples of a specimen: right, refused with the right reason or a wrong one, or silently wrong."""
+"""What became of the samples of a specimen: right, refused with the right reason or a wrong one, or
+silently wrong.
+"""
 
 from __future__ import annotations
 
@@ -32,11 +34,16 @@ class Verdict(StrEnum):
 BAD = (Verdict.SILENTLY_WRONG, Verdict.REFUSED_WRONGLY)
 """The worst first."""
 
-# A refusal at or behind a singular pose, or beyond the end of the motion, is right if it says so in any of these words.
-THE_MOTION_ENDS = r"lock-up|dead centre|singular|bifurcat|beyond|out of reach|not assemble|contradict"
-# An error of more than this part of the mechanism's size is another assembly, or none, and no lack of digits.
+# A refusal at or behind a singular pose, or beyond the end of the motion, is right if it says so in
+# any of these words.
+THE_MOTION_ENDS = (
+    r"lock-up|dead centre|singular|bifurcat|beyond|out of reach|not assemble|contradict"
+)
+# An error of more than this part of the mechanism's size is another assembly, or none, and no lack
+# of digits.
 ELSEWHERE = 1e-3
-# What the rows of contradictory geometry leave over can be spread over them, or be put into one: by ten that is the same.
+# What the rows of contradictory geometry leave over can be spread over them, or be put into one: by
+# ten that is the same.
 SPREAD = 10.0
 
 
@@ -46,7 +53,8 @@ class Judgement:
 
     Attributes:
         verdicts: of the samples.
-        worst: largest error of positions, velocities and accelerations over what is round-off; None where nothing was compared.
+        worst: largest error of positions, velocities and accelerations over what is round-off; None
+            where nothing was compared.
         elsewhere: how many of the silently wrong samples are in another assembly.
         message: what the engine said.
         told: the residual that it reported [m or -].
@@ -60,7 +68,9 @@ class Judgement:
     counts: Mapping[str, int] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "counts", {each: int((self.verdicts == each).sum()) for each in Verdict})
+        object.__setattr__(
+            self, "counts", {each: int((self.verdicts == each).sum()) for each in Verdict}
+        )
 
     def first(self, verdict: Verdict) -> int | None:
         """The first sample of that verdict."""
@@ -69,13 +79,19 @@ class Judgement:
 
 
 def described_wrong(specimen: Specimen, samples: int, message: str) -> Judgement:
-    """The judgement of a specimen whose description was refused, which is the same for every engine."""
+    """The judgement of a specimen whose description was refused, which is the same for every
+    engine.
+    """
     right = specimen.truth is None and re.search(specimen.reasons, message)
     return _all(samples, Verdict.REFUSED_RIGHTLY if right else Verdict.REFUSED_WRONGLY, message)
 
 
-def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer | Failure) -> Judgement:
-    """Compare an answer, or a refusal, with the truth; None is that of a specimen of which no sample makes sense."""
+def judged(
+    specimen: Specimen, case: Case, truth: Truth | None, result: Answer | Failure
+) -> Judgement:
+    """Compare an answer, or a refusal, with the truth; None is that of a specimen of which no
+    sample makes sense.
+    """
     n = len(case.sweep.values)
     if isinstance(result, Failure):
         if result.outcome in (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE):
@@ -100,7 +116,11 @@ def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer |
                 continue
             compared[k] = True
             # what is missing of a solved sample is infinitely wrong
-            off = np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf)[known].max(axis=1).astype(np.float64)
+            off = (
+                np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf)[known]
+                .max(axis=1)
+                .astype(np.float64)
+            )
             bound = np.maximum(truth.bounds[name][k, known], np.finfo(np.float64).tiny)
             ratios[k, known] = np.maximum(ratios[k, known], off / bound)
             if k == 0:
@@ -115,9 +135,14 @@ def judged(specimen: Specimen, case: Case, truth: Truth | None, result: Answer |
     verdicts[beyond] = Verdict.SILENTLY_WRONG
     far = (errors > ELSEWHERE * truth.system.rows.stated.unit) | beyond
     worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(3))
-    # what an engine notes beside its samples warns nobody who reads the samples, but tells where to look
-    message = "; ".join([*filter(None, [result.message]), *map(str, result.details.get("notes", []))])
-    return Judgement(verdicts, worst, int((far & (verdicts == Verdict.SILENTLY_WRONG)).sum()), message, told)
+    # what an engine notes beside its samples warns nobody who reads the samples, but tells where to
+    # look
+    message = "; ".join(
+        [*filter(None, [result.message]), *map(str, result.details.get("notes", []))]
+    )
+    return Judgement(
+        verdicts, worst, int((far & (verdicts == Verdict.SILENTLY_WRONG)).sum()), message, told
+    )
 
 
 def _refused(specimen: Specimen, truth: Truth | None, n: int, message: str) -> Judgement:
@@ -129,7 +154,10 @@ def _refused(specimen: Specimen, truth: Truth | None, n: int, message: str) -> J
     else:
         over = truth.singular | (truth.reach != Reach.REACHED)
         right = (over & ended) | (specimen.excused & named)
-    return Judgement(np.where(right, Verdict.REFUSED_RIGHTLY, Verdict.REFUSED_WRONGLY).astype(object), message=message)
+    return Judgement(
+        np.where(right, Verdict.REFUSED_RIGHTLY, Verdict.REFUSED_WRONGLY).astype(object),
+        message=message,
+    )
 
 
 def _all(n: int, verdict: Verdict, message: str) -> Judgement:

@@ -1,4 +1,6 @@
-"""Where the chunks of a study are solved, in threads here or on a cluster; either gives them in order, and a few at a time only."""
+"""Where the chunks of a study are solved, in threads here or on a cluster; either gives them in
+order, and a few at a time only.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,12 @@ from .study import Chunk, Ready, Study
 
 Chunks: TypeAlias = Generator[Chunk]
 Source: TypeAlias = Callable[[Study, int], Chunks]
-"""Solves the chunks of a study somewhere, from the one of that index on: gives each once, in order."""
+"""Solves the chunks of a study somewhere, from the one of that index on: gives each once, in
+order.
+"""
 
-# Chunks that are under way for each thread: one is solved, one waits, and results come back in order.
+# Chunks that are under way for each thread: one is solved, one waits, and results come back in
+# order.
 AHEAD = 3
 
 
@@ -50,21 +55,25 @@ def on_threads(ready: Ready, jobs: int) -> Source:
 
 
 def on_cluster(address: str) -> Source:
-    """The source on the workers of a dask.distributed scheduler. What a lost worker had is solved by another.
+    """The source on the workers of a dask.distributed scheduler. What a lost worker had is solved
+    by another.
 
     Raises:
-        ClusterError: dask.distributed is not installed, the scheduler does not answer or has gone, every worker that had a task
-            was lost, or a worker cannot solve.
+        ClusterError: dask.distributed is not installed, the scheduler does not answer or has gone,
+            every worker that had a task was lost, or a worker cannot solve.
     """
 
     def solve(study: Study, first: int = 0) -> Chunks:
         distributed = loaded()
         packed = pack(study)
-        name = f"kincheck-sweep-{uuid4().hex}"  # the scheduler takes equal names for one and the same task
+        # the scheduler takes equal names for one and the same task
+        name = f"kincheck-sweep-{uuid4().hex}"
         with connected(distributed, address) as client, _explained(distributed, address):
             waiting = deque[Any]()
             for index in range(first, study.chunks):
-                task: Any = client.submit(solve_there, packed, index, VERSION, key=f"{name}-{index}", pure=False)
+                task: Any = client.submit(
+                    solve_there, packed, index, VERSION, key=f"{name}-{index}", pure=False
+                )
                 waiting.append(task)
                 # asked each time: workers may come and go
                 if len(waiting) >= AHEAD * max(1, sum(client.nthreads().values())):
@@ -83,9 +92,13 @@ def _explained(distributed: Any, address: str) -> Generator[None]:
     except KincheckError:
         raise
     except distributed.scheduler.KilledWorker as error:
-        raise ClusterError(f"scheduler {address}: every worker that had some chunks was lost: {said(error)}") from error
+        raise ClusterError(
+            f"scheduler {address}: every worker that had some chunks was lost: {said(error)}"
+        ) from error
     except (OSError, distributed.CancelledError, TimeoutError) as error:
-        raise ClusterError(f"scheduler {address}: has gone ({said(error)}); sweep again when it is back") from error
+        raise ClusterError(
+            f"scheduler {address}: has gone ({said(error)}); sweep again when it is back"
+        ) from error
     except Exception as error:
         raise ClusterError(f"scheduler {address}: a worker cannot solve: {said(error)}") from error
 
@@ -102,7 +115,8 @@ def solve_there(packed: bytes, index: int, version: str) -> Chunk:
     """
     if version != VERSION:
         raise ClusterError(
-            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the sweep; install the same there"
+            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the sweep;"
+            " install the same there"
         )
     key = hashlib.sha256(packed).digest()
     with _lock:  # threads of a worker share the model; two studies at a time are enough

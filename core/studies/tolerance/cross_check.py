@@ -1,4 +1,6 @@
-"""Cross-checking: some variants rebuilt as cases of their own and solved by another engine, compared with what the sweep has."""
+"""Cross-checking: some variants rebuilt as cases of their own and solved by another engine,
+compared with what the sweep has.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ from .study import Study
 
 
 class Checked(msgspec.Struct, frozen=True, kw_only=True):
-    """A variant that was solved by the other engine too, and the quantity that is off most, in tolerances.
+    """A variant that was solved by the other engine too, and the quantity that is off most, in
+    tolerances.
 
     Attributes:
         message: empty where it passes: by how much it deviates, or why there is no answer.
@@ -51,7 +54,9 @@ def chosen(samples: int, share: float, seed: int) -> frozenset[int]:
 
 @dataclass(frozen=True, eq=False)
 class _Pairs(Sequence[Pair]):
-    """The pairs of variants with an engine; a case is made when it is asked for, so that thousands need no room."""
+    """The pairs of variants with an engine; a case is made when it is asked for, so that thousands
+    need no room.
+    """
 
     study: Study
     engine: Engine
@@ -79,8 +84,13 @@ def require_able(study: Study, engine: Engine, solver: Solver, tol: float) -> No
     """
     ((_, found),) = solver([Pair(study.case, engine, tol, timed=False)])
     result = found.result
-    if not isinstance(result, Answer) and result.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
-        raise KincheckError(f"--check {engine.name}: {result.outcome}: {result.message}; check with another engine")
+    if not isinstance(result, Answer) and result.outcome in (
+        Outcome.UNAVAILABLE,
+        Outcome.UNSUPPORTED,
+    ):
+        raise KincheckError(
+            f"--check {engine.name}: {result.outcome}: {result.message}; check with another engine"
+        )
 
 
 def check(
@@ -106,8 +116,11 @@ def check(
     return [found[variant] for variant in sorted(found)]
 
 
-def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf) -> Checked:
-    """Compare an engine's answer with the sweep's values: every row within its output's tolerance, wherever both have one.
+def judged(
+    study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf
+) -> Checked:
+    """Compare an engine's answer with the sweep's values: every row within its output's tolerance,
+    wherever both have one.
 
     A variant without a row that both have a value of is not judged. One fails where the engine has
     values and the sweep has no solution, or the engine has none and the sweep has one.
@@ -121,23 +134,40 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float
     case = study.of_variant(variant)
     beat = pace(case)
     lost = ""
-    worst = Checked(variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both")
-    if fault := _contradicted(study, case, result, ours) or excess(case, result.residual if result.solved else 0.0, tol):
+    worst = Checked(
+        variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both"
+    )
+    if fault := _contradicted(study, case, result, ours) or excess(
+        case, result.residual if result.solved else 0.0, tol
+    ):
         return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=fault)
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
         if theirs is None:
             continue
-        # where the sweep has no value either, nothing is lost: such a variant is counted among those without a solution
+        # where the sweep has no value either, nothing is lost: such a variant is counted among
+        # those without a solution
         if count := int((np.isfinite(values) & ~np.isfinite(theirs)).sum()):
-            lost = f"{row.name}: {count} samples without a value where the sweep has one: {result.message or 'no reason given'}"
-        off = deviation(theirs, values, row.output.atol * beat**row.derivative, row.output.rtol, "native")
+            lost = (
+                f"{row.name}: {count} samples without a value where the sweep has one:"
+                f" {result.message or 'no reason given'}"
+            )
+        off = deviation(
+            theirs, values, row.output.atol * beat**row.derivative, row.output.rtol, "native"
+        )
         if off is None:
             continue
         ratio = off.max_abs / off.tolerance if off.tolerance else (np.inf if off.max_abs else 0.0)
         if worst.ratio is None or ratio > worst.ratio:
-            told = row.output.name, QUANTITIES[row.derivative], off, case.sweep.driver, case.sweep.values.tolist(), row.output.unit
+            told = (
+                row.output.name,
+                QUANTITIES[row.derivative],
+                off,
+                case.sweep.driver,
+                case.sweep.values.tolist(),
+                row.output.unit,
+            )
             worst = Checked(
                 variant=variant,
                 outcome=Outcome.PASS if off.within else Outcome.FAIL,
@@ -148,17 +178,22 @@ def judged(study: Study, variant: int, attempt: Attempt, ours: Array, tol: float
                 ratio=float(ratio),
             )
     if lost:
-        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message="; ".join(filter(None, (lost, worst.message))))
+        return msgspec.structs.replace(
+            worst, outcome=Outcome.FAIL, message="; ".join(filter(None, (lost, worst.message)))
+        )
     return worst
 
 
 def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
-    """Return what an engine has where native cannot reach the sample, with native's reason; empty where there is nothing.
+    """Return what an engine has where native cannot reach the sample, with native's reason; empty
+    where there is nothing.
 
     Many variants at once are refused beside singular poses that one by itself passes, so that
     native solves a variant in question again, alone.
     """
-    values = np.logical_or.reduce([np.isfinite(series.position) for series in answer.outputs.values()])
+    values = np.logical_or.reduce(
+        [np.isfinite(series.position) for series in answer.outputs.values()]
+    )
     if not (values & ~np.isfinite(ours).any(axis=0)).any():
         return ""
     path = case.sweep.path
@@ -170,4 +205,7 @@ def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
     refused[alone.details.get(UNCERTAIN, [])] = False
     if not refused.any():
         return ""
-    return f"values at {refused.sum()} of {len(refused)} samples that {NATIVE} cannot reach; {NATIVE}: {alone.message}"
+    return (
+        f"values at {refused.sum()} of {len(refused)} samples that {NATIVE} cannot reach; {NATIVE}:"
+        f" {alone.message}"
+    )

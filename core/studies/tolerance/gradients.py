@@ -1,11 +1,14 @@
-"""Gradients of outputs by the coordinates of a variation, at the nominal design: central differences of solved variants.
+"""Gradients of outputs by the coordinates of a variation, at the nominal design: central
+differences of solved variants.
 
-A coordinate is moved by h and h/2 both ways. The difference over h is off by f''' h^2 / 6 + f''''' h^4 / 120, so four times the one
-over h/2 less the one over h, by three, is off by terms of h^4 only (Richardson). By how much the two differ says what was left out:
-a third of it is the error of the difference over h/2, and bounds that of the result wherever the series converges.
+A coordinate is moved by h and h/2 both ways. The difference over h is off by f''' h^2 / 6 + f'''''
+h^4 / 120, so four times the one over h/2 less the one over h, by three, is off by terms of h^4 only
+(Richardson). By how much the two differ says what was left out: a third of it is the error of the
+difference over h/2, and bounds that of the result wherever the series converges.
 
-With h/size = 2e-4 the share of the second term is about (h/size)^2 / 6 = 7e-9, that of the third 1e-17, and round-off of 1e-15 of
-the size in an output is 5e-12 of a gradient of one: room for outputs that bend a hundred times as much as the mechanism is large.
+With h/size = 2e-4 the share of the second term is about (h/size)^2 / 6 = 7e-9, that of the third
+1e-17, and round-off of 1e-15 of the size in an output is 5e-12 of a gradient of one: room for
+outputs that bend a hundred times as much as the mechanism is large.
 """
 
 from __future__ import annotations
@@ -21,10 +24,11 @@ from ...trajectory import Array
 from .study import Ready
 
 STEP = 2e-4
-# What gradients are to be good for: the error relative to the largest gradient of the output by a coordinate of the same unit.
+# What gradients are to be good for: the error relative to the largest gradient of the output by a
+# coordinate of the same unit.
 ACCURATE = 1e-6
-# Of an output that no such coordinate changes in first order, differences are round-off: this part of its size, or the mechanism's,
-# a thousand times that of a number, over the step.
+# Of an output that no such coordinate changes in first order, differences are round-off: this part
+# of its size, or the mechanism's, a thousand times that of a number, over the step.
 ROUND_OFF = 1e-13
 MOVES = np.array([1.0, -1.0, 0.5, -0.5])
 
@@ -34,11 +38,14 @@ class Gradients:
     """Derivatives of the rows of a study by its coordinates, at the nominal design.
 
     Attributes:
-        along: over the samples [unit of row / unit of coordinate], shape (coordinates, rows, n); NaN where a neighbour of the
-            nominal design has no value.
-        design: at the design position, shape (coordinates, rows); None where the case does not pass through it.
-        error: bound of the error over the samples and at design, from the two steps, shape (coordinates, rows).
-        accurate: whether that is at most `ACCURATE` of the row's largest gradient, or round-off, shape (coordinates, rows).
+        along: over the samples [unit of row / unit of coordinate], shape (coordinates, rows, n);
+            NaN where a neighbour of the nominal design has no value.
+        design: at the design position, shape (coordinates, rows); None where the case does not pass
+            through it.
+        error: bound of the error over the samples and at design, from the two steps, shape
+            (coordinates, rows).
+        accurate: whether that is at most `ACCURATE` of the row's largest gradient, or round-off,
+            shape (coordinates, rows).
         messages: by coordinate, why neighbours have no solution.
     """
 
@@ -57,7 +64,12 @@ def gradients(ready: Ready) -> Gradients:
     from_design = start.stands
     if from_design:  # one sample more, at the design itself
         ready = ready.along(Path(path.motions, np.append(path.times, start.time), path.design))
-    steps = np.array([STEP * (size(study.case) if each.unit == "m" else 1.0) for each in study.variation.coordinates])
+    steps = np.array(
+        [
+            STEP * (size(study.case) if each.unit == "m" else 1.0)
+            for each in study.variation.coordinates
+        ]
+    )
     found = np.empty((count, len(study.rows), n + from_design))
     apart = np.empty_like(found)
     messages = dict[int, str]()
@@ -67,7 +79,9 @@ def gradients(ready: Ready) -> Gradients:
         offsets = np.zeros((count, len(some), len(MOVES)))
         offsets[some, np.arange(len(some))] = steps[some, None] * MOVES
         values, _, _, why = ready.values(offsets.reshape(count, -1))
-        plus, minus, half_plus, half_minus = np.moveaxis(values.reshape(*values.shape[:2], len(some), len(MOVES)), -1, 0)
+        plus, minus, half_plus, half_minus = np.moveaxis(
+            values.reshape(*values.shape[:2], len(some), len(MOVES)), -1, 0
+        )
         h = steps[some]
         whole, half = (plus - minus) / (2.0 * h), (half_plus - half_minus) / h
         found[some] = np.moveaxis((4.0 * half - whole) / 3.0, -1, 0)
@@ -81,10 +95,17 @@ def gradients(ready: Ready) -> Gradients:
 
 
 def _largest(ready: Ready, found: Array) -> Array:
-    """The largest size of each row's gradients by coordinates of the same unit, shape (coordinates, rows)."""
+    """The largest size of each row's gradients by coordinates of the same unit, shape (coordinates,
+    rows).
+    """
     units = [each.unit for each in ready.study.variation.coordinates]
     largest = np.fmax.reduce(np.abs(found), axis=2)
-    return np.array([np.fmax.reduce(largest[[k for k, other in enumerate(units) if other == unit]], axis=0) for unit in units])
+    return np.array(
+        [
+            np.fmax.reduce(largest[[k for k, other in enumerate(units) if other == unit]], axis=0)
+            for unit in units
+        ]
+    )
 
 
 def _noise(ready: Ready, steps: Array) -> Array:

@@ -1,4 +1,6 @@
-"""The page of a study: one HTML file in the look of a run's report, with its style sheet and script."""
+"""The page of a study: one HTML file in the look of a run's report, with its style sheet and
+script.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ DIGITS = 7
 
 @dataclass(frozen=True)
 class OutputView:
-    """An output as the page has it, in display units: its figures by name, and its gradients, the largest effect first."""
+    """An output as the page has it, in display units: its figures by name, and its gradients, the
+    largest effect first.
+    """
 
     name: str
     unit: str
@@ -50,7 +54,11 @@ class OutputView:
             [value for value in values if value is not None]
             for values in (self.envelope.min, self.envelope.max, self.envelope.standard_deviation)
         )
-        return self.shown(min(least, default=None)), self.shown(max(most, default=None)), self.shown(max(spread, default=None))
+        return (
+            self.shown(min(least, default=None)),
+            self.shown(max(most, default=None)),
+            self.shown(max(spread, default=None)),
+        )
 
 
 def page(results: SweepResults) -> str:
@@ -61,9 +69,20 @@ def page(results: SweepResults) -> str:
     figures: dict[str, Figure] = {}
     outputs: list[OutputView] = []
     for index, (name, envelope) in enumerate(results.outputs.items()):
-        mine = sorted((each for each in results.gradients if each.output == name), key=effect, reverse=True)
+        mine = sorted(
+            (each for each in results.gradients if each.output == name), key=effect, reverse=True
+        )
         unit, scale = DISPLAY.get(envelope.unit, (envelope.unit, 1.0))
-        view = OutputView(name, unit, scale, envelope, f"envelope-{index}", f"spread-{index}", f"tornado-{index}", mine)
+        view = OutputView(
+            name,
+            unit,
+            scale,
+            envelope,
+            f"envelope-{index}",
+            f"spread-{index}",
+            f"tornado-{index}",
+            mine,
+        )
         figures[view.figure] = envelope_figure(view, axis, about_nominal=False)
         figures[view.spread] = envelope_figure(view, axis, about_nominal=True)
         figures[view.tornado] = tornado_figure(view)
@@ -79,7 +98,9 @@ def page(results: SweepResults) -> str:
             notes=notes(results.run),
             outputs=outputs,
             axis=axis,
-            circumstances={key: value for key, value in results.run.items() if key not in ("cases", "engines")},
+            circumstances={
+                key: value for key, value in results.run.items() if key not in ("cases", "engines")
+            },
             effect=effect,
             css=(_LOOK / "report.css").read_text("utf-8"),
             script=(_LOOK / "report.js").read_text("utf-8"),
@@ -93,24 +114,36 @@ def headline(results: SweepResults) -> str:
     """The study in one sentence."""
     said = f"{results.partial or results.samples} variants of {results.case}"
     said += ", partial: the sweep was stopped" if results.partial else ""
-    said += f", {results.unsolved} without a solution somewhere" if results.unsolved else ", all solved"
+    said += (
+        f", {results.unsolved} without a solution somewhere" if results.unsolved else ", all solved"
+    )
     if results.checked:
         off = len(results.deviating)
-        said += f"; {len(results.checked)} checked with {results.check_engine}, " + (f"{off} deviate" if off else "none deviates")
+        said += f"; {len(results.checked)} checked with {results.check_engine}, " + (
+            f"{off} deviate" if off else "none deviates"
+        )
         said += f", {results.unjudged} not judged" if results.unjudged else ""
     return said
 
 
 def effect(gradient: Gradient) -> float:
-    """The size of a bar: the largest gradient times what its coordinate varies by [unit of the output]."""
+    """The size of a bar: the largest gradient times what its coordinate varies by [unit of the
+    output].
+    """
     return abs(gradient.largest or 0.0) * gradient.scale
 
 
 def _environment() -> Environment:
     environment = Environment(
-        loader=FileSystemLoader([_HERE, _LOOK]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader([_HERE, _LOOK]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-    cast("dict[str, Any]", environment.filters).update(number=number, label=output_label, known=known)
+    cast("dict[str, Any]", environment.filters).update(
+        number=number, label=output_label, known=known
+    )
     return environment
 
 
@@ -123,7 +156,9 @@ def _axis(results: SweepResults) -> Axis:
 
 
 def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Figure:
-    """Bands between quantiles, the least and the most, and the nominal design, against the driver; or how far they are from it."""
+    """Bands between quantiles, the least and the most, and the nominal design, against the driver;
+    or how far they are from it.
+    """
     envelope = view.envelope
     traces: list[Figure] = []
 
@@ -133,35 +168,83 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
 
     def taken(values: Numbers) -> list[float | None]:
         some = ((values[k], envelope.nominal[k] if about_nominal else 0.0) for k in axis.kept)
-        return [None if v is None or at is None else float(f"{view.scale * (v - at):.{DIGITS}g}") for v, at in some]
+        return [
+            None if v is None or at is None else float(f"{view.scale * (v - at):.{DIGITS}g}")
+            for v, at in some
+        ]
 
     for low, high, opacity in (("0.01", "0.99", 0.14), ("0.05", "0.95", 0.28)):
         below, above = taken(envelope.quantiles[low]), taken(envelope.quantiles[high])
-        there = [(a, b, d) for a, b, d in zip(below, above, axis.shown, strict=True) if a is not None and b is not None]
-        around: list[float | None] = [*(a for a, _, _ in there), *(b for _, b, _ in reversed(there))]
+        there = [
+            (a, b, d)
+            for a, b, d in zip(below, above, axis.shown, strict=True)
+            if a is not None and b is not None
+        ]
+        around: list[float | None] = [
+            *(a for a, _, _ in there),
+            *(b for _, b, _ in reversed(there)),
+        ]
         ways = [d for _, _, d in there]
-        look: Figure = {"fill": "toself", "line": {"width": 0}, "hoverinfo": "skip", "uid": f"band-{low}"}
+        look: Figure = {
+            "fill": "toself",
+            "line": {"width": 0},
+            "hoverinfo": "skip",
+            "uid": f"band-{low}",
+        }
         curve(around, ways + ways[::-1], **look, fillcolor=f"rgba(0,114,178,{opacity})")
     for name, values in (("least", envelope.min), ("most", envelope.max)):
-        curve(taken(values), name=name, line={"width": 1, "color": "#0072B2", "dash": "3px,3px"}, uid=f"s0-{name}")
-    curve(taken(envelope.quantiles["0.5"]), name="median", line={"width": 2, "color": "#0072B2"}, uid="s0")
-    curve(taken(envelope.nominal), name="nominal", line={"width": 1.5, "color": "#D55E00", "dash": "12px,5px"}, uid="s1")
+        curve(
+            taken(values),
+            name=name,
+            line={"width": 1, "color": "#0072B2", "dash": "3px,3px"},
+            uid=f"s0-{name}",
+        )
+    curve(
+        taken(envelope.quantiles["0.5"]),
+        name="median",
+        line={"width": 2, "color": "#0072B2"},
+        uid="s0",
+    )
+    curve(
+        taken(envelope.nominal),
+        name="nominal",
+        line={"width": 1.5, "color": "#D55E00", "dash": "12px,5px"},
+        uid="s1",
+    )
     what = f"{output_label(view.name)}{' less nominal' if about_nominal else ''} [{view.unit}]"
     value_axis: Figure = {"title": {"text": plain(what)}, "hoverformat": ".5g"}
     moved_axis: Figure = {"title": {"text": plain(axis.title)}, "hoverformat": ".6~g"}
     if axis.up < 0:
         moved_axis["autorange"] = "reversed"
-    sides = {"xaxis": value_axis, "yaxis": moved_axis} if axis.up else {"xaxis": moved_axis, "yaxis": value_axis}
-    return {"data": traces, "layout": {**sides, "hovermode": "y unified" if axis.up else "x unified"}}
+    sides = (
+        {"xaxis": value_axis, "yaxis": moved_axis}
+        if axis.up
+        else {"xaxis": moved_axis, "yaxis": value_axis}
+    )
+    return {
+        "data": traces,
+        "layout": {**sides, "hovermode": "y unified" if axis.up else "x unified"},
+    }
 
 
 def tornado_figure(view: OutputView) -> Figure:
-    """Bars by coordinate, the largest on top: what its standard deviation, half width or largest offset does to the output."""
+    """Bars by coordinate, the largest on top: what its standard deviation, half width or largest
+    offset does to the output.
+    """
     bars = view.gradients[:MOST_BARS][::-1]
     lengths = [float(f"{view.scale * effect(each):.{DIGITS}g}") for each in bars]
     names = [plain(each.coordinate) for each in bars]
-    look: Figure = {"type": "bar", "orientation": "h", "y": names, "marker": {"color": "#0072B2"}, "hovertemplate": "%{x:.3~g}"}
-    traces = [{**look, "x": [sign * length for length in lengths], "uid": f"bars{sign}"} for sign in (-1, 1)]
+    look: Figure = {
+        "type": "bar",
+        "orientation": "h",
+        "y": names,
+        "marker": {"color": "#0072B2"},
+        "hovertemplate": "%{x:.3~g}",
+    }
+    traces = [
+        {**look, "x": [sign * length for length in lengths], "uid": f"bars{sign}"}
+        for sign in (-1, 1)
+    ]
     title = f"change of {output_label(view.name)} [{view.unit}]"
     layout: Figure = {
         "barmode": "overlay",

@@ -1,7 +1,9 @@
-"""The finished part of a study: its chunks in a file, each as soon as it is solved, from which the study is taken up again.
+"""The finished part of a study: its chunks in a file, each as soon as it is solved, from which the
+study is taken up again.
 
-The file holds an identity and then the chunks in their order, each with its length and SHA-256 before it: what was cut off in the
-middle of a write is left out. Numbers are kept bit by bit, so that a study that is taken up is equal to one that was never stopped.
+The file holds an identity and then the chunks in their order, each with its length and SHA-256
+before it: what was cut off in the middle of a write is left out. Numbers are kept bit by bit, so
+that a study that is taken up is equal to one that was never stopped.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ class Part:
         """Begin a file, or take up the one that is there.
 
         Args:
-            facts: what the chunks depend on besides the study: versions, the machine, modules of joint types.
+            facts: what the chunks depend on besides the study: versions, the machine, modules of
+                joint types.
             resume: take up the chunks that are there.
         """
         self.path, self.problems = path, list[str]()
@@ -62,8 +65,9 @@ class Part:
             with self.path.open("rb") as file:
                 if file.read(len(head)) != head:
                     raise KincheckError(
-                        f"--resume: {self.path} is the part of another study: the case, what varies, the options, versions or "
-                        "the machine differ; give the same, or leave out --resume to begin anew"
+                        f"--resume: {self.path} is the part of another study: the case, what"
+                        " varies, the options, versions or the machine differ; give the same, or"
+                        " leave out --resume to begin anew"
                     )
                 for index in range(study.chunks):
                     chunk = _next(file)
@@ -80,7 +84,9 @@ class Part:
         file = self._file
         if file is not None:
             packed = msgspec.msgpack.encode(chunk, enc_hook=_array)
-            frame = len(packed).to_bytes(LENGTH, "little") + hashlib.sha256(packed).digest() + packed
+            frame = (
+                len(packed).to_bytes(LENGTH, "little") + hashlib.sha256(packed).digest() + packed
+            )
             self._try(lambda: file.write(frame))
 
     def remove(self) -> None:
@@ -98,14 +104,17 @@ class Part:
         except OSError as error:
             self._file = None
             self.problems.append(
-                f"{self.path}: cannot be written ({error.strerror or error}); the study cannot be taken up from there"
+                f"{self.path}: cannot be written ({error.strerror or error}); the study cannot be"
+                " taken up from there"
             )
 
 
 def _next(file: BinaryIO) -> Chunk | None:
     """Return the next chunk of a file; None at its end, or where what follows is not whole."""
     head = file.read(LENGTH + HASH)
-    packed = file.read(int.from_bytes(head[:LENGTH], "little")) if len(head) == LENGTH + HASH else b""
+    packed = (
+        file.read(int.from_bytes(head[:LENGTH], "little")) if len(head) == LENGTH + HASH else b""
+    )
     if not packed or hashlib.sha256(packed).digest() != head[LENGTH:]:
         return None
     try:

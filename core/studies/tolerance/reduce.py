@@ -1,6 +1,8 @@
-"""Many variants to a few numbers: extremes, mean and spread as they come, in any number of steps; quantiles of those that are kept.
+"""Many variants to a few numbers: extremes, mean and spread as they come, in any number of steps;
+quantiles of those that are kept.
 
-Summaries are merged in the order of the chunks, whoever has computed them, so that a sum is rounded the same way every time.
+Summaries are merged in the order of the chunks, whoever has computed them, so that a sum is rounded
+the same way every time.
 """
 
 from __future__ import annotations
@@ -18,13 +20,15 @@ QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """Values of quantities over variants. Shape (quantities, n): one number for each quantity and sample.
+    """Values of quantities over variants. Shape (quantities, n): one number for each quantity and
+    sample.
 
     Attributes:
         count: variants that have a value.
         least, most, mean: NaN without any.
         squares: sum of the squared distances from the mean.
-        extremes: of each quantity, the variants with the least and the most of all samples, shape (quantities, 2); -1 without any.
+        extremes: of each quantity, the variants with the least and the most of all samples, shape
+            (quantities, 2); -1 without any.
     """
 
     count: NDArray[np.int64]
@@ -36,7 +40,9 @@ class Summary:
 
     @property
     def deviation(self) -> Array:
-        """Standard deviation of what the variants are a sample of: over count - 1; NaN of fewer than two."""
+        """Standard deviation of what the variants are a sample of: over count - 1; NaN of fewer
+        than two.
+        """
         with np.errstate(all="ignore"):
             return np.where(self.count > 1, np.sqrt(self.squares / (self.count - 1)), np.nan)
 
@@ -52,8 +58,9 @@ def nothing(quantities: int, n: int) -> Summary:
 def merged(a: Summary, b: Summary) -> Summary:
     """The summary of the variants of both; b's come after a's.
 
-    Mean and squares by Chan, Golub and LeVeque: Updating formulae and a pairwise algorithm for computing sample variances (1979),
-    which lose no digits where the mean is large against the spread.
+    Mean and squares by Chan, Golub and LeVeque: Updating formulae and a pairwise algorithm for
+    computing sample variances (1979), which lose no digits where the mean is large against the
+    spread.
     """
     count = a.count + b.count
     with np.errstate(all="ignore"):
@@ -76,8 +83,9 @@ class Quantiles:
 
     Attributes:
         values: by linear interpolation between neighbours in order, shape (len(QUANTILES), n).
-        errors: standard errors: half the distance between the quantiles at p - s and p + s, s = sqrt(p (1 - p) / m), which is the
-            standard error of the share of m variants below a value; shape as of the values, None where these are exact.
+        errors: standard errors: half the distance between the quantiles at p - s and p + s, s =
+            sqrt(p (1 - p) / m), which is the standard error of the share of m variants below a
+            value; shape as of the values, None where these are exact.
         kept: how many variants they are of.
     """
 
@@ -105,7 +113,8 @@ def quantiles(kept: Sequence[Array], *, exact: bool) -> Quantiles:
         some = ~np.isnan(values).all(axis=1)
         found[:, some] = np.nanquantile(values[some], wanted, axis=1)
     else:
-        values.sort(axis=1)  # by vectors of numbers: half the time of looking for each quantile in turn
+        # by vectors of numbers: half the time of looking for each quantile in turn
+        values.sort(axis=1)
         found = np.quantile(values, wanted, axis=1, overwrite_input=True)
     if exact:
         return Quantiles(found, None, count)

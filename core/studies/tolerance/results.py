@@ -1,4 +1,6 @@
-"""The results of a study as data: the JSON schema kincheck-sweep/1. SI units; what was not computed is null."""
+"""The results of a study as data: the JSON schema kincheck-sweep/1. SI units; what was not computed
+is null.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,8 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
-    """One output, or a derivative of it, over all variants; lists have a number for each sample [unit].
+    """One output, or a derivative of it, over all variants; lists have a number for each sample
+    [unit].
 
     Attributes:
         nominal: at the nominal design.
@@ -62,7 +65,8 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Gradient(msgspec.Struct, frozen=True, kw_only=True):
-    """The derivative of an output by a coordinate at the nominal design [unit of output / unit of coordinate].
+    """The derivative of an output by a coordinate at the nominal design [unit of output / unit of
+    coordinate].
 
     Attributes:
         at_design: at the design position; null where the case does not pass through it.
@@ -70,7 +74,8 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
         largest: that of the largest size over the samples, with its sign.
         sample: where that is.
         error: what it is off by at most, from two step sizes.
-        accurate: whether that is at most 1e-6 of the output's largest gradient by any coordinate of that unit.
+        accurate: whether that is at most 1e-6 of the output's largest gradient by any coordinate of
+            that unit.
         scale: of the coordinate; times `largest` it is the bar of a tornado diagram.
     """
 
@@ -87,7 +92,9 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Effect(msgspec.Struct, frozen=True, kw_only=True):
-    """One at a time: a variant, and by output the largest change over the samples, with its sign [unit]."""
+    """One at a time: a variant, and by output the largest change over the samples, with its sign
+    [unit].
+    """
 
     variant: int
     coordinate: str
@@ -109,7 +116,8 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         run: its circumstances, as of a run: versions, machine, settings, and what the case is.
         samples: how many variants were solved.
-        asked: how many there were to be: more than were solved where the sweep was stopped before its end.
+        asked: how many there were to be: more than were solved where the sweep was stopped before
+            its end.
         quantiles_of: how many variants the quantiles are of.
         driver: values at the samples by name, as in a run's records.
         unsolved: variants without a solution somewhere; `failed` lists the first of them.
@@ -141,7 +149,9 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def partial(self) -> str:
-        """How many variants of how many there are, of a sweep that was stopped before its end; else empty."""
+        """How many variants of how many there are, of a sweep that was stopped before its end; else
+        empty.
+        """
         return f"{self.samples} of {self.asked}" if self.samples < self.asked else ""
 
     @property
@@ -151,7 +161,9 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def unjudged(self) -> int:
-        """How many checked variants have no value to compare; all are among those without a solution."""
+        """How many checked variants have no value to compare; all are among those without a
+        solution.
+        """
         return sum(each.outcome is Outcome.UNJUDGED for each in self.checked)
 
 
@@ -160,7 +172,9 @@ def numbers(values: Array) -> Numbers:
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
-def envelopes(study: Study, whole: Summary, found: Sequence[Quantiles], nominal: Array) -> dict[str, Envelope]:
+def envelopes(
+    study: Study, whole: Summary, found: Sequence[Quantiles], nominal: Array
+) -> dict[str, Envelope]:
     """The envelope of every row, by name."""
     spread = whole.deviation
     result: dict[str, Envelope] = {}
@@ -200,7 +214,9 @@ def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
                     output=row.name,
                     coordinate=coordinate.name,
                     unit=f"({row.unit})/{coordinate.unit}",
-                    at_design=None if found.design is None else numbers(found.design[c, r : r + 1])[0],
+                    at_design=None
+                    if found.design is None
+                    else numbers(found.design[c, r : r + 1])[0],
                     along=numbers(along),
                     largest=None if sample is None else float(along[sample]),
                     sample=sample,
@@ -219,8 +235,14 @@ def effect_table(study: Study, effects: Mapping[int, Array]) -> list[Effect]:
         offsets = study.variation.of_variant(study.seed, variant)
         (moved,) = np.flatnonzero(offsets)
         each = study.variation.coordinates[int(moved)]
-        by_row = {row.name: change for row, change in zip(study.rows, numbers(changes), strict=True)}
-        table.append(Effect(variant=variant, coordinate=each.name, offset=float(offsets[moved]), changes=by_row))
+        by_row = {
+            row.name: change for row, change in zip(study.rows, numbers(changes), strict=True)
+        }
+        table.append(
+            Effect(
+                variant=variant, coordinate=each.name, offset=float(offsets[moved]), changes=by_row
+            )
+        )
     return table
 
 
@@ -228,7 +250,12 @@ def coordinates(study: Study) -> list[VariedCoordinate]:
     """The coordinates that vary."""
     return [
         VariedCoordinate(
-            name=each.name, hardpoint=each.hardpoint, unit=each.unit, law=str(each.law), scale=each.scale, values=[*each.values]
+            name=each.name,
+            hardpoint=each.hardpoint,
+            unit=each.unit,
+            law=str(each.law),
+            scale=each.scale,
+            values=[*each.values],
         )
         for each in study.variation.coordinates
     ]

@@ -1,4 +1,6 @@
-"""Totals of numbers that come in lanes, traced as everything else that runs on lanes: whatever runs programs can reduce, too."""
+"""Totals of numbers that come in lanes, traced as everything else that runs on lanes: whatever runs
+programs can reduce, too.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,17 @@ from ...program.llvm.jit import LlvmCode
 from ...trajectory import Array
 from .reduce import Summary
 
-BEGIN = {"count": 0.0, "first": math.nan, "sum": 0.0, "squares": 0.0, "least": math.inf, "most": -math.inf}
-"""Totals of a lane: how many of its numbers are finite, the first of these, sums of the distances from it and of their squares, and
-the extremes; each with what it begins with. Distances from a number among them cost no digits where all are far from zero."""
+BEGIN = {
+    "count": 0.0,
+    "first": math.nan,
+    "sum": 0.0,
+    "squares": 0.0,
+    "least": math.inf,
+    "most": -math.inf,
+}
+"""Totals of a lane: how many of its numbers are finite, the first of these, sums of the distances
+from it and of their squares, and the extremes; each with what it begins with. Distances from a
+number among them cost no digits where all are far from zero."""
 AT_A_TIME = 8
 """Numbers of each lane that are taken before the totals are put out."""
 NUMPY_LANES = 128
@@ -37,12 +47,16 @@ def plan() -> Plan:
         least = minimum(least, where_larger(math.inf, value, value, math.inf))
         most = maximum(most, where_larger(math.inf, value, value, -math.inf))
     taken = program("take", tape, dict(enumerate((count, first, total, squares, least, most))))
-    names = {**{name: k for k, name in enumerate(BEGIN)}, **{f"value {k}": slot for k, slot in enumerate(slots)}}
+    names = {
+        **{name: k for k, name in enumerate(BEGIN)},
+        **{f"value {k}": slot for k, slot in enumerate(slots)},
+    }
     return Plan({"take": taken}, names, after=("take",), taken=slots, kept=range(len(BEGIN)))
 
 
 class Totals:
-    """Totals of quantities at n samples, lane by lane: variants are lanes. It belongs to the thread that made it.
+    """Totals of quantities at n samples, lane by lane: variants are lanes. It belongs to the thread
+    that made it.
 
     Attributes:
         found: shape (quantities, len(BEGIN), n, lanes).
@@ -50,7 +64,8 @@ class Totals:
     """
 
     def __init__(self, quantities: int, n: int) -> None:
-        self._executor = _bound(None, _executor)  # for this thread: its lanes hold totals while numbers are taken
+        # for this thread: its lanes hold totals while numbers are taken
+        self._executor = _bound(None, _executor)
         self.found = np.empty((quantities, len(BEGIN), n, self._executor.group))
         self.found[:] = np.array([*BEGIN.values()])[:, None, None]
         self.extremes = np.full((quantities, 2), -1, dtype=np.int64)
@@ -64,7 +79,9 @@ class Totals:
             first: index of the first variant.
         """
         table = values
-        if (short := -values.shape[2] % (AT_A_TIME * self._executor.group)) or not values.flags.c_contiguous:
+        if (
+            short := -values.shape[2] % (AT_A_TIME * self._executor.group)
+        ) or not values.flags.c_contiguous:
             table = np.pad(values, ((0, 0), (0, 0), (0, short)), constant_values=np.nan)
         for rows, totals in zip(table, self.found, strict=True):
             self._executor.fold(rows, totals)
@@ -73,7 +90,9 @@ class Totals:
             outermost = by_sample.min(axis=1)
             for q in np.flatnonzero(outermost < self._outermost[which]).tolist():
                 sample = by_sample[q].argmin()
-                self.extremes[q, which] = first + (values[q, sample] == (1, -1)[which] * outermost[q]).argmax()
+                self.extremes[q, which] = (
+                    first + (values[q, sample] == (1, -1)[which] * outermost[q]).argmax()
+                )
             self._outermost[which] = outermost
 
     def summary(self) -> Summary:
@@ -87,7 +106,9 @@ class Totals:
         least, most = self["least"].min(axis=2), self["most"].max(axis=2)
         least[whole == 0.0] = most[whole == 0.0] = np.nan
         squares += np.where(some, count * (mean - mean_of_all[:, :, None]) ** 2, 0.0)
-        return Summary(whole.astype(np.int64), least, most, mean_of_all, squares.sum(axis=2), self.extremes)
+        return Summary(
+            whole.astype(np.int64), least, most, mean_of_all, squares.sum(axis=2), self.extremes
+        )
 
     def __getitem__(self, name: str) -> Array:
         """The totals of a name, shape (quantities, n, lanes)."""
@@ -95,7 +116,9 @@ class Totals:
 
 
 def _executor() -> Executor:
-    return LlvmExecutor(_code(), _code().width) if available() else NumpyExecutor(plan(), NUMPY_LANES)
+    return (
+        LlvmExecutor(_code(), _code().width) if available() else NumpyExecutor(plan(), NUMPY_LANES)
+    )
 
 
 @cache

@@ -1,4 +1,6 @@
-"""A study: which variants of which case, what is wanted of them, and what one chunk of them gives. Plain data, sent anywhere."""
+"""A study: which variants of which case, what is wanted of them, and what one chunk of them gives.
+Plain data, sent anywhere.
+"""
 
 from __future__ import annotations
 
@@ -23,13 +25,15 @@ from ...trajectory import PER_TIME, QUANTITIES, Array
 from .reduce import Summary
 from .streaming_totals import Totals
 
-# Variants that are solved together: what calls cost that reduce them is lost among as many. `solve_designs`, which reduces nothing,
-# is as fast with a quarter of them.
+# Variants that are solved together: what calls cost that reduce them is lost among as many.
+# `solve_designs`, which reduces nothing, is as fast with a quarter of them.
 TOGETHER = 1024
-# Bytes of motions at once, of one thread: many samples of many points are solved fewer at a time. As many are used again.
+# Bytes of motions at once, of one thread: many samples of many points are solved fewer at a time.
+# As many are used again.
 ROOM = RECYCLED
-# A study is in so many chunks for threads and workers to share, as far as that makes none smaller than the least, nor larger than
-# the most: each costs the other threads a pause of Python's lock, and on a cluster the scheduler a millisecond.
+# A study is in so many chunks for threads and workers to share, as far as that makes none smaller
+# than the least, nor larger than the most: each costs the other threads a pause of Python's lock,
+# and on a cluster the scheduler a millisecond.
 CHUNKS, LEAST, MOST = 64, 64, 4096
 # Where the values of all variants are stored, so many are held at once.
 MOST_STORED = 256
@@ -81,7 +85,9 @@ class Study:
 
     @property
     def of_a_chunk(self) -> int:
-        """Variants of a chunk, which is solved and reduced in one thread; told by the study alone, so that sums are the same."""
+        """Variants of a chunk, which is solved and reduced in one thread; told by the study alone,
+        so that sums are the same.
+        """
         share = self.samples // CHUNKS
         return min(MOST_STORED if self.whole else MOST, max(LEAST, share - share % LEAST))
 
@@ -103,7 +109,9 @@ class Study:
         """The case with the geometry of one variant."""
         values = self.variation.values(self.variation.of_variant(self.seed, index))
         name = f"{self.case.name} variant {index} of seed {self.seed}"
-        return replace(self.case, name=name, mechanism=placed(self.case.mechanism, values), reference={})
+        return replace(
+            self.case, name=name, mechanism=placed(self.case.mechanism, values), reference={}
+        )
 
 
 @dataclass(frozen=True)
@@ -126,7 +134,8 @@ class Chunk:
         unsolved: the first of the variants without a solution somewhere.
         failures: how many those are.
         retried: variants that were solved again alone, with divided steps.
-        effects: one at a time only: the largest change of each row over the samples, signed, shape (rows, count).
+        effects: one at a time only: the largest change of each row over the samples, signed, shape
+            (rows, count).
         values, offsets: where all are wanted: shape (rows, n, count) and (coordinates, count).
     """
 
@@ -172,7 +181,9 @@ class Ready:
         return self.values(np.zeros((len(self.study.variation.coordinates), 1)))[0][:, :, 0]
 
     def values(self, offsets: Array) -> tuple[Array, NDArray[np.bool_], int, Mapping[int, str]]:
-        """The rows of variants, NaN where there is none, shape (rows, n, V); which samples are solved (n, V); retried; messages."""
+        """The rows of variants, NaN where there is none, shape (rows, n, V); which samples are
+        solved (n, V); retried; messages.
+        """
         geometry = self.study.variation.geometry(offsets)
         found = solve_variants(self.route, geometry, self.study.tol)
         return self._rows(found.kept, geometry), found.solved, found.retried, found.messages
@@ -183,14 +194,22 @@ class Ready:
         numbers = self._numbers
         unknown = np.full((1, 1), np.nan)
         for name in self.study.case.points:
-            known = [kept[self.model.rows[f"{label} {name}"]] for label in QUANTITIES[: self.model.orders]]
+            known = [
+                kept[self.model.rows[f"{label} {name}"]]
+                for label in QUANTITIES[: self.model.orders]
+            ]
             x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
             at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
             place = f"points.{name}.position"
-            where = geometry[numbers[place]] if place in numbers else np.array(self.study.case.mechanism.point(name).position)
+            where = (
+                geometry[numbers[place]]
+                if place in numbers
+                else np.array(self.study.case.mechanism.point(name).position)
+            )
             design[name] = Vec3(*(Jet(each, np.zeros(()), np.zeros(())) for each in where))
         values = np.empty((len(self.study.rows), *kept.shape[1:]))
-        with np.errstate(all="ignore"):  # what is not known is NaN, and what is made of it becomes NaN
+        # what is not known is NaN, and what is made of it becomes NaN
+        with np.errstate(all="ignore"):
             jets = {output.name: output.of(at, design) for output in self.study.case.outputs}
             for k, row in enumerate(self.study.rows):
                 jet = jets[row.output.name]
@@ -214,7 +233,11 @@ class Ready:
         count = min(study.of_a_chunk, study.samples - first)
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
-        totals, picked, kept = Totals(len(study.rows), len(self.route.path.times)), dict[int, Array](), list[Array]()
+        totals, picked, kept = (
+            Totals(len(study.rows), len(self.route.path.times)),
+            dict[int, Array](),
+            list[Array](),
+        )
         unsolved: list[Unsolved] = []
         effects: list[Array] = []
         stored: list[Array] = []
@@ -228,7 +251,9 @@ class Ready:
             failures += len(messages)
             retried += again
             some = sorted(messages)[:MOST_MESSAGES]
-            unsolved += [Unsolved(first + start + k, int((~solved[:, k]).sum()), messages[k]) for k in some]
+            unsolved += [
+                Unsolved(first + start + k, int((~solved[:, k]).sum()), messages[k]) for k in some
+            ]
             if study.variation.mode is Mode.ONE_AT_A_TIME:
                 effects.append(largest(values - self.nominal[:, :, None]))
             if study.whole:
@@ -256,12 +281,17 @@ class Ready:
 def request(study: Study) -> Request:
     """What the native solver is asked for: no derivative that no output needs."""
     case = study.case
-    # an output of one derivative less is a quotient of velocities, and of two less has their derivatives in it
+    # an output of one derivative less is a quotient of velocities, and of two less has their
+    # derivatives in it
     order = max(3 - output.orders + min(study.order, output.orders - 1) for output in case.outputs)
-    return Request(tuple(case.sweep.path.motions), case.points, (), order, varied=tuple(study.variation.places))
+    return Request(
+        tuple(case.sweep.path.motions), case.points, (), order, varied=tuple(study.variation.places)
+    )
 
 
 def largest(changes: Array) -> Array:
-    """Return of changes, shape (rows, n, V), the largest in size over the samples, signed, shape (rows, V); NaN without any."""
+    """Return of changes, shape (rows, n, V), the largest in size over the samples, signed, shape
+    (rows, V); NaN without any.
+    """
     sizes = np.nan_to_num(np.abs(changes), nan=-1.0)
     return np.take_along_axis(changes, sizes.argmax(axis=1)[:, None, :], axis=1)[:, 0]

@@ -1,4 +1,6 @@
-"""A sweep over designs from beginning to end: solve all variants, reduce them on the way, differentiate, cross-check."""
+"""A sweep over designs from beginning to end: solve all variants, reduce them on the way,
+differentiate, cross-check.
+"""
 
 from __future__ import annotations
 
@@ -30,19 +32,23 @@ from .part_file import Part
 from .reduce import merged, nothing, quantiles
 from .study import Chunk, Ready, Study, Unsolved
 
-# Variants whose values are kept for quantiles: among ten thousand, the standard error of a 1 % quantile is a tenth of a percent.
+# Variants whose values are kept for quantiles: among ten thousand, the standard error of a 1 %
+# quantile is a tenth of a percent.
 KEPT = 10_000
 # Bytes that they may take; with many outputs over many samples there are fewer.
 KEPT_BYTES = 64_000_000
 # Variants without a solution that are listed; all are counted.
 LISTED = 50
-# A grid is counted in whole numbers; more than this is a mistake in it (a variant costs some ten microseconds, so it is a day).
+# A grid is counted in whole numbers; more than this is a mistake in it (a variant costs some ten
+# microseconds, so it is a day).
 MOST_VARIANTS = 10**10
 
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """How far a sweep is: variants solved of all, without a solution among them, seconds, and variants solved in these."""
+    """How far a sweep is: variants solved of all, without a solution among them, seconds, and
+    variants solved in these.
+    """
 
     done: int
     total: int
@@ -87,13 +93,15 @@ def sweep_designs(
     part: Part | None = None,
     stopped: Callable[[KeyboardInterrupt | ClusterError], None] | None = None,
 ) -> results.SweepResults:
-    """Solve all variants of a case and reduce its outputs over them; never are all variants held at once.
+    """Solve all variants of a case and reduce its outputs over them; never are all variants held at
+    once.
 
     Args:
         case: a case, as `kincheck run` takes it; its reference is not looked at.
         variation: what varies, from `read_variation`.
         samples: how many variants are drawn; None where the variation lists them.
-        seed: of the draws; the same seed gives the same variants on any machine and with any number of jobs.
+        seed: of the draws; the same seed gives the same variants on any machine and with any number
+            of jobs.
         order: derivatives of the outputs by time that are reduced too: 0, 1 or 2.
         tol: largest accepted constraint residual, relative to the mechanism's size.
         jobs: threads.
@@ -103,16 +111,19 @@ def sweep_designs(
         progress: told after every chunk.
         command: the command line, kept with the results.
         part: keeps the chunks that are solved, and has those of an earlier sweep that was stopped.
-        stopped: told what stops the sweep before its end: the results are then of the variants solved so far. Without it, and where
-            there are none yet, that is raised.
+        stopped: told what stops the sweep before its end: the results are then of the variants
+            solved so far. Without it, and where there are none yet, that is raised.
 
     Raises:
-        KincheckError: the number of variants is missing or not for this mode, the nominal design cannot be solved, the engine of
-            the check is not there or not able, or there is no cluster.
+        KincheckError: the number of variants is missing or not for this mode, the nominal design
+            cannot be solved, the engine of the check is not there or not able, or there is no
+            cluster.
     """
     started = datetime.now(UTC)
     case = replace(case, reference={})
-    study = Study(case, variation, how_many(variation, samples), seed, order, tol, whole=store is not None)
+    study = Study(
+        case, variation, how_many(variation, samples), seed, order, tol, whole=store is not None
+    )
     if check is not None:
         cross_check.require_able(study, check.engine, check.solver, check.tol)
         study = replace(study, picked=cross_check.chosen(study.samples, check.share, seed))
@@ -134,27 +145,51 @@ def sweep_designs(
                         store.write(chunk)
                     if part is not None:
                         part.add(chunk)
-                progress(Progress(found.done, study.samples, found.failures, perf_counter() - begin, found.done - earlier))
+                progress(
+                    Progress(
+                        found.done,
+                        study.samples,
+                        found.failures,
+                        perf_counter() - begin,
+                        found.done - earlier,
+                    )
+                )
         measured = _measured(
-            study, found.done - earlier, jobs if source is None else None, perf_counter() - begin, process_time() - cpu
+            study,
+            found.done - earlier,
+            jobs if source is None else None,
+            perf_counter() - begin,
+            process_time() - cpu,
         )
         if check is not None:
-            checked = cross_check.check(study, check.engine, check.solver, found.picked, check.tol, check.progress)
+            checked = cross_check.check(
+                study, check.engine, check.solver, found.picked, check.tol, check.progress
+            )
         hold()
     except (KeyboardInterrupt, ClusterError) as reason:
         if stopped is None or not found.done:
             raise
         stopped(reason)
         measured = _measured(
-            study, found.done - earlier, jobs if source is None else None, perf_counter() - begin, process_time() - cpu
+            study,
+            found.done - earlier,
+            jobs if source is None else None,
+            perf_counter() - begin,
+            process_time() - cpu,
         )
     slopes = gradients(ready)
-    exact = study.subset >= 1.0 and variation.mode is not Mode.MONTE_CARLO and found.done == study.samples
+    exact = (
+        study.subset >= 1.0
+        and variation.mode is not Mode.MONTE_CARLO
+        and found.done == study.samples
+    )
     by_row = [[each[k] for each in found.kept] for k in range(len(study.rows))]
     with ThreadPoolExecutor(jobs) as pool:  # sorting is done without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
-    run["cases"][case.name]["notes"] += start_notes(case.mechanism, ready.model.request, case.sweep.path, tol)
+    run["cases"][case.name]["notes"] += start_notes(
+        case.mechanism, ready.model.request, case.sweep.path, tol
+    )
     return results.SweepResults(
         run=run,
         case=case.name,
@@ -167,10 +202,15 @@ def sweep_designs(
         outputs=results.envelopes(study, found.summary, kept, ready.nominal),
         quantiles_of=kept[0].kept,
         gradients=results.gradient_table(study, slopes),
-        gradient_messages={variation.coordinates[k].name: message for k, message in sorted(slopes.messages.items())},
+        gradient_messages={
+            variation.coordinates[k].name: message for k, message in sorted(slopes.messages.items())
+        },
         effects=results.effect_table(study, found.effects),
         unsolved=found.failures,
-        failed=[results.Failed(variant=each.variant, samples=each.samples, message=each.message) for each in found.unsolved],
+        failed=[
+            results.Failed(variant=each.variant, samples=each.samples, message=each.message)
+            for each in found.unsolved
+        ],
         retried=found.retried,
         check_engine=check.engine.name if check else None,
         checked=checked,
@@ -196,7 +236,9 @@ class _Gathered:
         self.picked |= chunk.picked
         self.unsolved += islice(chunk.unsolved, LISTED - len(self.unsolved))
         if chunk.effects is not None:  # the first variant is the nominal design
-            self.effects |= {self.done + k: each for k, each in enumerate(chunk.effects.T) if self.done + k}
+            self.effects |= {
+                self.done + k: each for k, each in enumerate(chunk.effects.T) if self.done + k
+            }
         self.done += chunk.count
         self.chunks += 1
         self.failures += chunk.failures
@@ -210,17 +252,26 @@ def how_many(variation: Variation, samples: int | None) -> int:
         samples: as many as are drawn; None where they are listed.
 
     Raises:
-        KincheckError: it is not given where it is needed, or given where it is not, or there are too many.
+        KincheckError: it is not given where it is needed, or given where it is not, or there are
+            too many.
     """
     listed = variation.count
     if listed is None:
         if samples is None:
-            raise KincheckError(f"{variation.mode} draws as many variants as it is told; give --samples")
+            raise KincheckError(
+                f"{variation.mode} draws as many variants as it is told; give --samples"
+            )
         listed = samples
     elif samples is not None:
-        raise KincheckError(f"--samples: {variation.mode} has {listed} variants as listed, none is drawn; leave it out")
+        raise KincheckError(
+            f"--samples: {variation.mode} has {listed} variants as listed, none is drawn; leave"
+            " it out"
+        )
     if not 1 <= listed <= MOST_VARIANTS:
-        raise KincheckError(f"{listed} variants, expected 1 to {MOST_VARIANTS}; vary less at once, or in fewer steps")
+        raise KincheckError(
+            f"{listed} variants, expected 1 to {MOST_VARIANTS}; vary less at once, or in fewer"
+            " steps"
+        )
     return listed
 
 
@@ -228,12 +279,20 @@ def _kept(study: Study) -> int:
     return max(1, min(KEPT, KEPT_BYTES // (8 * len(study.rows) * len(study.case.sweep.values))))
 
 
-def _measured(study: Study, solved: int, jobs: int | None, seconds: float, cpu: float) -> dict[str, Any]:
-    """Rates of the solution and reduction of the variants; those by core are not known of a cluster."""
+def _measured(
+    study: Study, solved: int, jobs: int | None, seconds: float, cpu: float
+) -> dict[str, Any]:
+    """Rates of the solution and reduction of the variants; those by core are not known of a
+    cluster.
+    """
     points = solved * len(study.case.sweep.values)
     found: dict[str, Any] = {"seconds": seconds, "variants_per_second": solved / seconds}
     if jobs is not None and points:
-        found |= {"jobs": jobs, "us_per_sample_and_core": 1e6 * seconds * jobs / points, "cpu_us_per_sample": 1e6 * cpu / points}
+        found |= {
+            "jobs": jobs,
+            "us_per_sample_and_core": 1e6 * seconds * jobs / points,
+            "cpu_us_per_sample": 1e6 * cpu / points,
+        }
     return found
 
 

@@ -1,1 +1,3 @@
-"""Hardpoints: files of named points as suspension engineers have them, onto templates of suspensions, to cases."""
+"""Hardpoints: files of named points as suspension engineers have them, onto templates of
+suspensions, to cases.
+"""

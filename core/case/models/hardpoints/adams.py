@@ -1,7 +1,9 @@
-"""Hardpoints of Adams/Car: the [HARDPOINT] blocks of its subsystem, template and assembly files (TeimOrbit format).
+"""Hardpoints of Adams/Car: the [HARDPOINT] blocks of its subsystem, template and assembly files
+(TeimOrbit format).
 
-A block has the columns {hardpoint_name symmetry x_value y_value z_value}; of a 'left/right' pair it holds the left one. Adams/Car
-has x rearward, y to the right and z up. The unit is in the block [UNITS]; a block that was cut out of its file has none.
+A block has the columns {hardpoint_name symmetry x_value y_value z_value}; of a 'left/right' pair it
+holds the left one. Adams/Car has x rearward, y to the right and z up. The unit is in the block
+[UNITS]; a block that was cut out of its file has none.
 """
 
 from __future__ import annotations
@@ -46,18 +48,37 @@ def read_adams(file: Path, text: str) -> HardpointTable:
         elif section == "HARDPOINT" and row.startswith("{"):
             columns = tuple(row.strip("{}").split())
             if sorted(columns) != sorted(COLUMNS):
-                raise fault(file, where, f"found the columns {shown(row)}, expected {{{' '.join(COLUMNS)}}}; correct them")
+                raise fault(
+                    file,
+                    where,
+                    f"found the columns {shown(row)}, expected {{{' '.join(COLUMNS)}}}; correct"
+                    " them",
+                )
         elif section == "HARDPOINT":
             name, symmetry, point = _row(file, where, row, columns)
             if symmetry == RIGHT:
                 right += 1
             elif name in points:
-                raise fault(file, where, f"{name}: given before, in {points[name].where}, expected once; remove one of them")
+                raise fault(
+                    file,
+                    where,
+                    f"{name}: given before, in {points[name].where}, expected once; remove one of"
+                    " them",
+                )
             else:
                 points[name] = point
     if not points:
-        raise fault(file, "", f"found no row in a block {BLOCK}, expected hardpoints; give a subsystem file of Adams/Car")
-    left_out = [f"[{name}] ({rows} rows)" for name, rows in sections.items() if name not in ("HARDPOINT", "UNITS", "") and rows]
+        raise fault(
+            file,
+            "",
+            f"found no row in a block {BLOCK}, expected hardpoints; give a subsystem file of"
+            " Adams/Car",
+        )
+    left_out = [
+        f"[{name}] ({rows} rows)"
+        for name, rows in sections.items()
+        if name not in ("HARDPOINT", "UNITS", "") and rows
+    ]
     left_out += [f"{right} points of the right side"] * bool(right)
     return HardpointTable(file, "Adams/Car", points, unit, "rearward,right,up", None, left_out)
 
@@ -65,12 +86,24 @@ def read_adams(file: Path, text: str) -> HardpointTable:
 def _row(file: Path, where: str, row: str, columns: tuple[str, ...]) -> tuple[str, str, Hardpoint]:
     fields = [(quoted or bare).strip() for quoted, bare in _FIELD.findall(row)]
     if len(fields) != len(columns):
-        raise fault(file, where, f"found {len(fields)} fields, expected {len(columns)}: {' '.join(columns)}; complete the row")
+        raise fault(
+            file,
+            where,
+            f"found {len(fields)} fields, expected {len(columns)}: {' '.join(columns)}; complete"
+            " the row",
+        )
     cells = dict(zip(columns, fields, strict=True))
     name, symmetry = cells["hardpoint_name"], cells["symmetry"].lower()
     if not name or not name.isprintable():
-        raise fault(file, where, f"found the name {name!r}, expected printable characters; name the point")
+        raise fault(
+            file, where, f"found the name {name!r}, expected printable characters; name the point"
+        )
     if symmetry not in (*LEFT, RIGHT):
-        raise fault(file, where, f"{name}: found symmetry {shown(symmetry)}, expected a side; {remedy(symmetry, (*LEFT, RIGHT))}")
+        raise fault(
+            file,
+            where,
+            f"{name}: found symmetry {shown(symmetry)}, expected a side;"
+            f" {remedy(symmetry, (*LEFT, RIGHT))}",
+        )
     x, y, z = (number(file, f"{where}: {name}: {axis}", cells[axis]) for axis in COLUMNS[2:])
     return name, symmetry, Hardpoint((x, y, z), where)

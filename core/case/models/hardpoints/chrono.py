@@ -1,6 +1,8 @@
-"""Suspensions of Project Chrono: the JSON files of its vehicle models (data/vehicle/**/suspension/*.json).
+"""Suspensions of Project Chrono: the JSON files of its vehicle models
+(data/vehicle/**/suspension/*.json).
 
-Points are relative to the subsystem, metres, x forward, y left, z up; those of the left side are given (Chrono::Vehicle manual).
+Points are relative to the subsystem, metres, x forward, y left, z up; those of the left side are
+given (Chrono::Vehicle manual).
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from .table import Hardpoint, HardpointTable, number
 WHEEL_CENTER = "Spindle/COM"
 """The centre of mass of the spindle, which is where Chrono has its wheel."""
 
-# What is open goes on to the end of the line or file: were it no match, every quote and every /* would be searched from anew.
+# What is open goes on to the end of the line or file: were it no match, every quote and every /*
+# would be searched from anew.
 _STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*+"?|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
 
 
@@ -38,10 +41,19 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
     tables = parse(file, without_comments(text))
     kind = tables.get("Type", "Suspension")
     if kind != "Suspension":
-        raise fault(file, "Type", f'found {shown(kind)}, expected "Suspension"; give the JSON file of a suspension')
+        raise fault(
+            file,
+            "Type",
+            f'found {shown(kind)}, expected "Suspension"; give the JSON file of a suspension',
+        )
     template = tables.get("Template")
     if template is not None and not isinstance(template, str):
-        raise fault(file, "Template", f"found {shown(template)}, expected the name of a suspension template; correct the value")
+        raise fault(
+            file,
+            "Template",
+            f"found {shown(template)}, expected the name of a suspension template; correct the"
+            " value",
+        )
     points: dict[str, Hardpoint] = {}
     left_out: list[str] = []
     for section, content in tables.items():
@@ -60,13 +72,25 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
         if others:
             left_out.append(f"{section} ({', '.join(others)})")
     if not points:
-        raise fault(file, "", 'found no key "Location ...", expected the points of a suspension; give a suspension file of Chrono')
-    return HardpointTable(file, "Project Chrono", points, "m", "forward,left,up", template, left_out)
+        raise fault(
+            file,
+            "",
+            'found no key "Location ...", expected the points of a suspension; give a suspension'
+            " file of Chrono",
+        )
+    return HardpointTable(
+        file, "Project Chrono", points, "m", "forward,left,up", template, left_out
+    )
 
 
 def _point(file: Path, key: str, value: object) -> tuple[float, float, float]:
     numbers = cast("list[object]", value) if isinstance(value, list) else []
     if len(numbers) != 3:
-        raise fault(file, key, f"found {shown(cast('object', value))}, expected three numbers [x, y, z]; correct the point")
+        raise fault(
+            file,
+            key,
+            f"found {shown(cast('object', value))}, expected three numbers [x, y, z]; correct the"
+            " point",
+        )
     x, y, z = (number(file, key, each) for each in numbers)
     return x, y, z

@@ -1,4 +1,6 @@
-"""From a file of hardpoints and a template to a case: the wheel goes up and down, the chassis and the steering stand still."""
+"""From a file of hardpoints and a template to a case: the wheel goes up and down, the chassis and
+the steering stand still.
+"""
 
 from __future__ import annotations
 
@@ -24,23 +26,30 @@ from .templates.base import KNUCKLE, normal
 
 Reader = Callable[[Path, str], HardpointTable]
 
-# The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every 2.5 mm.
+# The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every
+# 2.5 mm.
 TRAVEL, SAMPLES = 0.05, 41
 WHEEL = "wheel_center"
-# Cars have some tens of hardpoints at a corner; names of many more are not searched for those that are missing.
+# Cars have some tens of hardpoints at a corner; names of many more are not searched for those that
+# are missing.
 MOST_POINTS = 10_000
 
 
 def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -> Case:
-    """The case of a suspension: outputs are the coordinates of three points of the knuckle; it is consensus_only.
+    """The case of a suspension: outputs are the coordinates of three points of the knuckle; it is
+    consensus_only.
 
     Raises:
-        CaseError: the file cannot be read, does not say enough, or does not fill the roles of the template.
+        CaseError: the file cannot be read, does not say enough, or does not fill the roles of the
+            template.
     """
     table = reader(file, text)
     if len(table.points) > MOST_POINTS:
         raise fault(
-            file, "", f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most; take out the others"
+            file,
+            "",
+            f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most;"
+            " take out the others",
         )
     template = _template(table, supplied.template)
     points = placed(table, supplied.units, supplied.axes)
@@ -56,7 +65,10 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
         stroke = PointCoordinate("stroke", WHEEL, AXES["z"])
         mechanism = Mechanism(file.stem, [Body(name) for name in bodies], joints, watched, [stroke])
     others = [*(name for name in points if name not in named.values()), *table.left_out]
-    source = f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x forward, y left, z up{LEFT_OUT}"
+    source = (
+        f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x"
+        f" forward, y left, z up{LEFT_OUT}"
+    )
     source += _listed(others)
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ())
     return with_all_coordinates(replace(case, length_unit=unit_of(table, supplied.units).name))
@@ -65,20 +77,33 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
 def _template(table: HardpointTable, said: str | None) -> Template:
     known = {normal(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
     if said is not None and normal(said) not in known:
-        raise fault(table.file, "--template", f"found {shown(said)}, expected a template; {remedy(said, TEMPLATES)}")
+        raise fault(
+            table.file,
+            "--template",
+            f"found {shown(said)}, expected a template; {remedy(said, TEMPLATES)}",
+        )
     names = ", ".join(TEMPLATES)
     if table.template is None:
         if said is None:
             raise fault(
-                table.file, "", f"does not say what suspension it is of, expected it from you; add --template, one of {names}"
+                table.file,
+                "",
+                "does not say what suspension it is of, expected it from you; add --template, one"
+                f" of {names}",
             )
         return known[normal(said)]
     if normal(table.template) not in known:
-        problem = f"found {shown(table.template)}, expected one of those that there is a template for; known: {names}"
+        problem = (
+            f"found {shown(table.template)}, expected one of those that there is a template for;"
+            f" known: {names}"
+        )
         raise fault(table.file, "Template", problem)
     written = known[normal(table.template)]
     if said is not None and known[normal(said)] is not written:
-        problem = f"found {said}, but the file is of a {table.template}, expected {written.name}; leave out --template"
+        problem = (
+            f"found {said}, but the file is of a {table.template}, expected {written.name}; leave"
+            " out --template"
+        )
         raise fault(table.file, "--template", problem)
     return written
 
@@ -90,10 +115,16 @@ def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
         by_normal_name.setdefault(normal(name), []).append(name)
     filled: dict[str, str] = {}
     for role in template.roles:
-        found = [name for each in dict.fromkeys(role.names) for name in by_normal_name.get(each, ())]
+        found = [
+            name for each in dict.fromkeys(role.names) for name in by_normal_name.get(each, ())
+        ]
         if len(found) > 1:
             places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
-            raise fault(table.file, role.name, f"found {places}, expected one point; remove what {role.meaning} is not")
+            raise fault(
+                table.file,
+                role.name,
+                f"found {places}, expected one point; remove what {role.meaning} is not",
+            )
         if found:
             filled[role.name] = found[0]
     missing = [role for role in template.roles if role.name not in filled]
@@ -110,7 +141,11 @@ def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
             advice = f" (is it {name!r}{'' if where == name else f', {where}'}?)"
         lines.append(f"{role.name}, {role.meaning}{advice}")
     problem = f"template {template.name}: missing {'; '.join(lines)}"
-    raise fault(table.file, "", f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them")
+    raise fault(
+        table.file,
+        "",
+        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them",
+    )
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -119,7 +154,11 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _require_left_and_upright(
-    table: HardpointTable, template: Template, named: Mapping[str, str], at: Mapping[str, Vector], supplied: Supplied
+    table: HardpointTable,
+    template: Template,
+    named: Mapping[str, str],
+    at: Mapping[str, Vector],
+    supplied: Supplied,
 ) -> None:
     """Refuse points that are mirrored or upside down: their axes are others than was said."""
 
@@ -131,7 +170,8 @@ def _require_left_and_upright(
         raise fault(
             table.file,
             named[WHEEL],
-            f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice}, or give the left points",
+            f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice},"
+            " or give the left points",
         )
     for rear in (role for role in at if role.endswith("_rear")):
         front = f"{rear.removesuffix('_rear')}_front"
@@ -139,15 +179,16 @@ def _require_left_and_upright(
             raise fault(
                 table.file,
                 named[front],
-                f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it in front of that; {advice}",
+                f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
+                f" in front of that; {advice}",
             )
     high, low = (at[role][2] for role in (template.upper, template.lower))
     if high <= low:
         raise fault(
             table.file,
             named[template.upper],
-            f"found {written(template.upper, 2)}, not above {named[template.lower]} with {written(template.lower, 2)}, "
-            f"expected it above; {advice}",
+            f"found {written(template.upper, 2)}, not above {named[template.lower]} with"
+            f" {written(template.lower, 2)}, expected it above; {advice}",
         )
 
 
@@ -164,7 +205,7 @@ def _travel(file: Path, said: str | None) -> Array:
             raise fault(
                 file,
                 "--travel",
-                f"found {shown(said)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of them; say --travel 0.05 for 50 mm "
-                "up and down",
+                f"found {shown(said)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of"
+                " them; say --travel 0.05 for 50 mm up and down",
             )
     return np.linspace(-travel, travel, samples)

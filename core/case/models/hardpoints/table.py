@@ -1,4 +1,6 @@
-"""A table of hardpoints as its file gives it, and its way to metres in the axes of ISO 8855: x forward, y left, z up."""
+"""A table of hardpoints as its file gives it, and its way to metres in the axes of ISO 8855: x
+forward, y left, z up.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,11 @@ _DIRECTIONS: Mapping[str, tuple[int, float]] = {
     "up": (2, 1.0),
     "down": (2, -1.0),
 }
-_NAMED_AXES: Mapping[str, str] = {"iso": "forward,left,up", "sae": "forward,right,down", "adams": "rearward,right,up"}
+_NAMED_AXES: Mapping[str, str] = {
+    "iso": "forward,left,up",
+    "sae": "forward,right,down",
+    "adams": "rearward,right,up",
+}
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,8 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
     """The points in metres, x forward, y left, z up.
 
     Args:
-        units, axes: what the user says of them; needed where the file does not say, and not to contradict it.
+        units, axes: what the user says of them; needed where the file does not say, and not to
+            contradict it.
 
     Raises:
         CaseError: unit or axes are not known, or contradict each other.
@@ -93,10 +100,17 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
     return points
 
 
-def coordinate(table: HardpointTable, name: str, k: int, units: str | None, axes: str | None) -> str:
-    """The coordinate of a point that became its x, y or z (0, 1, 2), as the file has it: "y = 750 mm"."""
+def coordinate(
+    table: HardpointTable, name: str, k: int, units: str | None, axes: str | None
+) -> str:
+    """The coordinate of a point that became its x, y or z (0, 1, 2), as the file has it: "y = 750
+    mm".
+    """
     column = next(column for column, (axis, _) in enumerate(_axes(table, axes)) if axis == k)
-    return f"{'xyz'[column]} = {plain(table.points[name].position[column])} {unit_of(table, units).name}"
+    return (
+        f"{'xyz'[column]} = {plain(table.points[name].position[column])}"
+        f" {unit_of(table, units).name}"
+    )
 
 
 def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str | None) -> None:
@@ -116,18 +130,33 @@ def unit_of(table: HardpointTable, said: str | None) -> Unit:
 def _unit(table: HardpointTable, said: str | None) -> str:
     written = None if table.unit is None else _unit_name(table.unit)
     if written is not None and written not in LENGTHS:
-        raise fault(table.file, "unit", f"found {shown(table.unit)}, expected a length; {remedy(str(table.unit), LENGTHS)}")
+        raise fault(
+            table.file,
+            "unit",
+            f"found {shown(table.unit)}, expected a length; {remedy(str(table.unit), LENGTHS)}",
+        )
     if said is None:
         if written is None:
             raise fault(
-                table.file, "", "does not say in which unit its coordinates are, expected it from you; add --units mm or --units m"
+                table.file,
+                "",
+                "does not say in which unit its coordinates are, expected it from you; add --units"
+                " mm or --units m",
             )
         return written
     name = _unit_name(said)
     if name not in LENGTHS:
-        raise fault(table.file, "--units", f"found {shown(said)}, expected a length; {remedy(said, LENGTHS)}")
+        raise fault(
+            table.file,
+            "--units",
+            f"found {shown(said)}, expected a length; {remedy(said, LENGTHS)}",
+        )
     if written not in (None, name):
-        raise fault(table.file, "--units", f"found {said}, but the file is in {written}; leave out --units, or correct the file")
+        raise fault(
+            table.file,
+            "--units",
+            f"found {said}, but the file is in {written}; leave out --units, or correct the file",
+        )
     return name
 
 
@@ -141,8 +170,9 @@ def _axes(table: HardpointTable, said: str | None) -> list[tuple[int, float]]:
         raise fault(
             table.file,
             "",
-            "does not say where x, y and z point, expected it from you; add --axes forward,left,up (ISO 8855), "
-            "rearward,right,up (Adams/Car), forward,right,down (SAE J670), or what else they are",
+            "does not say where x, y and z point, expected it from you; add --axes forward,left,up"
+            " (ISO 8855), rearward,right,up (Adams/Car), forward,right,down (SAE J670), or what"
+            " else they are",
         )
     places = None if table.axes is None else _places(table.file, "axes", table.axes)
     if said is None:
@@ -150,18 +180,24 @@ def _axes(table: HardpointTable, said: str | None) -> list[tuple[int, float]]:
         return places
     found = _places(table.file, "--axes", said)
     if places not in (None, found):
-        raise fault(table.file, "--axes", f"found {said}, but the points of this file are {table.axes}; leave out --axes")
+        raise fault(
+            table.file,
+            "--axes",
+            f"found {said}, but the points of this file are {table.axes}; leave out --axes",
+        )
     return found
 
 
 def _places(file: Path, key: str, text: str) -> list[tuple[int, float]]:
-    words = [word.strip().lower() for word in _NAMED_AXES.get(text.strip().lower(), text).split(",")]
+    words = [
+        word.strip().lower() for word in _NAMED_AXES.get(text.strip().lower(), text).split(",")
+    ]
     places = [_DIRECTIONS[word] for word in words if word in _DIRECTIONS]
     if len(words) != 3 or sorted(k for k, _ in places) != [0, 1, 2]:
         raise fault(
             file,
             key,
-            f"found {shown(text)}, expected where x, y and z point, one each of forward or rearward, left or right, up or down; "
-            "write them with commas: forward,left,up",
+            f"found {shown(text)}, expected where x, y and z point, one each of forward or"
+            " rearward, left or right, up or down; write them with commas: forward,left,up",
         )
     return places

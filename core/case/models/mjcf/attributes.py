@@ -1,18 +1,75 @@
-"""The attributes that MJCF has, of the elements that are read; from MuJoCo's own schema (mj_printSchema, MuJoCo 4.0)."""
+"""The attributes that MJCF has, of the elements that are read; from MuJoCo's own schema
+(mj_printSchema, MuJoCo 4.0).
+"""
 
 from __future__ import annotations
 
 ORIENTATION = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _FRAME = ("name", "childclass", "pos", *ORIENTATION)
 _SOFT = ("solref", "solimp", "class", "active", "name")
-_FORCES = ("springdamper", "springyield", "stiffness", "springref", "armature", "damping", "frictionloss")
-_LIMITS = ("range", "limited", "actuatorfrcrange", "actuatorfrclimited", "actuatorgravcomp", "margin", "solreflimit", "solimplimit")
-_JOINT = ("type", "group", "pos", "axis", "ref", "user", "solreffriction", "solimpfriction", *_FORCES, *_LIMITS)
+_FORCES = (
+    "springdamper",
+    "springyield",
+    "stiffness",
+    "springref",
+    "armature",
+    "damping",
+    "frictionloss",
+)
+_LIMITS = (
+    "range",
+    "limited",
+    "actuatorfrcrange",
+    "actuatorfrclimited",
+    "actuatorgravcomp",
+    "margin",
+    "solreflimit",
+    "solimplimit",
+)
+_JOINT = (
+    "type",
+    "group",
+    "pos",
+    "axis",
+    "ref",
+    "user",
+    "solreffriction",
+    "solimpfriction",
+    *_FORCES,
+    *_LIMITS,
+)
 
 _COMPILER = (
-    *("alignfree", "angle", "assetdir", "autolimits", "balanceinertia", "boundinertia", "boundmass", "conflict", "coordinate"),
-    *("discardvisual", "eulerseq", "fitaabb", "fusestatic", "inertiafromgeom", "inertiagrouprange", "meshdir", "passthrough"),
-    *("savecanonical", "savecompiled", "saveinertial", "settotalmass", "strippath", "texturedir", "usethread"),
+    *(
+        "alignfree",
+        "angle",
+        "assetdir",
+        "autolimits",
+        "balanceinertia",
+        "boundinertia",
+        "boundmass",
+        "conflict",
+        "coordinate",
+    ),
+    *(
+        "discardvisual",
+        "eulerseq",
+        "fitaabb",
+        "fusestatic",
+        "inertiafromgeom",
+        "inertiagrouprange",
+        "meshdir",
+        "passthrough",
+    ),
+    *(
+        "savecanonical",
+        "savecompiled",
+        "saveinertial",
+        "settotalmass",
+        "strippath",
+        "texturedir",
+        "usethread",
+    ),
 )
 
 KNOWN = {
@@ -22,7 +79,20 @@ KNOWN = {
     "frame": _FRAME,
     "joint": ("name", "class", *_JOINT),
     "freejoint": ("name", "group", "align"),
-    "site": ("name", "class", "type", "group", "pos", *ORIENTATION, "material", "mesh", "size", "fromto", "rgba", "user"),
+    "site": (
+        "name",
+        "class",
+        "type",
+        "group",
+        "pos",
+        *ORIENTATION,
+        "material",
+        "mesh",
+        "size",
+        "fromto",
+        "rgba",
+        "user",
+    ),
     "connect": (*_SOFT, "body1", "body2", "anchor", "site1", "site2"),
     "weld": (*_SOFT, "body1", "body2", "relpose", "anchor", "torquescale", "site1", "site2"),
     "equality joint": (*_SOFT, "joint1", "joint2", "polycoef"),
@@ -37,7 +107,18 @@ _NOT_READ = (
 ROOT = (*_READ, *_NOT_READ)
 """What <mujoco> can hold: sections that are read, and those that are not."""
 
-IN_BODY = ("body", "frame", "joint", "freejoint", "site", "inertial", "geom", "camera", "light", "plugin")
+IN_BODY = (
+    "body",
+    "frame",
+    "joint",
+    "freejoint",
+    "site",
+    "inertial",
+    "geom",
+    "camera",
+    "light",
+    "plugin",
+)
 """What a body can hold, besides elements that make bodies."""
 
 MAKE_BODIES = {
@@ -50,8 +131,8 @@ MAKE_BODIES = {
 """Elements that stand for others; MuJoCo itself can write the model out."""
 
 WRITE_OUT = (
-    "let MuJoCo write the model out and give that file: "
-    "python -c \"import mujoco; mujoco.mj_saveLastXML('flat.xml', mujoco.MjModel.from_xml_path('model.xml'))\""
+    'let MuJoCo write the model out and give that file: python -c "import mujoco;'
+    " mujoco.mj_saveLastXML('flat.xml', mujoco.MjModel.from_xml_path('model.xml'))\""
 )
 
 DYNAMIC = {
@@ -61,4 +142,6 @@ DYNAMIC = {
     "armature": "armature",
     "frictionloss": "friction",
 }
-"""Attributes of joints that move nothing where motion is given; they are counted for the list of what is left out."""
+"""Attributes of joints that move nothing where motion is given; they are counted for the list of
+what is left out.
+"""

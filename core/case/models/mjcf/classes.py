@@ -19,20 +19,34 @@ READ = {"joint": "joint", "site": "site", "equality": "connect"}
 class Classes:
     """Attributes by class name and kind of element."""
 
-    attributes: Mapping[str, Mapping[str, Mapping[str, str]]] = field(default_factory=lambda: {MAIN: {}})
+    attributes: Mapping[str, Mapping[str, Mapping[str, str]]] = field(
+        default_factory=lambda: {MAIN: {}}
+    )
 
     def complete(self, element: Element, kind: str, childclass: str) -> Element:
-        """The element with the attributes of its class, or of the class of the body around it, added where it has none."""
+        """The element with the attributes of its class, or of the class of the body around it,
+        added where it has none.
+        """
         name = element.attributes.get("class", childclass)
         if name not in self.attributes:
-            raise element.fault(f"class: found {shown(name)}, expected a default class; {remedy(name, self.attributes)}")
-        return replace(element, attributes=_over(self.attributes[name].get(kind, {}), element.attributes))
+            raise element.fault(
+                f"class: found {shown(name)}, expected a default class;"
+                f" {remedy(name, self.attributes)}"
+            )
+        return replace(
+            element, attributes=_over(self.attributes[name].get(kind, {}), element.attributes)
+        )
 
 
 def _over(inherited: Mapping[str, str], own: Mapping[str, str]) -> dict[str, str]:
-    """Attributes, the own ones first; an orientation takes the place of another, however either is written."""
+    """Attributes, the own ones first; an orientation takes the place of another, however either is
+    written.
+    """
     turned = any(key in own for key in ORIENTATION)
-    return {**{key: value for key, value in inherited.items() if not (turned and key in ORIENTATION)}, **own}
+    return {
+        **{key: value for key, value in inherited.items() if not (turned and key in ORIENTATION)},
+        **own,
+    }
 
 
 def read_classes(root: Element) -> Classes:

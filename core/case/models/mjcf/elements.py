@@ -1,7 +1,8 @@
-"""Elements of an XML file somebody wrote: attributes and lines, no entities, no document types, a bounded depth.
+"""Elements of an XML file somebody wrote: attributes and lines, no entities, no document types, a
+bounded depth.
 
-Every element is read once, by taking what it has; attributes that MJCF does not know are refused, because a mistyped one would
-silently fall back to its default.
+Every element is read once, by taking what it has; attributes that MJCF does not know are refused,
+because a mistyped one would silently fall back to its default.
 """
 
 from __future__ import annotations
@@ -51,13 +52,19 @@ class Element:
         """Refuse attributes that are none of the known ones."""
         for name in self.attributes:
             if name not in known:
-                raise self.fault(f"found the attribute {shown(name)}, which MJCF does not have here; {remedy(name, known)}")
+                raise self.fault(
+                    f"found the attribute {shown(name)}, which MJCF does not have here;"
+                    f" {remedy(name, known)}"
+                )
 
-    def numbers(self, name: str, counts: Sequence[int], default: Sequence[float] | None = None) -> tuple[float, ...]:
+    def numbers(
+        self, name: str, counts: Sequence[int], default: Sequence[float] | None = None
+    ) -> tuple[float, ...]:
         """The numbers of an attribute, as many as one of the counts says.
 
         Raises:
-            CaseError: missing without a default, another number of them, or one that cannot be worked with.
+            CaseError: missing without a default, another number of them, or one that cannot be
+                worked with.
         """
         text = self.attributes.get(name)
         expected = f"{' or '.join(map(str, counts))} numbers"
@@ -70,14 +77,19 @@ class Element:
         except ValueError:
             found = (math.nan,)
         if len(found) not in counts or not all(map(usable, found)):
-            raise self.fault(f"{name}: found {shown(text)}, expected {expected}; correct the attribute")
+            raise self.fault(
+                f"{name}: found {shown(text)}, expected {expected}; correct the attribute"
+            )
         return found
 
     def choice(self, name: str, known: Sequence[str], default: str) -> str:
         """The value of an attribute that is one of a few words."""
         found = self.attributes.get(name, default)
         if found not in known:
-            raise self.fault(f"{name}: found {shown(found)}, expected one of {', '.join(known)}; {remedy(found, known)}")
+            raise self.fault(
+                f"{name}: found {shown(found)}, expected one of {', '.join(known)};"
+                f" {remedy(found, known)}"
+            )
         return found
 
 
@@ -85,9 +97,11 @@ def parse_xml(file: Path, text: str) -> Element:
     """The root element of a text.
 
     Raises:
-        CaseError: not well-formed, nested too deeply, or with a document type, which MJCF has none of and which may hold entities.
+        CaseError: not well-formed, nested too deeply, or with a document type, which MJCF has none
+            of and which may hold entities.
     """
-    # a declared encoding is not looked up: the text has been decoded, and Python knows encodings that expat cannot take
+    # a declared encoding is not looked up: the text has been decoded, and Python knows encodings
+    # that expat cannot take
     parser = expat.ParserCreate("utf-8")
     roots: list[Element] = []
     open_: list[Element] = []
@@ -95,10 +109,15 @@ def parse_xml(file: Path, text: str) -> Element:
     def start(tag: str, attributes: Mapping[str, str]) -> None:
         element = Element(file, tag, attributes, parser.CurrentLineNumber)
         if len(open_) >= DEEPEST:
-            raise element.fault(f"nested more than {DEEPEST} deep, expected the tree of a mechanism; correct the file")
+            raise element.fault(
+                f"nested more than {DEEPEST} deep, expected the tree of a mechanism; correct the"
+                " file"
+            )
         for name in (tag, *attributes.values()):
             if not name.isprintable():
-                raise element.fault(f"found {shown(name)}, expected printable text; remove the control characters")
+                raise element.fault(
+                    f"found {shown(name)}, expected printable text; remove the control characters"
+                )
         (open_[-1].children if open_ else roots).append(element)
         open_.append(element)
 
@@ -107,7 +126,12 @@ def parse_xml(file: Path, text: str) -> Element:
 
     def refuse(*_: object) -> None:
         line = f"line {parser.CurrentLineNumber}"
-        raise fault(file, line, "found <!DOCTYPE>, expected none: it can hold entities, which are not expanded; remove it")
+        raise fault(
+            file,
+            line,
+            "found <!DOCTYPE>, expected none: it can hold entities, which are not expanded;"
+            " remove it",
+        )
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end
@@ -115,6 +139,10 @@ def parse_xml(file: Path, text: str) -> Element:
     try:
         parser.Parse(text.encode("utf-8"), True)
     except expat.ExpatError as error:
-        raise fault(file, f"line {error.lineno}", f"not valid XML: {expat.ErrorString(error.code)}; correct the syntax") from None
+        raise fault(
+            file,
+            f"line {error.lineno}",
+            f"not valid XML: {expat.ErrorString(error.code)}; correct the syntax",
+        ) from None
     (root,) = roots
     return root

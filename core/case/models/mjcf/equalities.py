@@ -1,4 +1,6 @@
-"""Equalities of a model: what closes its loops. They must hold in the pose qpos0 of the file, from which the motion starts."""
+"""Equalities of a model: what closes its loops. They must hold in the pose qpos0 of the file, from
+which the motion starts.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,17 @@ from .elements import Element
 from .frames import Place, unit_quaternion
 from .tree import WORLD, Tree
 
-# An equality that is open by more than that [m, rad] is not the rounding of composed frames (1e-15), and the motion that kincheck
-# would compute is not the one that MuJoCo's residual vanishes on, by as much.
+# An equality that is open by more than that [m, rad] is not the rounding of composed frames
+# (1e-15), and the motion that kincheck would compute is not the one that MuJoCo's residual vanishes
+# on, by as much.
 OPEN = 1e-12
 
 
 @dataclass(frozen=True)
 class Connect:
-    """A point common to two bodies of the mechanism, global at qpos0; with the orientation too, a weld."""
+    """A point common to two bodies of the mechanism, global at qpos0; with the orientation too, a
+    weld.
+    """
 
     name: str
     i: str
@@ -44,7 +49,9 @@ class Relation:
 
 @dataclass(frozen=True)
 class Rod:
-    """Two points that keep their distance at qpos0, global there, each on a body of the mechanism."""
+    """Two points that keep their distance at qpos0, global there, each on a body of the
+    mechanism.
+    """
 
     name: str
     i: str
@@ -60,15 +67,23 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
     """The active equalities, in order.
 
     Raises:
-        CaseError: one that refers to what does not exist, is open at qpos0, is not linear, or is of a kind there is no joint for.
+        CaseError: one that refers to what does not exist, is open at qpos0, is not linear, or is of
+            a kind there is no joint for.
     """
     tendons, names = _tendons(root), set[str]()
-    off = any(flag.attributes.get("equality") == "disable" for option in root.only("option") for flag in option.only("flag"))
+    off = any(
+        flag.attributes.get("equality") == "disable"
+        for option in root.only("option")
+        for flag in option.only("flag")
+    )
     for section in root.only("equality"):
         for k, bare in enumerate(section.children, 1):
             element = tree.classes.complete(bare, "equality", MAIN)
             if element.tag not in _READERS:
-                raise element.fault(f"cannot be read: there is no joint for it; expected one of {', '.join(_READERS)}; remove it")
+                raise element.fault(
+                    "cannot be read: there is no joint for it; expected one of"
+                    f" {', '.join(_READERS)}; remove it"
+                )
             known = KNOWN.get(f"equality {element.tag}") or KNOWN[element.tag]
             element.require_known(known)
             if off or element.choice("active", ("true", "false"), "true") == "false":
@@ -76,7 +91,10 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
                 continue
             name = element.attributes.get("name", f"{element.tag}{k}")
             if name in names:
-                raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the equalities")
+                raise element.fault(
+                    f"name: found {shown(name)} again, expected a name of its own; rename one of"
+                    " the equalities"
+                )
             names.add(name)
             yield _READERS[element.tag](name, element, tree, tendons)
 
@@ -98,7 +116,10 @@ def _connect(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
 def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
     (scale,) = element.numbers("torquescale", (1,), (1.0,))
     if scale == 0.0:
-        raise element.fault("torquescale: found 0, which leaves all turning free, expected more; write it as <connect>")
+        raise element.fault(
+            "torquescale: found 0, which leaves all turning free, expected more; write it as"
+            " <connect>"
+        )
     if "site1" in element.attributes:
         (i, here), (j, there) = _sites(element, tree)
         wanted = Place()
@@ -108,7 +129,11 @@ def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
         i, j = tree.carriers[first], tree.carriers[second]
         relpose = element.numbers("relpose", (7,), (0.0,) * 7)
         # zeros for the quaternion mean: as in qpos0
-        wanted = Place(vec(relpose[:3]), unit_quaternion(quat(relpose[3:]))) if any(relpose[3:]) else there.seen_from(here)
+        wanted = (
+            Place(vec(relpose[:3]), unit_quaternion(quat(relpose[3:])))
+            if any(relpose[3:])
+            else there.seen_from(here)
+        )
     found = there.seen_from(here)
     gap, turn = found.at - wanted.at, (wanted.turn.conjugate() * found.turn).e
     _require_closed(element, math.sqrt(gap @ gap), "m apart")
@@ -124,7 +149,9 @@ def _joint(name: str, element: Element, tree: Tree, _: _Tendons) -> Relation:
     slope = _slope(element)
     second = _axial(element, "joint2", element.attributes["joint2"], tree)
     if first == second:
-        raise element.fault(f"couples the joint {first!r} with itself, expected two; correct joint2")
+        raise element.fault(
+            f"couples the joint {first!r} with itself, expected two; correct joint2"
+        )
     return Relation(name, _nonzero({first: 1.0, second: -slope}), element)
 
 
@@ -139,11 +166,19 @@ def _tendon(name: str, element: Element, tree: Tree, tendons: _Tendons) -> Relat
             continue
         tendon = element.attributes.get(key, "")
         if tendon not in tendons:
-            raise element.fault(f"{key}: found {shown(tendon)}, expected a tendon; {remedy(tendon, tendons)}")
+            raise element.fault(
+                f"{key}: found {shown(tendon)}, expected a tendon; {remedy(tendon, tendons)}"
+            )
         found = tendons[tendon]
         if found.tag != "fixed":
-            problem = f"{key}: {tendon!r} is a spatial tendon, whose length is not linear in joint coordinates"
-            raise element.fault(f"{problem}, expected a fixed one; only alone, and between two sites, is there a joint for it")
+            problem = (
+                f"{key}: {tendon!r} is a spatial tendon, whose length is not linear in joint"
+                " coordinates"
+            )
+            raise element.fault(
+                f"{problem}, expected a fixed one; only alone, and between two sites, is there a"
+                " joint for it"
+            )
         for wrap in found.only("joint"):
             joint = _axial(wrap, "joint", wrap.attributes.get("joint"), tree)
             (coefficient,) = wrap.numbers("coef", (1,))
@@ -155,19 +190,28 @@ def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
     """A spatial tendon of constant length."""
     if [child.tag for child in tendon.children] != ["site", "site"]:
         way = ", ".join(child.tag for child in tendon.children) or "nothing"
-        raise element.fault(f"tendon1: {tendon} goes over {way}, expected two sites; there is no joint for others")
+        raise element.fault(
+            f"tendon1: {tendon} goes over {way}, expected two sites; there is no joint for others"
+        )
     _require_closed(element, abs(_coefficients(element)[0]), "m off")
     ends: list[tuple[str, Place]] = []
     for child in tendon.children:
         site = child.attributes.get("site", "")
         if site not in tree.sites:
-            raise child.fault(f"site: found {shown(site)}, expected a site; {remedy(site, tree.sites)}")
+            raise child.fault(
+                f"site: found {shown(site)}, expected a site; {remedy(site, tree.sites)}"
+            )
         ends.append(tree.sites[site])
     (i, here), (j, there) = ends
     apart = there.at - here.at
     if i == j or not apart @ apart > 0.0:
-        what = f"is between two points of {i!r}" if i == j else "has no length in the pose of the file"
-        raise element.fault(f"tendon1: {tendon} {what}, expected two points of two bodies; remove the equality, or write <connect>")
+        what = (
+            f"is between two points of {i!r}" if i == j else "has no length in the pose of the file"
+        )
+        raise element.fault(
+            f"tendon1: {tendon} {what}, expected two points of two bodies; remove the equality, or"
+            " write <connect>"
+        )
     return Rod(name, i, j, (here.at, there.at), element)
 
 
@@ -175,7 +219,11 @@ _READERS = {"connect": _connect, "weld": _weld, "joint": _joint, "tendon": _tend
 
 
 def _tendons(root: Element) -> dict[str, Element]:
-    return {each.attributes.get("name", ""): each for section in root.only("tendon") for each in section.children}
+    return {
+        each.attributes.get("name", ""): each
+        for section in root.only("tendon")
+        for each in section.children
+    }
 
 
 def _nonzero(weights: Mapping[str, float]) -> dict[str, float]:
@@ -189,7 +237,8 @@ def _slope(element: Element) -> float:
         slope = 1.0  # what is left out of polycoef keeps its default
     if any(higher):
         raise element.fault(
-            f"polycoef: found {shown(element.attributes['polycoef'])}, expected a linear one; there is no joint for curves"
+            f"polycoef: found {shown(element.attributes['polycoef'])}, expected a linear one; there"
+            " is no joint for curves"
         )
     _require_closed(element, abs(constant), "rad or m off")
     return slope
@@ -201,20 +250,29 @@ def _coefficients(element: Element) -> tuple[float, ...]:
 
 def _axial(element: Element, key: str, name: str | None, tree: Tree) -> str:
     if name not in tree.joints:
-        raise element.fault(f"{key}: found {shown(name)}, expected a joint; {remedy(str(name), tree.joints)}")
+        raise element.fault(
+            f"{key}: found {shown(name)}, expected a joint; {remedy(str(name), tree.joints)}"
+        )
     joint = tree.joints[name]
     if joint.type == "ball":
-        raise element.fault(f"{key}: {name!r} is a ball joint, expected a hinge or a slide; couple one of those")
+        raise element.fault(
+            f"{key}: {name!r} is a ball joint, expected a hinge or a slide; couple one of those"
+        )
     return name
 
 
 def _bodies(element: Element, tree: Tree) -> tuple[str, str]:
     if "body1" not in element.attributes:
-        raise element.fault("body1: missing, expected two bodies or two sites; add body1 and body2, or site1 and site2")
+        raise element.fault(
+            "body1: missing, expected two bodies or two sites; add body1 and body2, or site1 and"
+            " site2"
+        )
     names = element.attributes["body1"], element.attributes.get("body2", WORLD)
     for key, name in zip(("body1", "body2"), names, strict=True):
         if name not in tree.places:
-            raise element.fault(f"{key}: found {shown(name)}, expected a body; {remedy(name, tree.places)}")
+            raise element.fault(
+                f"{key}: found {shown(name)}, expected a body; {remedy(name, tree.places)}"
+            )
     return names
 
 
@@ -223,7 +281,9 @@ def _sites(element: Element, tree: Tree) -> list[tuple[str, Place]]:
     for key in ("site1", "site2"):
         name = element.attributes.get(key, "")
         if name not in tree.sites:
-            raise element.fault(f"{key}: found {shown(name)}, expected a site; {remedy(name, tree.sites)}")
+            raise element.fault(
+                f"{key}: found {shown(name)}, expected a site; {remedy(name, tree.sites)}"
+            )
         found.append(tree.sites[name])
     return found
 
@@ -231,12 +291,15 @@ def _sites(element: Element, tree: Tree) -> list[tuple[str, Place]]:
 def _require_closed(element: Element, gap: float, what: str) -> None:
     if gap > OPEN:
         raise element.fault(
-            f"is open in the pose of the file: {gap:.4g} {what}, expected a model that closes there; give it the closed pose as "
-            f"pos and quat of its bodies, which are those of qpos0; or {WRITE_OUT.removesuffix(')')} after closing it)"
+            f"is open in the pose of the file: {gap:.4g} {what}, expected a model that closes"
+            " there; give it the closed pose as pos and quat of its bodies, which are those of"
+            f" qpos0; or {WRITE_OUT.removesuffix(')')} after closing it)"
         )
 
 
 def _closed(connect: Connect) -> Connect:
     if connect.i == connect.j:
-        raise connect.element.fault(f"joins {connect.i!r} with itself, expected two bodies that move otherwise; remove it")
+        raise connect.element.fault(
+            f"joins {connect.i!r} with itself, expected two bodies that move otherwise; remove it"
+        )
     return connect

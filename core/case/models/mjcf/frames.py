@@ -1,4 +1,6 @@
-"""Places and orientations as MJCF has them: quaternions, angles and axes, Euler angles in any sequence."""
+"""Places and orientations as MJCF has them: quaternions, angles and axes, Euler angles in any
+sequence.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, quat, rotation_less_identity, vec
+from ....algebra import (
+    IDENTITY,
+    ZERO,
+    Quat,
+    Vec3,
+    X,
+    Y,
+    Z,
+    cross,
+    quat,
+    rotation_less_identity,
+    vec,
+)
 from ....mechanism.mechanism import Vector
 from ...io.document import shown
 from .attributes import KNOWN, ORIENTATION
@@ -21,7 +35,8 @@ class Compiler:
 
     Attributes:
         degrees: angles are in degrees, as they are unless the model says otherwise.
-        sequence: three letters, the axes of Euler angles: small ones turn with the body, capital ones stand still.
+        sequence: three letters, the axes of Euler angles: small ones turn with the body, capital
+            ones stand still.
         align: the frames of free bodies are moved to their inertia, unless a joint says otherwise.
     """
 
@@ -43,12 +58,20 @@ def read_compiler(root: Element) -> Compiler:
     found = Compiler()
     for element in root.only("compiler"):
         element.require_known(KNOWN["compiler"])
-        degrees = element.choice("angle", ("degree", "radian"), "degree" if found.degrees else "radian") == "degree"
+        degrees = (
+            element.choice("angle", ("degree", "radian"), "degree" if found.degrees else "radian")
+            == "degree"
+        )
         sequence = element.attributes.get("eulerseq", found.sequence)
         if len(sequence) != 3 or not all(letter.lower() in _AXES for letter in sequence):
-            raise element.fault(f"eulerseq: found {shown(sequence)}, expected three of x, y, z, X, Y, Z; correct it")
+            raise element.fault(
+                f"eulerseq: found {shown(sequence)}, expected three of x, y, z, X, Y, Z; correct it"
+            )
         element.choice("coordinate", ("local",), "local")
-        align = element.choice("alignfree", ("true", "false"), "true" if found.align else "false") == "true"
+        align = (
+            element.choice("alignfree", ("true", "false"), "true" if found.align else "false")
+            == "true"
+        )
         found = Compiler(degrees, sequence, align)
     return found
 
@@ -96,12 +119,15 @@ def read_place(element: Element, compiler: Compiler) -> Place:
     """The place that an element gives by pos and one kind of orientation.
 
     Raises:
-        CaseError: several orientations, or one that is none: zero or parallel axes, a zero quaternion.
+        CaseError: several orientations, or one that is none: zero or parallel axes, a zero
+            quaternion.
     """
     at = vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0)))
     given = [name for name in ORIENTATION if name in element.attributes]
     if len(given) > 1:
-        raise element.fault(f"found {' and '.join(given)}, expected one orientation; remove the others")
+        raise element.fault(
+            f"found {' and '.join(given)}, expected one orientation; remove the others"
+        )
     return Place(at, _orientation(element, given[0], compiler) if given else IDENTITY)
 
 
@@ -127,10 +153,15 @@ def _orientation(element: Element, name: str, compiler: Compiler) -> Quat:
 
 
 def _nonzero(element: Element, name: str, numbers: Sequence[float]) -> Vec3:
-    """The direction of numbers, length one; of a quaternion, of its last three, which is not used."""
+    """The direction of numbers, length one; of a quaternion, of its last three, which is not
+    used.
+    """
     length = math.sqrt(sum(each * each for each in numbers))
     if length < 1e-10:  # as MuJoCo has it: shorter axes point anywhere
-        raise element.fault(f"{name}: found axes of no direction, expected ones that span a frame; correct the attribute")
+        raise element.fault(
+            f"{name}: found axes of no direction, expected ones that span a frame; correct the"
+            " attribute"
+        )
     return (1.0 / length) * vec(numbers[-3:])
 
 
@@ -148,9 +179,16 @@ def _z_towards(axis: Vec3) -> Quat:
 
 
 def _of_axes(x: Vec3, y: Vec3, z: Vec3) -> Quat:
-    """The quaternion of a frame, from the largest of its components (Shepperd's choice), which cannot vanish."""
+    """The quaternion of a frame, from the largest of its components (Shepperd's choice), which
+    cannot vanish.
+    """
     trace = x.x + y.y + z.z
-    squares = (1.0 + trace, 1.0 + 2.0 * x.x - trace, 1.0 + 2.0 * y.y - trace, 1.0 + 2.0 * z.z - trace)
+    squares = (
+        1.0 + trace,
+        1.0 + 2.0 * x.x - trace,
+        1.0 + 2.0 * y.y - trace,
+        1.0 + 2.0 * z.z - trace,
+    )
     k = squares.index(max(squares))
     scaled = (
         (squares[0], y.z - z.y, z.x - x.z, x.y - y.x),

@@ -1,4 +1,6 @@
-"""From an MJCF model to a case: joints and equalities as joints of a mechanism, one of them driven, others held."""
+"""From an MJCF model to a case: joints and equalities as joints of a mechanism, one of them driven,
+others held.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +25,24 @@ from .frames import coordinates, read_compiler
 from .parts import Parts, parts_of
 from .tree import Tree, read_tree
 
-# What these hold is for looks, forces and measurements. Tendons are read where an equality holds one.
-_LEFT_OUT = ("contact", "actuator", "sensor", "keyframe", "tendon", "custom", "extension", "deformable", "asset")
+# What these hold is for looks, forces and measurements. Tendons are read where an equality holds
+# one.
+_LEFT_OUT = (
+    "contact",
+    "actuator",
+    "sensor",
+    "keyframe",
+    "tendon",
+    "custom",
+    "extension",
+    "deformable",
+    "asset",
+)
 
 
 def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
-    """The case of a model; outputs are the coordinates of the origins of bodies and of sites; it is consensus_only.
+    """The case of a model; outputs are the coordinates of the origins of bodies and of sites; it is
+    consensus_only.
 
     Raises:
         CaseError: not a model that can be read, or the options do not say how it moves.
@@ -45,10 +59,20 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     parts = parts_of(tree, [*read_equalities(root, tree)], driving)
     for name in driving.joints:
         if isinstance(parts.joints[name], Fixed):
-            option, advice = ("--drive", "name another") if name == driving.joint else ("--hold", "leave it out")
-            raise fault(file, option, f"found {name!r}, which an equality of the file locks, expected a joint that moves; {advice}")
+            option, advice = (
+                ("--drive", "name another") if name == driving.joint else ("--hold", "leave it out")
+            )
+            raise fault(
+                file,
+                option,
+                f"found {name!r}, which an equality of the file locks, expected a joint that moves;"
+                f" {advice}",
+            )
     points = _points(tree, parts)
-    bodies = [Body(name, coordinates(at.at), _euler_parameters(at.turn), name in parts.fixed) for name, at in parts.bodies.items()]
+    bodies = [
+        Body(name, coordinates(at.at), _euler_parameters(at.turn), name in parts.fixed)
+        for name, at in parts.bodies.items()
+    ]
     with explained(file):
         drivers = [_driver(parts, name) for name in driving.joints]
         joints, couplers = list(parts.joints.values()), list(parts.couplers.values())
@@ -58,7 +82,10 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
         raise undriven(file, root, tree, driving, dof)
     others = [*parts.left_out, *(f"{what} ({count})" for what, count in tree.left_out.items())]
     model = root.attributes.get("model", file.stem)
-    source = f"MJCF model {model!r} of {file.name}, from its pose qpos0{LEFT_OUT}{', '.join(others) or 'nothing'}"
+    source = (
+        f"MJCF model {model!r} of {file.name}, from its pose"
+        f" qpos0{LEFT_OUT}{', '.join(others) or 'nothing'}"
+    )
     sweep = Sweep(driving.joint, driving.values, design=tree.joints[driving.joint].ref)
     return with_all_coordinates(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
 
@@ -87,9 +114,15 @@ def _driver(parts: Parts, joint: str) -> JointDriver:
 def _points(tree: Tree, parts: Parts) -> list[Point]:
     """The origins of the bodies of the file that move, and the sites on them."""
     moving = [name for name in parts.bodies if name not in parts.fixed]
-    points = [Point(name, name, coordinates(parts.bodies[name].at)) for name in moving if name in tree.places]
+    points = [
+        Point(name, name, coordinates(parts.bodies[name].at))
+        for name in moving
+        if name in tree.places
+    ]
     taken = {point.name for point in points}
     for site, (body, place) in tree.sites.items():
         if body in moving:
-            points.append(Point(f"site {site}" if site in taken else site, body, coordinates(place.at)))
+            points.append(
+                Point(f"site {site}" if site in taken else site, body, coordinates(place.at))
+            )
     return points

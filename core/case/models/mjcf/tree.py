@@ -1,6 +1,8 @@
-"""The tree of bodies of a model, in the pose qpos0 that its file draws: what moves, on which joints, and what is fixed to what.
+"""The tree of bodies of a model, in the pose qpos0 that its file draws: what moves, on which
+joints, and what is fixed to what.
 
-A body without a joint is part of the body around it. A body with several joints hangs on a chain of massless ones, a joint each.
+A body without a joint is part of the body around it. A body with several joints hangs on a chain of
+massless ones, a joint each.
 """
 
 from __future__ import annotations
@@ -17,8 +19,9 @@ from .elements import Element
 from .frames import HERE, Compiler, Place, joint_axis, read_place
 
 WORLD = "world"
-# Scenes have many bodies, robots and hands at most some tens that move, a joint each; the freedom of all is counted at once, in a
-# time that grows with the cube of their number: some seconds for as many as these.
+# Scenes have many bodies, robots and hands at most some tens that move, a joint each; the freedom
+# of all is counted at once, in a time that grows with the cube of their number: some seconds for as
+# many as these.
 MOST_BODIES, MOST_MOVING = 2_000, 150
 
 
@@ -48,7 +51,8 @@ class Tree:
     Attributes:
         places: of all bodies of the file, global.
         carriers: by body of the file, the body of the mechanism it belongs to.
-        moving: bodies of the mechanism that move, with their places; the massless ones of chains too.
+        moving: bodies of the mechanism that move, with their places; the massless ones of chains
+            too.
         massless: the names of those.
         free: by name, of the joint or of its body, bodies that no joint holds.
         sites: by name, the body of the mechanism they are on, and their global places.
@@ -69,14 +73,18 @@ class Tree:
     names: set[str] = field(default_factory=set[str])
 
     def read(self, around: Element, place: Place, body: str, childclass: str) -> None:
-        """What is in a body, or in a frame of it; `place` is that of the body or frame, `body` one of the mechanism.
+        """What is in a body, or in a frame of it; `place` is that of the body or frame, `body` one
+        of the mechanism.
 
         Raises:
-            CaseError: an element that is not known or makes bodies, a name given twice, a joint or place that makes no sense.
+            CaseError: an element that is not known or makes bodies, a name given twice, a joint or
+                place that makes no sense.
         """
         for element in around.children:
             if element.tag in MAKE_BODIES:
-                raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")
+                raise element.fault(
+                    f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}"
+                )
             if element.tag not in IN_BODY:
                 raise element.fault(f"unknown in a body; {remedy(element.tag, IN_BODY)}")
             if element.tag == "body":
@@ -85,7 +93,12 @@ class Tree:
                 if any(element.only("joint", "freejoint")):
                     raise element.fault(f"holds a joint, expected joints in bodies; {WRITE_OUT}")
                 element.require_known(KNOWN["frame"])
-                self.read(element, place.then(read_place(element, self.compiler)), body, _class(element, childclass))
+                self.read(
+                    element,
+                    place.then(read_place(element, self.compiler)),
+                    body,
+                    _class(element, childclass),
+                )
             elif element.tag == "site":
                 self._site(self.classes.complete(element, "site", childclass), place, body)
             elif element.tag not in ("joint", "freejoint"):
@@ -99,25 +112,40 @@ class Tree:
         element.require_known(KNOWN["body"])
         name = element.attributes.get("name", self._unused(f"body{len(self.places)}"))
         if name == GROUND:
-            raise element.fault(f"name: found {shown(name)}, which is what does not move in a mechanism; rename the body")
+            raise element.fault(
+                f"name: found {shown(name)}, which is what does not move in a mechanism; rename the"
+                " body"
+            )
         if name in self.places:
-            raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the bodies")
+            raise element.fault(
+                f"name: found {shown(name)} again, expected a name of its own; rename one of the"
+                " bodies"
+            )
         place = around.then(read_place(element, self.compiler))
         childclass = _class(element, childclass)
         elements = list(element.only("joint", "freejoint"))
         for most, count, what in (
             (MOST_BODIES, len(self.places), "bodies; take out what does not move"),
-            (MOST_MOVING, len(self.moving) + len(elements), "joints; take out those that are not looked at"),
+            (
+                MOST_MOVING,
+                len(self.moving) + len(elements),
+                "joints; take out those that are not looked at",
+            ),
         ):
             if count > most:
-                raise element.fault(f"found more than the {most} that are read, expected fewer {what}")
+                raise element.fault(
+                    f"found more than the {most} that are read, expected fewer {what}"
+                )
         if not elements:
             carrier = outer
             if element.attributes.get("mocap") == "true":
                 self.count("mocap bodies, which stand still")
         else:
             carrier = name
-            joints = [self.classes.complete(each, "joint", childclass) if each.tag == "joint" else each for each in elements]
+            joints = [
+                self.classes.complete(each, "joint", childclass) if each.tag == "joint" else each
+                for each in elements
+            ]
             self._joints(name, joints, place, outer)
         self.places[name], self.carriers[name] = place, carrier
         self.read(element, place, carrier, childclass)
@@ -128,7 +156,10 @@ class Tree:
             last = k == len(elements) - 1
             name = element.attributes.get("name", body if len(elements) == 1 else f"{body}.{k + 1}")
             if name in self.joints or (kind == "free" and name in self.free):
-                raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the joints")
+                raise element.fault(
+                    f"name: found {shown(name)} again, expected a name of its own; rename one of"
+                    " the joints"
+                )
             inner = body if last else self._unused(f"{body}.{name}")
             self.moving[inner] = place
             if not last:
@@ -136,7 +167,8 @@ class Tree:
             if kind == "free":
                 if len(elements) > 1 or outer != GROUND:
                     raise element.fault(
-                        "frees a body that other joints hold, expected a body in worldbody alone; remove one of them"
+                        "frees a body that other joints hold, expected a body in worldbody alone;"
+                        " remove one of them"
                     )
                 self.free |= {name: body, body: body}
             else:
@@ -151,16 +183,23 @@ class Tree:
 
     def _kind(self, element: Element) -> str:
         element.require_known(KNOWN[element.tag])
-        kind = "free" if element.tag == "freejoint" else element.choice("type", ("hinge", "slide", "ball", "free"), "hinge")
+        kind = (
+            "free"
+            if element.tag == "freejoint"
+            else element.choice("type", ("hinge", "slide", "ball", "free"), "hinge")
+        )
         align = element.choice("align", ("true", "false", "auto"), "auto")
         if kind == "free" and (align == "true" or (align == "auto" and self.compiler.align)):
             raise element.fault(
-                "its body's frame is moved to its inertia (align, or alignfree of <compiler>), where anchors and relpose mean "
-                'something else, expected the frame of the file; set align="false" and give them in that'
+                "its body's frame is moved to its inertia (align, or alignfree of <compiler>),"
+                " where anchors and relpose mean something else, expected the frame of the file;"
+                ' set align="false" and give them in that'
             )
         return kind
 
-    def _joint(self, name: str, kind: str, element: Element, place: Place, outer: str, inner: str) -> ModelJoint:
+    def _joint(
+        self, name: str, kind: str, element: Element, place: Place, outer: str, inner: str
+    ) -> ModelJoint:
         for attribute, what in DYNAMIC.items():
             if attribute in element.attributes:
                 self.count(f"{what} of joints")
@@ -168,7 +207,9 @@ class Tree:
         point = place.point(vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0))))
         if kind == "hinge":
             ref = self.compiler.angle(ref)
-        return ModelJoint(name, kind, outer, inner, point, place.direction(joint_axis(element)), ref, element)
+        return ModelJoint(
+            name, kind, outer, inner, point, place.direction(joint_axis(element)), ref, element
+        )
 
     def _site(self, element: Element, place: Place, body: str) -> None:
         element.require_known(KNOWN["site"])
@@ -176,9 +217,14 @@ class Tree:
         if name is None:
             return
         if name in self.sites:
-            raise element.fault(f"name: found {shown(name)} again, expected a name of its own; rename one of the sites")
+            raise element.fault(
+                f"name: found {shown(name)} again, expected a name of its own; rename one of the"
+                " sites"
+            )
         if "fromto" in element.attributes:
-            raise element.fault(f"fromto: found a site between two points, expected pos and quat; {WRITE_OUT}")
+            raise element.fault(
+                f"fromto: found a site between two points, expected pos and quat; {WRITE_OUT}"
+            )
         self.sites[name] = body, place.then(read_place(element, self.compiler))
 
 
@@ -191,6 +237,10 @@ def read_tree(root: Element, classes: Classes, compiler: Compiler) -> Tree:
     tree = Tree(classes, compiler)
     for world in root.only("worldbody"):
         world.require_known(KNOWN["worldbody"])
-        tree.names |= {each.attributes["name"] for each in world.below() if each.tag == "body" and "name" in each.attributes}
+        tree.names |= {
+            each.attributes["name"]
+            for each in world.below()
+            if each.tag == "body" and "name" in each.attributes
+        }
         tree.read(world, HERE, GROUND, MAIN)
     return tree

@@ -1,4 +1,6 @@
-"""Families of nasty situations, by theme. Every module in this folder is loaded, so a new class in a new file is a new family."""
+"""Families of nasty situations, by theme. Every module in this folder is loaded, so a new class in
+a new file is a new family.
+"""
 
 import importlib
 import pkgutil

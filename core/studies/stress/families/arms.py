@@ -26,7 +26,10 @@ class Arms(Family):
     """Trees of bodies, all drivers moving at once, each in its own way."""
 
     name = "arms"
-    about = f"trees of 3 to {LARGEST} bodies on hinges, slides, cylinders and screws, every freedom driven; forward kinematics"
+    about = (
+        f"trees of 3 to {LARGEST} bodies on hinges, slides, cylinders and screws, every freedom"
+        " driven; forward kinematics"
+    )
     samples = 41
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
@@ -44,7 +47,8 @@ class Arms(Family):
             parts.append(Body(name))
             joints.append(joint)
             ends[name] = place
-            for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:  # a thread's turn says its shift
+            # a thread's turn says its shift
+            for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:
                 of = JointAngle if freedom == "rotation" else JointDisplacement
                 drivers.append(of(f"{joint.name}_{freedom}", joint.name))
                 size = 1.0 if freedom == "rotation" else 0.1
@@ -58,7 +62,9 @@ class Arms(Family):
         del motions[swept]
         ends.pop(GROUND)
         last = list(ends)[-3:]
-        points = [Point(f"tip_{name}", name, triple(ends[name] + 0.1 * direction(rng))) for name in last]
+        points = [
+            Point(f"tip_{name}", name, triple(ends[name] + 0.1 * direction(rng))) for name in last
+        ]
         mechanism = Mechanism("arm", parts, joints, points, drivers)
         return Specimen(
             f"arm of {count} bodies and {len(drivers)} drivers",
@@ -68,7 +74,14 @@ class Arms(Family):
         )
 
 
-def _joint(kind: type[Joint], rng: Rng, name: str, parent: str, child: str, place: tuple[float, float, float]) -> Joint:
+def _joint(
+    kind: type[Joint],
+    rng: Rng,
+    name: str,
+    parent: str,
+    child: str,
+    place: tuple[float, float, float],
+) -> Joint:
     given: dict[str, Any] = {"point": place}
     if issubclass(kind, AxialJoint):
         given["axis"] = triple(direction(rng))
@@ -81,21 +94,40 @@ def forward(mechanism: Mechanism) -> Closed:
     """The closed form of a tree whose joints stand in an order in which parents come first."""
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
-        values = {(d.joint, d.freedom): x for d, x in zip(mechanism.drivers, drives, strict=True) if isinstance(d, _DRIVEN)}
+        values = {
+            (d.joint, d.freedom): x
+            for d, x in zip(mechanism.drivers, drives, strict=True)
+            if isinstance(d, _DRIVEN)
+        }
         n, zero = drives.shape[1], np.zeros_like(drives[0])
         still = np.stack([zero + 1.0, zero, zero, zero])
-        found: dict[str, tuple[Real, Real, Real]] = {GROUND: (still, extended(np.zeros(3)), np.zeros((3, n), dtype=np.longdouble))}
+        found: dict[str, tuple[Real, Real, Real]] = {
+            GROUND: (still, extended(np.zeros(3)), np.zeros((3, n), dtype=np.longdouble))
+        }
         for joint in mechanism.joints:
             q, at, come = found[joint.i]
             given: Any = joint
             place = extended(given.point)
-            turn, shift = values.get((joint.name, "rotation"), zero), values.get((joint.name, "translation"), zero)
+            turn, shift = (
+                values.get((joint.name, "rotation"), zero),
+                values.get((joint.name, "translation"), zero),
+            )
             if isinstance(joint, Screw):
                 shift = extended(joint.lead) * turn / (2.0 * PI)
-            h = unit(extended(given.axis)) if isinstance(joint, AxialJoint) else extended((0.0, 0.0, 1.0))
+            h = (
+                unit(extended(given.axis))
+                if isinstance(joint, AxialJoint)
+                else extended((0.0, 0.0, 1.0))
+            )
             along = h[:, None] * shift
             carried = come + along + _swing(q, (place - at)[:, None] + along)
-            found[joint.j] = _product(q, np.concatenate([np.cos(turn / 2)[None], h[:, None] * np.sin(turn / 2)])), place, carried
+            found[joint.j] = (
+                _product(
+                    q, np.concatenate([np.cos(turn / 2)[None], h[:, None] * np.sin(turn / 2)])
+                ),
+                place,
+                carried,
+            )
         del found[GROUND]
         return found
 

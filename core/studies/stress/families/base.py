@@ -1,4 +1,6 @@
-"""What a family is: a way to make specimens at random, each a case, its truth, and the refusals that are right."""
+"""What a family is: a way to make specimens at random, each a case, its truth, and the refusals
+that are right.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +30,14 @@ class Specimen:
     """One mechanism and its sweep.
 
     Attributes:
-        describe: makes the case; may refuse to (KincheckError), which is the outcome for every engine then.
+        describe: makes the case; may refuse to (KincheckError), which is the outcome for every
+            engine then.
         truth: of the case; None where no sample makes sense and every answer is wrong.
-        reasons: what a right refusal speaks of (a regular expression), beyond singular poses and the end of the motion.
+        reasons: what a right refusal speaks of (a regular expression), beyond singular poses and
+            the end of the motion.
         excused: whether it may be refused for these reasons though solutions exist.
-        reported: whether an answer must report what the geometry contradicts itself by (`Known.violated`).
+        reported: whether an answer must report what the geometry contradicts itself by
+            (`Known.violated`).
         facts: what there is to say of it, by name.
     """
 
@@ -51,7 +56,8 @@ class Family(ABC):
 
     Attributes:
         about: what is nasty, and its sizes, in a sentence.
-        samples: the most that one specimen has, and so how fine its sweep can be; coarse ones are drawn as often.
+        samples: the most that one specimen has, and so how fine its sweep can be; coarse ones are
+            drawn as often.
         several: whether samples are shared out among several specimens rather than given to one.
     """
 
@@ -82,7 +88,9 @@ def as_case(
 ) -> Case:
     """The case of a mechanism, all coordinates of all its points as outputs."""
     sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
-    return with_all_coordinates(Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
+    return with_all_coordinates(
+        Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    )
 
 
 def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:
@@ -103,5 +111,7 @@ def power(rng: Rng, low: float, high: float) -> float:
 
 
 def bodies(rng: Rng, most: int) -> int:
-    """How many bodies, 3 to the most: the cost grows with the square, so that half of them have five or fewer."""
+    """How many bodies, 3 to the most: the cost grows with the square, so that half of them have
+    five or fewer.
+    """
     return int(3.0 * ((most + 1) / 3.0) ** (rng.random() ** 2))

@@ -1,4 +1,6 @@
-"""Four-bars near their change points, in coarse steps: sharp corners that more rows than are solved must not hide."""
+"""Four-bars near their change points, in coarse steps: sharp corners that more rows than are solved
+must not hide.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,19 @@ from ..truth.long_double import extended
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case, power
 from .pairs import beside, beside_motion
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, crank_rocker, flats, four_bar, four_bar_motion, meet
+from .planar import (
+    JOINTS_OF_A_LOOP,
+    Plan,
+    any_plane,
+    crank_rocker,
+    flats,
+    four_bar,
+    four_bar_motion,
+    meet,
+)
 
-# The design is not to be near a corner itself: of what is folded more, coordinates hold too few digits of the shape.
+# The design is not to be near a corner itself: of what is folded more, coordinates hold too few
+# digits of the shape.
 FOLDED = 0.05
 SMALL = "small "
 
@@ -32,9 +44,10 @@ class Corners(Family):
 
     name = "corners"
     about = (
-        "four-bars of any sizes, off by 1e-7 to 0.1 from kites, parallelograms and others that can lie flat, from anywhere in "
-        "coarse steps: rods on hinges (three redundant rows), on two universals (one), and on what leaves none; half of them with "
-        "a regular loop of 1e-3 to 0.3 of their size on the same crank"
+        "four-bars of any sizes, off by 1e-7 to 0.1 from kites, parallelograms and others that can"
+        " lie flat, from anywhere in coarse steps: rods on hinges (three redundant rows), on two"
+        " universals (one), and on what leaves none; half of them with a regular loop of 1e-3 to"
+        " 0.3 of their size on the same crank"
     )
 
     samples = 31
@@ -48,12 +61,16 @@ class Corners(Family):
         last = float(rng.uniform(2.0, 6.2) * rng.choice([-1.0, 1.0]))
         mechanism, motion = four_bar(plane, b, d, c, way), four_bar_motion(plane, b, d, c)
         name, facts = f"{kind} with {way}, off by {off:.2g}", [("off", off)]
-        if rng.random() < 0.5:  # its singular values are small everywhere, and hide those of the large loop
+        # its singular values are small everywhere, and hide those of the large loop
+        if rng.random() < 0.5:
             ratio, hung = power(rng, -3.0, -0.5), str(rng.choice(JOINTS_OF_A_LOOP))
             small = crank_rocker(rng, ratio)
             mechanism = beside(mechanism, plane, *small, hung, SMALL)
             motion = beside_motion(motion, four_bar_motion(plane, *small), SMALL)
-            name, facts = f"{name}, beside a loop of {ratio:.2g} with {hung}", [*facts, ("ratio", ratio)]
+            name, facts = (
+                f"{name}, beside a loop of {ratio:.2g} with {hung}",
+                [*facts, ("ratio", ratio)],
+            )
         return Specimen(
             name,
             partial(as_case, mechanism, "turn", np.linspace(0.0, last, samples)),
@@ -73,6 +90,9 @@ def _loop(rng: Rng, kind: str, off: float) -> tuple[Plan, Plan, Plan]:
         pin, rest = (extended(each)[:, None] for each in (b, d))
         met = meet(pin, extended([coupler]) ** 2, rest, extended([rocker]) ** 2, side)
         c: Plan = (float(met[0, 0]), float(met[1, 0]))
-        twice = (c[0] - b[0]) * (d[1] - b[1]) - (c[1] - b[1]) * (d[0] - b[0])  # the area; not a number where they do not meet
-        if min(coupler, rocker) > 0.1 and abs(twice) > FOLDED * float(np.hypot(d[0] - b[0], d[1] - b[1])):
+        # the area; not a number where they do not meet
+        twice = (c[0] - b[0]) * (d[1] - b[1]) - (c[1] - b[1]) * (d[0] - b[0])
+        if min(coupler, rocker) > 0.1 and abs(twice) > FOLDED * float(
+            np.hypot(d[0] - b[0], d[1] - b[1])
+        ):
             return b, d, c

@@ -1,4 +1,6 @@
-"""Degenerate descriptions: links without length, points that coincide, axes that are antiparallel, freedoms that nobody drives."""
+"""Degenerate descriptions: links without length, points that coincide, axes that are antiparallel,
+freedoms that nobody drives.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,15 @@ from typing import Any
 import numpy as np
 
 from ....case.case import Case
-from ....joints import ConstantVelocity, Distance, Joint, Revolute, RevoluteSpherical, Spherical, Universal
+from ....joints import (
+    ConstantVelocity,
+    Distance,
+    Joint,
+    Revolute,
+    RevoluteSpherical,
+    Spherical,
+    Universal,
+)
 from ....mechanism.drivers import JointAngle, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ..truth.reference_motion import followed
@@ -24,15 +34,27 @@ class Degenerate(Family):
     """What is no mechanism must be refused, by its name; what merely looks odd must be solved."""
 
     name = "degenerate"
-    about = "zero links, coincident points, antiparallel, zero and infinite axes, free spins, dead centres at design"
+    about = (
+        "zero links, coincident points, antiparallel, zero and infinite axes, free spins, dead"
+        " centres at design"
+    )
     samples = 21
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """One of them."""
-        make, reasons = WRONG[int(rng.integers(len(WRONG)))] if rng.random() < 0.7 else (SOUND[int(rng.integers(len(SOUND)))], "")
+        make, reasons = (
+            WRONG[int(rng.integers(len(WRONG)))]
+            if rng.random() < 0.7
+            else (SOUND[int(rng.integers(len(SOUND)))], "")
+        )
         values = np.linspace(-0.5, 0.5, samples)
         name = make.__name__.strip("_").replace("_", " ")
-        return Specimen(name, partial(_described, make, rng, values), None if reasons else followed, reasons=reasons)
+        return Specimen(
+            name,
+            partial(_described, make, rng, values),
+            None if reasons else followed,
+            reasons=reasons,
+        )
 
 
 def _described(make: Callable[[Rng], Mechanism], rng: Rng, values: Values) -> Case:
@@ -45,7 +67,10 @@ def _pair(joint: Callable[..., Joint], **given: Any) -> Mechanism:
     return Mechanism(
         "pair",
         [Body("a"), Body("b")],
-        [Revolute("pivot", GROUND, "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), joint("odd", "a", "b", **given)],
+        [
+            Revolute("pivot", GROUND, "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+            joint("odd", "a", "b", **given),
+        ],
         [Point("tip", "b", (1.0, 0.5, 0.2))],
         [JointAngle("turn", "pivot")],
     )
@@ -93,7 +118,10 @@ def _body_that_spins_freely(rng: Rng) -> Mechanism:
     b, d, c = crank_rocker(rng)
     plane = any_plane(rng)
     found = four_bar(plane, b, d, c, "rod")
-    balls = [Spherical("ball_1", "crank", "bar", plane.point(b)), Spherical("ball_2", "bar", "rocker", plane.point(c))]
+    balls = [
+        Spherical("ball_1", "crank", "bar", plane.point(b)),
+        Spherical("ball_2", "bar", "rocker", plane.point(c)),
+    ]
     return replace(found, bodies=[*found.bodies, Body("bar")], joints=[*found.joints[:2], *balls])
 
 
@@ -106,12 +134,20 @@ def _driver_across_the_motion(rng: Rng) -> Mechanism:
     """The crank pin is driven along the crank."""
     b, d, c = crank_rocker(rng)
     plane = any_plane(rng)
-    return replace(four_bar(plane, b, d, c, "rod"), drivers=[PointCoordinate("pull", "B", plane.along(b))])
+    return replace(
+        four_bar(plane, b, d, c, "rod"), drivers=[PointCoordinate("pull", "B", plane.along(b))]
+    )
 
 
 def _slider_at_its_dead_centre(rng: Rng) -> Mechanism:
     r, length = rng.uniform(0.2, 0.4), rng.uniform(0.8, 1.2)
-    return slider_crank(any_plane(rng), (float(r), 0.0), (float(r + length), 0.0), str(rng.choice(["rod", "revolutes"])), "slide")
+    return slider_crank(
+        any_plane(rng),
+        (float(r), 0.0),
+        (float(r + length), 0.0),
+        str(rng.choice(["rod", "revolutes"])),
+        "slide",
+    )
 
 
 def _rod_too_long_to_close(rng: Rng) -> Mechanism:
@@ -147,7 +183,9 @@ WRONG: tuple[tuple[Callable[[Rng], Mechanism], str], ...] = (
 
 def _crank_of_length_zero(rng: Rng) -> Mechanism:
     """Turns, and nothing moves with it."""
-    return slider_crank(any_plane(rng), (0.0, 0.0), (1.0, float(rng.uniform(0.1, 0.5))), "rod", "turn")
+    return slider_crank(
+        any_plane(rng), (0.0, 0.0), (1.0, float(rng.uniform(0.1, 0.5))), "rod", "turn"
+    )
 
 
 def _pivots_that_coincide(rng: Rng) -> Mechanism:
@@ -160,14 +198,19 @@ def _hinges_the_other_way_round(rng: Rng) -> Mechanism:
     """Axes of any sign and length."""
     found = four_bar(any_plane(rng), *crank_rocker(rng))
     each: list[Any] = list(found.joints)
-    joints = [replace(joint, axis=triple(s * np.array(joint.axis))) for joint, s in zip(each, (1.0, -2.0, -0.01, 1e6), strict=True)]
+    joints = [
+        replace(joint, axis=triple(s * np.array(joint.axis)))
+        for joint, s in zip(each, (1.0, -2.0, -0.01, 1e6), strict=True)
+    ]
     return replace(found, joints=joints)
 
 
 def _bodies_far_from_their_joints(rng: Rng) -> Mechanism:
     """Body origins a thousand sizes away: only a name for a frame."""
     found = four_bar(any_plane(rng), *crank_rocker(rng))
-    return replace(found, bodies=[replace(body, origin=triple(1e3 * direction(rng))) for body in found.bodies])
+    return replace(
+        found, bodies=[replace(body, origin=triple(1e3 * direction(rng))) for body in found.bodies]
+    )
 
 
 SOUND: tuple[Callable[[Rng], Mechanism], ...] = (

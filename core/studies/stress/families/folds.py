@@ -21,13 +21,15 @@ BEFORE, STEP = (-4.0, -0.3), (-1.0, 0.7)
 
 
 class Folds(Family):
-    """Steps so long that a motion may turn round between two samples, and another assembly go on."""
+    """Steps so long that a motion may turn round between two samples, and another assembly go
+    on.
+    """
 
     name = "folds"
     about = (
-        f"random closed mechanisms of 1 to {LARGEST} bodies, all joint types, gears and racks, 1 to "
-        f"{DRIVERS} drivers that move at once, in 2 to 4 samples: most have one sample 1e-4 to 0.5 "
-        "of the way before a fold, and the next one far beyond it"
+        f"random closed mechanisms of 1 to {LARGEST} bodies, all joint types, gears and racks, 1 to"
+        f" {DRIVERS} drivers that move at once, in 2 to 4 samples: most have one sample 1e-4 to 0.5"
+        " of the way before a fold, and the next one far beyond it"
     )
 
     samples = 2

@@ -20,7 +20,10 @@ class Hardpoints(Family):
     """The corners of cars."""
 
     name = "hardpoints"
-    about = "McPherson, double wishbone and five-link corners, hardpoints off by 1e-6 to 0.05 m, strokes of 0.1 m both ways"
+    about = (
+        "McPherson, double wishbone and five-link corners, hardpoints off by 1e-6 to 0.05 m,"
+        " strokes of 0.1 m both ways"
+    )
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Driven at the wheel centre."""
@@ -39,18 +42,30 @@ class Hardpoints(Family):
 
 
 def _corner(
-    name: str, bodies: list[Body], joints: list[Revolute | Spherical | Translational | Distance], wheel: Point
+    name: str,
+    bodies: list[Body],
+    joints: list[Revolute | Spherical | Translational | Distance],
+    wheel: Point,
 ) -> Mechanism:
-    return Mechanism(name, bodies, joints, [wheel], [PointCoordinate("stroke", wheel.name, (0.0, 0.0, 1.0))])
+    return Mechanism(
+        name, bodies, joints, [wheel], [PointCoordinate("stroke", wheel.name, (0.0, 0.0, 1.0))]
+    )
 
 
 def _mcpherson(at: At) -> Mechanism:
-    top, lower, ball, pivot = at(0.0, 0.55, 0.6), at(-0.02, 0.61, 0.18), at(-0.03, 0.66, -0.01), at(0.17, 0.35, 0.0)
+    top, lower, ball, pivot = (
+        at(0.0, 0.55, 0.6),
+        at(-0.02, 0.61, 0.18),
+        at(-0.03, 0.66, -0.01),
+        at(0.17, 0.35, 0.0),
+    )
     return _corner(
         "mcpherson",
         [Body("arm"), Body("knuckle"), Body("strut")],
         [
-            Revolute("pivot", GROUND, "arm", pivot, triple(np.subtract(at(-0.17, 0.35, 0.0), pivot))),
+            Revolute(
+                "pivot", GROUND, "arm", pivot, triple(np.subtract(at(-0.17, 0.35, 0.0), pivot))
+            ),
             Spherical("ball", "arm", "knuckle", ball),
             Spherical("top", "strut", GROUND, top),
             Translational("slide", "knuckle", "strut", top, triple(np.subtract(top, lower))),
@@ -66,8 +81,20 @@ def _wishbones(at: At) -> Mechanism:
         "double_wishbone",
         [Body("lower"), Body("upper"), Body("knuckle")],
         [
-            Revolute("lower_pivot", GROUND, "lower", lower, triple(np.subtract(at(-0.15, 0.3, 0.02), lower))),
-            Revolute("upper_pivot", GROUND, "upper", upper, triple(np.subtract(at(-0.12, 0.4, 0.38), upper))),
+            Revolute(
+                "lower_pivot",
+                GROUND,
+                "lower",
+                lower,
+                triple(np.subtract(at(-0.15, 0.3, 0.02), lower)),
+            ),
+            Revolute(
+                "upper_pivot",
+                GROUND,
+                "upper",
+                upper,
+                triple(np.subtract(at(-0.12, 0.4, 0.38), upper)),
+            ),
             Spherical("lower_ball", "lower", "knuckle", at(-0.02, 0.7, 0.0)),
             Spherical("upper_ball", "upper", "knuckle", at(0.02, 0.66, 0.38)),
             Distance("tie_rod", "knuckle", GROUND, (at(0.15, 0.68, 0.1), at(0.15, 0.33, 0.1))),
@@ -87,6 +114,9 @@ def _five_link(at: At) -> Mechanism:
     return _corner(
         "five_link",
         [Body("knuckle")],
-        [Distance(f"rod_{k}", "knuckle", GROUND, (at(*outer), at(*inner))) for k, (inner, outer) in enumerate(rods, 1)],
+        [
+            Distance(f"rod_{k}", "knuckle", GROUND, (at(*outer), at(*inner)))
+            for k, (inner, outer) in enumerate(rods, 1)
+        ],
         Point("wheel", "knuckle", at(0.0, 0.75, 0.2)),
     )

@@ -13,7 +13,8 @@ from .planar import JOINTS_OF_A_LOOP, any_plane, crank_rocker, four_bar, four_ba
 from .sizes import linkage
 
 TURNS = 1000
-# From one sample to the next: a step is gone in 2,000 parts at most, of which a turn takes some twelve.
+# From one sample to the next: a step is gone in 2,000 parts at most, of which a turn takes some
+# twelve.
 MOST_BETWEEN = 100
 
 
@@ -31,7 +32,12 @@ class Drift(Family):
         turns = min(TURNS, MOST_BETWEEN * (samples - 1))
         return Specimen(
             f"four_bar with {way}, {turns} turns",
-            partial(as_case, four_bar(plane, *points, way), "turn", np.linspace(0.0, 2.0 * np.pi * turns, samples)),
+            partial(
+                as_case,
+                four_bar(plane, *points, way),
+                "turn",
+                np.linspace(0.0, 2.0 * np.pi * turns, samples),
+            ),
             partial(closed, motion=four_bar_motion(plane, *points)),
         )
 
@@ -60,4 +66,11 @@ class Tolerances(Family):
         tol = power(rng, -300.0, -15.0) if rng.random() < 0.2 else power(rng, -20.0, -15.0)
         found = linkage(rng, any_plane(rng), samples)
         reasons = r"residual .*\d"
-        return replace(found, name=f"{found.name} to {tol:.3g}", tol=tol, reasons=reasons, excused=True, facts=(("tol", tol),))
+        return replace(
+            found,
+            name=f"{found.name} to {tol:.3g}",
+            tol=tol,
+            reasons=reasons,
+            excused=True,
+            facts=(("tol", tol),),
+        )

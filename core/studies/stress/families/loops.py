@@ -1,7 +1,9 @@
-"""Random closed loops of every joint type. They close by construction: joints are placed at the design position of both bodies.
+"""Random closed loops of every joint type. They close by construction: joints are placed at the
+design position of both bodies.
 
-A random tree of bodies is closed by random joints, each taken only if all its rows are independent of those there are (found on a
-basis of the motions that are left), until as few freedoms are left as are driven. The truth is followed from the design.
+A random tree of bodies is closed by random joints, each taken only if all its rows are independent
+of those there are (found on a basis of the motions that are left), until as few freedoms are left
+as are driven. The truth is followed from the design.
 """
 
 from __future__ import annotations
@@ -38,7 +40,10 @@ class Loops(Family):
     """Whatever can be built."""
 
     name = "loops"
-    about = f"random closed loops of 3 to {LARGEST} bodies, all joint types, gears and racks, 1 or 2 drivers"
+    about = (
+        f"random closed loops of 3 to {LARGEST} bodies, all joint types, gears and racks, 1 or 2"
+        " drivers"
+    )
     samples = 81
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
@@ -78,11 +83,18 @@ class Builder:
         """The mechanism, and how far it is driven; None where it cannot be closed."""
         for body in self.bodies:
             parent = str(self.rng.choice(list(self.places)))
-            self.places[body.name] = self.places[parent] + self.rng.uniform(0.3, 0.6) * direction(self.rng)
+            self.places[body.name] = self.places[parent] + self.rng.uniform(0.3, 0.6) * direction(
+                self.rng
+            )
         for body in self.bodies:
             near = [name for name in self.places if name != body.name]
-            nearest = sorted(near, key=lambda name: float(np.linalg.norm(self.places[name] - self.places[body.name])))
-            before = [name for name in nearest if name == GROUND or int(name[1:]) < int(body.name[1:])]
+            nearest = sorted(
+                near,
+                key=lambda name: float(np.linalg.norm(self.places[name] - self.places[body.name])),
+            )
+            before = [
+                name for name in nearest if name == GROUND or int(name[1:]) < int(body.name[1:])
+            ]
             while not self._join(str(self.rng.choice(CARRIERS)), before[0], body.name):
                 pass
         drivers, tries = int(self.rng.integers(1, self.most + 1)), 0
@@ -100,9 +112,18 @@ class Builder:
         """How many are left."""
         return self.motions.shape[1]
 
-    def _mechanism(self, joints: Sequence[Joint], drivers: Sequence[Driver] = (), couplers: Sequence[Coupler] = ()) -> Mechanism:
+    def _mechanism(
+        self,
+        joints: Sequence[Joint],
+        drivers: Sequence[Driver] = (),
+        couplers: Sequence[Coupler] = (),
+    ) -> Mechanism:
         """With the same points whatever the joints, so that the unknowns are the same."""
-        points = [Point(f"p_{name}", name, triple(self.places[name])) for name in self.places if name != GROUND]
+        points = [
+            Point(f"p_{name}", name, triple(self.places[name]))
+            for name in self.places
+            if name != GROUND
+        ]
         return Mechanism("loop", self.bodies, joints, points, drivers, couplers)
 
     def _rows(self, mechanism: Mechanism, drop: int = 0) -> Array:
@@ -113,7 +134,9 @@ class Builder:
         return found / np.linalg.norm(found, axis=1, keepdims=True)
 
     def _take(self, rows: Array, leave: int) -> bool:
-        """Take rows off the motions that are left, if all are independent there and enough motions stay."""
+        """Take rows off the motions that are left, if all are independent there and enough motions
+        stay.
+        """
         if self.freedoms - len(rows) < leave:
             return False
         _, sizes, basis = np.linalg.svd(rows @ self.motions)
@@ -144,15 +167,27 @@ class Builder:
             Kind.DIRECTIONS: (triple(h), triple(second)),
             Kind.LENGTH: float(rng.uniform(0.02, 0.2)),
         }
-        required = [f for f in fields(cls) if f.default is MISSING and f.name not in ("name", "i", "j")]
+        required = [
+            f for f in fields(cls) if f.default is MISSING and f.name not in ("name", "i", "j")
+        ]
         try:
-            return cls(f"{kind}_{len(self.joints) + 1}", one, other, **{f.name: values[f.metadata["kind"]] for f in required})
+            return cls(
+                f"{kind}_{len(self.joints) + 1}",
+                one,
+                other,
+                **{f.name: values[f.metadata["kind"]] for f in required},
+            )
         except MechanismError:
             return None
 
     def _couple(self, leave: int) -> bool:
         """A gear or a rack between two coordinates of joints."""
-        axial = [(joint, freedom) for joint in self.joints if isinstance(joint, AxialJoint) for freedom in joint.freedoms]
+        axial = [
+            (joint, freedom)
+            for joint in self.joints
+            if isinstance(joint, AxialJoint)
+            for freedom in joint.freedoms
+        ]
         turning = [joint.name for joint, freedom in axial if freedom == "rotation"]
         sliding = [joint.name for joint, freedom in axial if freedom == "translation"]
         seconds = sliding if self.rng.random() < 0.5 and sliding else turning
@@ -162,7 +197,9 @@ class Builder:
         if pair[0] == pair[1]:
             return False
         name, size = f"coupler_{len(self.couplers) + 1}", float(self.rng.uniform(0.3, 1.5))
-        coupler = Gear(name, pair, size) if seconds is turning else RackPinion(name, pair, 0.2 * size)
+        coupler = (
+            Gear(name, pair, size) if seconds is turning else RackPinion(name, pair, 0.2 * size)
+        )
         joined = [joint for joint in self.joints if joint.name in pair]
         rows = sum(joint.rows for joint in joined)
         whole = self._rows(self._mechanism(joined, couplers=[coupler]))
@@ -172,15 +209,29 @@ class Builder:
         return True
 
     def _driven(self, count: int) -> tuple[Mechanism, float] | None:
-        """Drivers that move what is left, and the reach that turns or shifts something by a third to one."""
+        """Drivers that move what is left, and the reach that turns or shifts something by a third
+        to one.
+        """
         drivers: list[Driver] = []
         for joint in self.joints:
             if isinstance(joint, AxialJoint):
                 of = {"rotation": JointAngle, "translation": JointDisplacement}
-                drivers += [of[f](f"{joint.name}_{f}", joint.name) for f in joint.freedoms if f in of]
-        drivers += [PointCoordinate(f"shift_{b.name}", f"p_{b.name}", triple(direction(self.rng))) for b in self.bodies[:3]]
-        needed = [joint for joint in self.joints if any(getattr(d, "joint", "") == joint.name for d in drivers)]
-        rows = self._rows(self._mechanism(needed, drivers), sum(joint.rows for joint in needed)) @ self.motions
+                drivers += [
+                    of[f](f"{joint.name}_{f}", joint.name) for f in joint.freedoms if f in of
+                ]
+        drivers += [
+            PointCoordinate(f"shift_{b.name}", f"p_{b.name}", triple(direction(self.rng)))
+            for b in self.bodies[:3]
+        ]
+        needed = [
+            joint
+            for joint in self.joints
+            if any(getattr(d, "joint", "") == joint.name for d in drivers)
+        ]
+        rows = (
+            self._rows(self._mechanism(needed, drivers), sum(joint.rows for joint in needed))
+            @ self.motions
+        )
         order = self.rng.permutation(len(drivers))
         taken: list[int] = []
         for k in order:
@@ -195,4 +246,9 @@ class Builder:
         driven = [d.point for d in found.drivers if isinstance(d, PointCoordinate)]
         shown = {*driven, *(f"p_{body.name}" for body in self.bodies[-3:])}
         points = [point for point in found.points if point.name in shown]
-        return Mechanism(found.name, found.bodies, found.joints, points, found.drivers, found.couplers), reach
+        return (
+            Mechanism(
+                found.name, found.bodies, found.joints, points, found.drivers, found.couplers
+            ),
+            reach,
+        )

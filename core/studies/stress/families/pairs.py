@@ -11,19 +11,34 @@ from ..truth.reference_motion import Motion
 from .planar import Plan, Plane, coupled
 
 
-def beside(single: Mechanism, plane: Plane, b: Plan, d: Plan, c: Plan, way: str, label: str) -> Mechanism:
-    """A four-bar with a second coupler and rocker on its crank, of points of their own and named by the label."""
+def beside(
+    single: Mechanism, plane: Plane, b: Plan, d: Plan, c: Plan, way: str, label: str
+) -> Mechanism:
+    """A four-bar with a second coupler and rocker on its crank, of points of their own and named by
+    the label.
+    """
     rocker = f"{label}rocker"
     bodies, joints = coupled(way, plane, ("crank", rocker, f"{label}coupler"), (b, c), label)
     rest = Revolute(f"{label}rest", "ground", rocker, plane.point(d), plane.normal)
     points = [*single.points, Point(f"{label}C", rocker, plane.point(c))]
-    return Mechanism("two_loops", [*single.bodies, Body(rocker), *bodies], [*single.joints, rest, *joints], points, single.drivers)
+    return Mechanism(
+        "two_loops",
+        [*single.bodies, Body(rocker), *bodies],
+        [*single.joints, rest, *joints],
+        points,
+        single.drivers,
+    )
 
 
 def beside_motion(first: Motion, second: Motion, label: str) -> Motion:
-    """Its closed form, from those of both four-bars; they know nothing of each other but the crank."""
+    """Its closed form, from those of both four-bars; they know nothing of each other but the
+    crank.
+    """
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
-        return {**first(drives), **{f"{label}{name}": moved for name, moved in second(drives).items()}}
+        return {
+            **first(drives),
+            **{f"{label}{name}": moved for name, moved in second(drives).items()},
+        }
 
     return motion

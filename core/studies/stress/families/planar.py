@@ -1,4 +1,6 @@
-"""Linkages in a plane with closed forms: what the families of sizes, offsets, rates and reaches are made of."""
+"""Linkages in a plane with closed forms: what the families of sizes, offsets, rates and reaches are
+made of.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,11 @@ class Plane:
 
     def point(self, at: Plan) -> tuple[float, float, float]:
         """A point of the plane in space, rounded once."""
-        return triple(np.asarray(extended(self.origin) + self.lift(extended(at)[:, None])[:, 0], dtype=np.float64))
+        return triple(
+            np.asarray(
+                extended(self.origin) + self.lift(extended(at)[:, None])[:, 0], dtype=np.float64
+            )
+        )
 
     def lift(self, shift: Real) -> Real:
         """Shifts in the plane in space, shape (3, n)."""
@@ -61,7 +67,9 @@ def any_plane(rng: Rng) -> Plane:
 
 
 def flat_plane(rng: Rng, origin: Array) -> Plane:
-    """Along two of the global axes: coordinates of points are sums of plain numbers, exact where these are."""
+    """Along two of the global axes: coordinates of points are sums of plain numbers, exact where
+    these are.
+    """
     first = int(rng.integers(3))
     e1, e2 = np.eye(3)[first], np.eye(3)[(first + 1) % 3]
     return Plane(origin, e1, e2)
@@ -80,7 +88,9 @@ def heading(a: Real) -> Real:
 
 
 def meet(first: Real, p: Real, second: Real, q: Real, side: float) -> Real:
-    """Where circles of squared radii p and q about two points meet, on that side of the line between; NaN where they do not."""
+    """Where circles of squared radii p and q about two points meet, on that side of the line
+    between; NaN where they do not.
+    """
     d = second - first
     e = (d * d).sum(axis=0)
     along = (p - q + e) / (2.0 * e)
@@ -96,7 +106,9 @@ JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
 def coupled(
     way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan, Plan], label: str = ""
 ) -> tuple[list[Body], list[Joint]]:
-    """The coupler, or the rod in its place, between two bodies at their points: bodies and joints of it."""
+    """The coupler, or the rod in its place, between two bodies at their points: bodies and joints
+    of it.
+    """
     first, second, coupler = names
     start, end = map(plane.point, at)
     n = plane.normal
@@ -106,16 +118,32 @@ def coupled(
         return [], [Distance(f"{label}rod", first, second, (start, end))]
     pin_1, pin_2 = f"{label}pin_1", f"{label}pin_2"
     joints: Mapping[str, Sequence[Joint]] = {
-        "revolutes": (Revolute(pin_1, first, coupler, start, n), Revolute(pin_2, coupler, second, end, n)),
-        "balls": (Universal(pin_1, first, coupler, start, (n, across)), Spherical(pin_2, coupler, second, end)),
-        "universals": (Universal(pin_1, first, coupler, start, (across, n)), Universal(pin_2, coupler, second, end, (n, along))),
-        "cylinders": (Cylindrical(pin_1, first, coupler, start, n), Spherical(pin_2, coupler, second, end)),
+        "revolutes": (
+            Revolute(pin_1, first, coupler, start, n),
+            Revolute(pin_2, coupler, second, end, n),
+        ),
+        "balls": (
+            Universal(pin_1, first, coupler, start, (n, across)),
+            Spherical(pin_2, coupler, second, end),
+        ),
+        "universals": (
+            Universal(pin_1, first, coupler, start, (across, n)),
+            Universal(pin_2, coupler, second, end, (n, along)),
+        ),
+        "cylinders": (
+            Cylindrical(pin_1, first, coupler, start, n),
+            Spherical(pin_2, coupler, second, end),
+        ),
     }
     return [Body(coupler)], list(joints[way])
 
 
-def four_bar(plane: Plane, b: Plan, d: Plan, c: Plan, way: str = "revolutes", turn: str = "turn") -> Mechanism:
-    """A crank from the origin of the plane to B, a coupler to C, a rocker to D; the crank is driven."""
+def four_bar(
+    plane: Plane, b: Plan, d: Plan, c: Plan, way: str = "revolutes", turn: str = "turn"
+) -> Mechanism:
+    """A crank from the origin of the plane to B, a coupler to C, a rocker to D; the crank is
+    driven.
+    """
     bodies, joints = coupled(way, plane, ("crank", "rocker", "coupler"), (b, c))
     return Mechanism(
         "four_bar",
@@ -135,16 +163,25 @@ def nearly_parallel(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
     off = 0.0 if rng.random() < 0.25 else power(rng, -12.0, -2.0) * float(rng.choice([-1.0, 1.0]))
     crank, up = float(rng.uniform(0.2, 0.5)), float(rng.uniform(0.8, 2.2))
     b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
-    # the crank is the shortest, and by Grashof turns if the rocker is longer, the coupler being as long as the ground
+    # the crank is the shortest, and by Grashof turns if the rocker is longer, the coupler being as
+    # long as the ground
     c: Plan = (b[0] + 1.0, b[1])
     if off:
-        met = meet(extended(b)[:, None], extended([1.0]), extended([[1.0], [0.0]]), extended([(crank + off) ** 2]), 1.0)
+        met = meet(
+            extended(b)[:, None],
+            extended([1.0]),
+            extended([[1.0], [0.0]]),
+            extended([(crank + off) ** 2]),
+            1.0,
+        )
         c = (float(met[0, 0]), float(met[1, 0]))
     return b, (1.0, 0.0), c, off
 
 
 def nearly_kite(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
-    """B, D and C of a kite: the crank is as long as the ground, but for the last, and passes the rocker's pivot."""
+    """B, D and C of a kite: the crank is as long as the ground, but for the last, and passes the
+    rocker's pivot.
+    """
     off, up = power(rng, -9.0, -2.0), float(rng.uniform(0.8, 2.2))
     crank, long = 0.4 * (1.0 - off), float(rng.uniform(0.8, 1.2))
     b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
@@ -155,14 +192,18 @@ def nearly_kite(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
 
 
 def rockers(rng: Rng) -> tuple[Plan, Plan, Plan]:
-    """B, D and C of a four-bar whose longest bar is between the pivots: neither the crank nor the rocker turns round."""
+    """B, D and C of a four-bar whose longest bar is between the pivots: neither the crank nor the
+    rocker turns round.
+    """
     b = (float(rng.uniform(-0.2, 0.2)), float(rng.uniform(0.4, 0.6)))
     d: Plan = (float(rng.uniform(1.0, 1.1)), 0.0)
     return b, d, (float(rng.uniform(0.5, 0.8)), float(rng.uniform(0.5, 0.7)))
 
 
 def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = False) -> Motion:
-    """Its closed form, on the side of the design up to where the crank must turn back; or of the parallelogram, which goes on."""
+    """Its closed form, on the side of the design up to where the crank must turn back; or of the
+    parallelogram, which goes on.
+    """
     B, C, D = (extended(each)[:, None] for each in (b, c, d))
     p, q = ((C - B) ** 2).sum(axis=0), ((C - D) ** 2).sum(axis=0)
     side = float(np.sign((D - B)[0, 0] * (C - B)[1, 0] - (D - B)[1, 0] * (C - B)[0, 0]))
@@ -177,17 +218,23 @@ def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = Fa
         return {
             "crank": (plane.turned(turn), pivot, still),
             "rocker": (plane.turned(heading(now_c - D) - heading(C - D)), rest, still),
-            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.lift(now_b - B)),
+            "coupler": (
+                plane.turned(heading(now_c - now_b) - heading(C - B)),
+                pin,
+                plane.lift(now_b - B),
+            ),
         }
 
     return motion
 
 
 def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
-    """How far a crank at b may turn either way from there, coupler and rocker having squared lengths p and q; the pivot is at d.
+    """How far a crank at b may turn either way from there, coupler and rocker having squared
+    lengths p and q; the pivot is at d.
 
-    The coupler and the rocker are stretched out or folded where the law of cosines gives the crank's angle from the ground a cosine
-    within -1 and 1; without such an angle the crank passes there.
+    The coupler and the rocker are stretched out or folded where the law of cosines gives the
+    crank's angle from the ground a cosine within -1 and 1; without such an angle the crank passes
+    there.
     """
     r2, g2 = (b * b).sum(axis=0)[0], (d * d).sum(axis=0)[0]
     folded, stretched = ((np.sqrt(p[0]) + sign * np.sqrt(q[0])) ** 2 for sign in (-1.0, 1.0))
@@ -196,19 +243,34 @@ def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
     at = np.arctan2(np.sin(at), np.cos(at))
     low, high = (float(np.arccos(x)) if -1.0 < x < 1.0 else None for x in (nearest, farthest))
     # all angles at which it must stop, on the circle and once around it
-    stops = [k * 2.0 * np.pi + sign * stop for stop in (low, high) if stop is not None for sign in (-1.0, 1.0) for k in (-1, 0, 1)]
-    ahead, behind = [stop - at for stop in stops if stop > at], [stop - at for stop in stops if stop < at]
+    stops = [
+        k * 2.0 * np.pi + sign * stop
+        for stop in (low, high)
+        if stop is not None
+        for sign in (-1.0, 1.0)
+        for k in (-1, 0, 1)
+    ]
+    ahead, behind = (
+        [stop - at for stop in stops if stop > at],
+        [stop - at for stop in stops if stop < at],
+    )
     return float(max(behind, default=-np.inf)), float(min(ahead, default=np.inf))
 
 
 def flats(b: Plan, d: Plan) -> list[float]:
-    """Turns of a crank at b by which it lies along the ground, toward the pivot at d or away from it, within two turns of there."""
+    """Turns of a crank at b by which it lies along the ground, toward the pivot at d or away from
+    it, within two turns of there.
+    """
     at = float(heading(extended(b)) - heading(extended(d)))
     return [k * math.pi - at for k in range(-4, 5)]
 
 
-def slider_crank(plane: Plane, b: Plan, c: Plan, way: str, drive: str, guide: Plan = (1.0, 0.0)) -> Mechanism:
-    """A crank from the origin of the plane to B, a coupler to C on a slider along the guide; "turn" or "slide" is driven."""
+def slider_crank(
+    plane: Plane, b: Plan, c: Plan, way: str, drive: str, guide: Plan = (1.0, 0.0)
+) -> Mechanism:
+    """A crank from the origin of the plane to B, a coupler to C on a slider along the guide; "turn"
+    or "slide" is driven.
+    """
     bodies, joints = coupled(way, plane, ("crank", "slider", "coupler"), (b, c))
     driver = JointAngle("turn", "pivot") if drive == "turn" else JointDisplacement("slide", "guide")
     return Mechanism(
@@ -224,8 +286,12 @@ def slider_crank(plane: Plane, b: Plan, c: Plan, way: str, drive: str, guide: Pl
     )
 
 
-def slider_crank_motion(plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan = (1.0, 0.0)) -> Motion:
-    """Its closed form, the guide of length one: the slider by a quadratic, or the crank by two circles."""
+def slider_crank_motion(
+    plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan = (1.0, 0.0)
+) -> Motion:
+    """Its closed form, the guide of length one: the slider by a quadratic, or the crank by two
+    circles.
+    """
     B, C, g = (extended(each)[:, None] for each in (b, c, guide))
     r2, l2 = (B * B).sum(axis=0), ((C - B) ** 2).sum(axis=0)
     side = float(np.sign(C[0, 0] * B[1, 0] - C[1, 0] * B[0, 0]))
@@ -249,18 +315,30 @@ def slider_crank_motion(plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan 
         return {
             "crank": (plane.turned(turn), pivot, np.zeros((3, len(turn)), dtype=np.longdouble)),
             "slider": (plane.turned(0.0 * turn), slider, plane.lift(now_c - C)),
-            "coupler": (plane.turned(heading(now_c - now_b) - heading(C - B)), pin, plane.lift(now_b - B)),
+            "coupler": (
+                plane.turned(heading(now_c - now_b) - heading(C - B)),
+                pin,
+                plane.lift(now_b - B),
+            ),
         }
 
     return motion
 
 
 def crank_rocker(rng: Rng, scale: float = 1.0, grid: float = 0.0) -> tuple[Plan, Plan, Plan]:
-    """B, D and C of a four-bar whose crank turns freely, far from its change points; on a grid unless that is zero."""
+    """B, D and C of a four-bar whose crank turns freely, far from its change points; on a grid
+    unless that is zero.
+    """
     while True:
         turn, high = rng.uniform(0.0, 2.0 * np.pi), rng.choice([-1.0, 1.0])
         crank, ground = rng.uniform(0.15, 0.4), rng.uniform(0.8, 1.2)
-        points = np.array([[crank * np.cos(turn), crank * np.sin(turn)], [ground, 0.0], [rng.uniform(0.2, 1.0), 0.0]])
+        points = np.array(
+            [
+                [crank * np.cos(turn), crank * np.sin(turn)],
+                [ground, 0.0],
+                [rng.uniform(0.2, 1.0), 0.0],
+            ]
+        )
         points[2, 1] = high * rng.uniform(0.5, 1.0)
         points = scale * (np.round(points / grid) * grid if grid else points)
         b, d, c = points
@@ -270,9 +348,17 @@ def crank_rocker(rng: Rng, scale: float = 1.0, grid: float = 0.0) -> tuple[Plan,
 
 
 def turning_crank(rng: Rng, grid: float = 0.0) -> tuple[Plan, Plan]:
-    """B and C of a slider-crank whose crank turns freely; the guide along the first axis may pass the pivot."""
-    turn, crank, offset = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.15, 0.4), rng.uniform(-0.2, 0.2)
-    points = np.array([[crank * np.cos(turn), crank * np.sin(turn)], [rng.uniform(1.0, 1.3), offset]])
+    """B and C of a slider-crank whose crank turns freely; the guide along the first axis may pass
+    the pivot.
+    """
+    turn, crank, offset = (
+        rng.uniform(0.0, 2.0 * np.pi),
+        rng.uniform(0.15, 0.4),
+        rng.uniform(-0.2, 0.2),
+    )
+    points = np.array(
+        [[crank * np.cos(turn), crank * np.sin(turn)], [rng.uniform(1.0, 1.3), offset]]
+    )
     b, c = np.round(points / grid) * grid if grid else points
     return _plan(b), _plan(c)
 

@@ -8,7 +8,16 @@ import numpy as np
 
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case, power
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, four_bar, four_bar_motion, rockers, slider_crank, slider_crank_motion
+from .planar import (
+    JOINTS_OF_A_LOOP,
+    Plan,
+    any_plane,
+    four_bar,
+    four_bar_motion,
+    rockers,
+    slider_crank,
+    slider_crank_motion,
+)
 
 
 class Reach(Family):
@@ -16,7 +25,8 @@ class Reach(Family):
 
     name = "reach"
     about = (
-        "sliders driven past the stretched rod, rockers past their dead centres, struts and tie rods within 1e-6 of them at design"
+        "sliders driven past the stretched rod, rockers past their dead centres, struts and tie"
+        " rods within 1e-6 of them at design"
     )
 
     samples = 81
@@ -31,8 +41,13 @@ class Reach(Family):
             c: Plan = (float(np.sqrt(crank**2 + rod**2 + 2.0 * crank * rod * np.cos(bend))), 0.0)
             up = float(np.arctan2(rod * np.sin(bend), crank + rod * np.cos(bend)))
             b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
-            stroke = np.linspace(-1.2 * (c[0] - abs(rod - crank)), 1.2 * (crank + rod - c[0]) + 0.1 * crank, samples)
-            mechanism, motion = slider_crank(plane, b, c, way, "slide"), slider_crank_motion(plane, b, c, "slide")
+            stroke = np.linspace(
+                -1.2 * (c[0] - abs(rod - crank)), 1.2 * (crank + rod - c[0]) + 0.1 * crank, samples
+            )
+            mechanism, motion = (
+                slider_crank(plane, b, c, way, "slide"),
+                slider_crank_motion(plane, b, c, "slide"),
+            )
             return Specimen(
                 f"slider_crank with {way}, bend {bend:.3g}",
                 partial(as_case, mechanism, "slide", stroke),

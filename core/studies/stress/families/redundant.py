@@ -26,13 +26,17 @@ class Redundant(Family):
     about = "four-bars of four hinges, one of them off by 1e-12 to 1e-3 rad, or by nothing"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """To be solved as well as the geometry allows, telling what is left over, or refused by naming it."""
+        """To be solved as well as the geometry allows, telling what is left over, or refused by
+        naming it.
+        """
         tilt = 0.0 if rng.random() < 0.15 else power(rng, -12.0, -3.0)
         plane, points = any_plane(rng), crank_rocker(rng)
         sound = four_bar(plane, *points)
         joint: Any = sound.joint("pin_2")
         bent = replace(joint, axis=triple(np.array(joint.axis) + tilt * direction(rng)))
-        mechanism = replace(sound, joints=[bent if each is joint else each for each in sound.joints])
+        mechanism = replace(
+            sound, joints=[bent if each is joint else each for each in sound.joints]
+        )
         values = np.linspace(-2.0, 2.0, samples)
         return Specimen(
             f"four_bar, one hinge off by {tilt:.2g} rad",
@@ -46,9 +50,11 @@ class Redundant(Family):
 
 
 def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
-    """The truth of the sound mechanism, and how far one may be from it by meeting other rows than are met here.
+    """The truth of the sound mechanism, and how far one may be from it by meeting other rows than
+    are met here.
 
-    Rows off by the tilt move the pose by K times as much; another choice of rows has an inverse of its own, K times larger at most.
+    Rows off by the tilt move the pose by K times as much; another choice of rows has an inverse of
+    its own, K times larger at most.
     """
     found = closed(replace(case, mechanism=sound), motion)
     system = System(case)
@@ -63,7 +69,9 @@ def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
     slack = found.condition * (1.0 + found.condition) * tilt * size
     # rates follow from poses that are off, by rows that do not agree: nothing is held against them
     bounds = {
-        name: np.stack([bound[0] + slack, *(bound[1:] if tilt <= ROUNDED else np.full_like(bound[1:], np.inf))])
+        name: np.stack(
+            [bound[0] + slack, *(bound[1:] if tilt <= ROUNDED else np.full_like(bound[1:], np.inf))]
+        )
         for name, bound in found.bounds.items()
     }
     return replace(found, bounds=bounds, violated=np.where(violated > TOL, violated * size, 0.0))

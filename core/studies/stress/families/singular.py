@@ -1,4 +1,6 @@
-"""Near-singular geometry: change points, dead centres, platforms and overconstrained loops that barely move."""
+"""Near-singular geometry: change points, dead centres, platforms and overconstrained loops that
+barely move.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,19 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....trajectory import Array
 from ..truth.reference_motion import closed, followed
 from .base import Family, Rng, Specimen, as_case, direction, power, triple
-from .planar import JOINTS_OF_A_LOOP, any_plane, flats, four_bar, four_bar_motion, nearly_kite, nearly_parallel
+from .planar import (
+    JOINTS_OF_A_LOOP,
+    any_plane,
+    flats,
+    four_bar,
+    four_bar_motion,
+    nearly_kite,
+    nearly_parallel,
+)
 
 TURN = 0.97 * np.pi
-# A platform that is off by less may be told to have a freedom more: its smallest singular value is a tenth of that or less, and
-# ranks are told at 1e-9.
+# A platform that is off by less may be told to have a freedom more: its smallest singular value is
+# a tenth of that or less, and ranks are told at 1e-9.
 UNTOLD = 3e-8
 
 
@@ -26,20 +36,24 @@ class Singular(Family):
 
     name = "singular"
     about = (
-        "parallelograms (exact, and off by 1e-12 to 1e-2) and kites at their change points; Bennett and Bricard loops; platforms "
-        "on six legs, off by 1e-8 to 0.1 from the similar hexagons that are singular"
+        "parallelograms (exact, and off by 1e-12 to 1e-2) and kites at their change points; Bennett"
+        " and Bricard loops; platforms on six legs, off by 1e-8 to 0.1 from the similar hexagons"
+        " that are singular"
     )
 
     samples = 61
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """One of them."""
-        return (_parallelogram, _kite, _bennett, _bricard, _platform)[int(rng.integers(5))](rng, samples)
+        return (_parallelogram, _kite, _bennett, _bricard, _platform)[int(rng.integers(5))](
+            rng, samples
+        )
 
 
 def _parallelogram(rng: Rng, samples: int) -> Specimen:
-    """Folds flat twice a turn. Exact, it is answered by the parallelogram or refused, never by what crosses it there; off one way
-    it turns into the antiparallel linkage within the root of that, off the other way it cannot pass.
+    """Folds flat twice a turn. Exact, it is answered by the parallelogram or refused, never by what
+    crosses it there; off one way it turns into the antiparallel linkage within the root of that,
+    off the other way it cannot pass.
     """
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
     b, d, c, off = nearly_parallel(rng)
@@ -71,38 +85,58 @@ def _bennett(rng: Rng, samples: int) -> Specimen:
     a = float(rng.uniform(0.3, 0.6))
     b = a * np.sin(beta) / np.sin(alpha)
     first = float(rng.uniform(0.8, 2.0))
-    second = 2.0 * float(np.arctan2(np.sin(0.5 * (beta + alpha)), np.sin(0.5 * (beta - alpha)) * np.tan(0.5 * first)))
+    second = 2.0 * float(
+        np.arctan2(np.sin(0.5 * (beta + alpha)), np.sin(0.5 * (beta - alpha)) * np.tan(0.5 * first))
+    )
     frame, hinges = np.eye(4), list[tuple[Array, Array]]()
-    for turn, length, twist in ((first, a, alpha), (second, b, beta), (-first, a, alpha), (-second, b, beta)):
+    for turn, length, twist in (
+        (first, a, alpha),
+        (second, b, beta),
+        (-first, a, alpha),
+        (-second, b, beta),
+    ):
         hinges.append((frame[:3, 3].copy(), frame[:3, 2].copy()))
         frame = frame @ _screwed(turn, length, twist)
     if np.abs(frame - np.eye(4)).max() > 1e-12:
         raise ArithmeticError("the Bennett loop does not close")
     mechanism = _ring("bennett", hinges)
     return Specimen(
-        f"bennett, alpha {alpha:.3g}, beta {beta:.3g}", partial(as_case, mechanism, "turn", np.linspace(-7.0, 7.0, samples))
+        f"bennett, alpha {alpha:.3g}, beta {beta:.3g}",
+        partial(as_case, mechanism, "turn", np.linspace(-7.0, 7.0, samples)),
     )
 
 
 def _screwed(turn: float, length: float, twist: float) -> Array:
     """The frame of the next hinge: turned about z, then along and about x."""
     c, s, k, m = np.cos(turn), np.sin(turn), np.cos(twist), np.sin(twist)
-    return np.array([[c, -s * k, s * m, length * c], [s, c * k, -c * m, length * s], [0.0, m, k, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    return np.array(
+        [
+            [c, -s * k, s * m, length * c],
+            [s, c * k, -c * m, length * s],
+            [0.0, m, k, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def _ring(name: str, hinges: list[tuple[Array, Array]]) -> Mechanism:
-    """Bodies around a ring of hinges, the ground between the first and the last; the first is driven."""
+    """Bodies around a ring of hinges, the ground between the first and the last; the first is
+    driven.
+    """
     bodies = [Body(f"link_{k}") for k in range(1, len(hinges))]
     around = [GROUND, *(body.name for body in bodies), GROUND]
     joints = [
-        Revolute(f"hinge_{k}", around[k], around[k + 1], triple(point), triple(axis)) for k, (point, axis) in enumerate(hinges)
+        Revolute(f"hinge_{k}", around[k], around[k + 1], triple(point), triple(axis))
+        for k, (point, axis) in enumerate(hinges)
     ]
     points = [Point(f"P{k}", around[k], triple(hinges[k][0])) for k in range(1, len(hinges))]
     return Mechanism(name, bodies, joints, points, [JointAngle("turn", "hinge_0")])
 
 
 def _bricard(rng: Rng, samples: int) -> Specimen:
-    """Six hinges along edges of a cube: no freedom by count, one by geometry; its dead centre is 30 degrees from the cube."""
+    """Six hinges along edges of a cube: no freedom by count, one by geometry; its dead centre is 30
+    degrees from the cube.
+    """
     x, y, z = np.eye(3)
     hinges = [
         (0.0 * x, -y),
@@ -120,7 +154,9 @@ def _bricard(rng: Rng, samples: int) -> Specimen:
 
 
 def _platform(rng: Rng, samples: int) -> Specimen:
-    """On five rods and a driven leg; similar hexagons on base and platform give a freedom too many."""
+    """On five rods and a driven leg; similar hexagons on base and platform give a freedom too
+    many.
+    """
     off = power(rng, -8.0, -1.0)
     angles = np.sort(np.linspace(0.0, 2.0 * np.pi, 6, endpoint=False) + rng.uniform(-0.3, 0.3, 6))
     base = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
@@ -129,13 +165,21 @@ def _platform(rng: Rng, samples: int) -> Specimen:
     low, high = ends[0]
     along = triple(np.subtract(high, low))
     across = triple(np.cross(along, direction(rng)))
-    joints: list[Joint] = [Distance(f"rod_{k}", GROUND, "platform", pair) for k, pair in enumerate(ends[1:], 1)]
-    hung: Any = Universal("foot", GROUND, "cylinder", low, (across, triple(np.cross(along, across))))
-    slide: Joint = (Translational if rng.random() < 0.5 else Cylindrical)("leg", "cylinder", "piston", low, along)
+    joints: list[Joint] = [
+        Distance(f"rod_{k}", GROUND, "platform", pair) for k, pair in enumerate(ends[1:], 1)
+    ]
+    hung: Any = Universal(
+        "foot", GROUND, "cylinder", low, (across, triple(np.cross(along, across)))
+    )
+    slide: Joint = (Translational if rng.random() < 0.5 else Cylindrical)(
+        "leg", "cylinder", "piston", low, along
+    )
     head: Joint = (
         Spherical("head", "piston", "platform", high)
         if isinstance(slide, Translational)
-        else Universal("head", "piston", "platform", high, (across, triple(np.cross(along, across))))
+        else Universal(
+            "head", "piston", "platform", high, (across, triple(np.cross(along, across)))
+        )
     )
     mechanism = Mechanism(
         "platform",

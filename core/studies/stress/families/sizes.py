@@ -27,7 +27,15 @@ TURN = np.pi
 """Of a crank to either side of the design [rad]: a whole turn in all."""
 
 
-def linkage(rng: Rng, plane: Plane, samples: int, *, scale: float = 1.0, grid: float = 0.0, rate: float = 1.0) -> Specimen:
+def linkage(
+    rng: Rng,
+    plane: Plane,
+    samples: int,
+    *,
+    scale: float = 1.0,
+    grid: float = 0.0,
+    rate: float = 1.0,
+) -> Specimen:
     """A four-bar or a slider-crank whose crank makes a whole turn."""
     way, turn = str(rng.choice(JOINTS_OF_A_LOOP)), np.linspace(-TURN, TURN, samples)
     if rng.random() < 0.5:
@@ -38,7 +46,9 @@ def linkage(rng: Rng, plane: Plane, samples: int, *, scale: float = 1.0, grid: f
         mechanism = slider_crank(plane, b, c, way, "turn")
         motion = slider_crank_motion(plane, b, c, "turn")
     return Specimen(
-        f"{mechanism.name} with {way}", partial(as_case, mechanism, "turn", turn, rate=rate), partial(closed, motion=motion)
+        f"{mechanism.name} with {way}",
+        partial(as_case, mechanism, "turn", turn, rate=rate),
+        partial(closed, motion=motion),
     )
 
 
@@ -62,11 +72,16 @@ class Offset(Family):
     """A mechanism far from the origin of its coordinates."""
 
     name = "offset"
-    about = "four-bars and slider-cranks of 1 m up to 1e7 m from the origin, coordinates on a grid so that none is rounded"
+    about = (
+        "four-bars and slider-cranks of 1 m up to 1e7 m from the origin, coordinates on a grid so"
+        " that none is rounded"
+    )
     GRID: ClassVar[float] = 2.0**-20
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """In a plane along the global axes: 24 bits of the offset and 20 of the grid fit into a double."""
+        """In a plane along the global axes: 24 bits of the offset and 20 of the grid fit into a
+        double.
+        """
         origin = np.round(rng.uniform(-1.0, 1.0, 3) * power(rng, 0.0, 7.0) / self.GRID) * self.GRID
         return linkage(rng, flat_plane(rng, np.array(triple(origin))), samples, grid=self.GRID)
 
@@ -78,20 +93,37 @@ class Ratios(Family):
     about = "cranks, and cranks with rockers, of 1e-6 to 1 of the other links' lengths, one turn"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """A short crank on a slider-crank; two short bars facing each other, or one short crank in a four-bar."""
-        plane, way, turn = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP)), np.linspace(-TURN, TURN, samples)
+        """A short crank on a slider-crank; two short bars facing each other, or one short crank in
+        a four-bar.
+        """
+        plane, way, turn = (
+            any_plane(rng),
+            str(rng.choice(JOINTS_OF_A_LOOP)),
+            np.linspace(-TURN, TURN, samples),
+        )
         ratio, at = power(rng, -6.0, 0.0), rng.uniform(0.3, 2.8)
         short: Plan = (0.3 * ratio * float(np.cos(at)), 0.3 * ratio * float(np.sin(at)))
         kind = int(rng.integers(3))
         facts = (("ratio", ratio),)
         if kind == 0:
             c: Plan = (float(rng.uniform(1.0, 1.3)), 0.0)
-            mechanism, motion = slider_crank(plane, short, c, way, "turn"), slider_crank_motion(plane, short, c, "turn")
+            mechanism, motion = (
+                slider_crank(plane, short, c, way, "turn"),
+                slider_crank_motion(plane, short, c, "turn"),
+            )
         else:
             d: Plan = (1.0, 0.0)
-            # the rocker is 1.3 / 0.3 times the crank and stands across, or as long as the other links
-            c = (1.0, 1.3 * ratio) if kind == 1 else (float(rng.uniform(0.4, 0.6)), float(rng.uniform(0.6, 0.8)))
-            mechanism, motion = four_bar(plane, short, d, c, way), four_bar_motion(plane, short, d, c)
+            # the rocker is 1.3 / 0.3 times the crank and stands across, or as long as the other
+            # links
+            c = (
+                (1.0, 1.3 * ratio)
+                if kind == 1
+                else (float(rng.uniform(0.4, 0.6)), float(rng.uniform(0.6, 0.8)))
+            )
+            mechanism, motion = (
+                four_bar(plane, short, d, c, way),
+                four_bar_motion(plane, short, d, c),
+            )
         return Specimen(
             f"{mechanism.name} with {way}, ratio {ratio:.3g}",
             partial(as_case, mechanism, "turn", turn),

@@ -1,4 +1,6 @@
-"""Two loops on one crank: singular at the same poses, where the determinant of all rows changes its sign twice, and keeps it."""
+"""Two loops on one crank: singular at the same poses, where the determinant of all rows changes its
+sign twice, and keeps it.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,17 @@ import numpy as np
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case
 from .pairs import beside, beside_motion
-from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, nearly_kite, nearly_parallel, rockers
+from .planar import (
+    JOINTS_OF_A_LOOP,
+    Plan,
+    any_plane,
+    flats,
+    four_bar,
+    four_bar_motion,
+    nearly_kite,
+    nearly_parallel,
+    rockers,
+)
 
 TURN, TWIN = 0.97 * np.pi, "twin "
 
@@ -27,8 +39,9 @@ class Twins(Family):
 
     name = "twins"
     about = (
-        "two equal loops on one crank, hung alike or not, so that no sign of a whole determinant tells singular poses: "
-        "parallelograms (exact, and off by 1e-12 to 1e-2), kites, and four-bars driven past their dead centres"
+        "two equal loops on one crank, hung alike or not, so that no sign of a whole determinant"
+        " tells singular poses: parallelograms (exact, and off by 1e-12 to 1e-2), kites, and"
+        " four-bars driven past their dead centres"
     )
 
     samples = 61

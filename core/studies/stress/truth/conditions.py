@@ -1,13 +1,16 @@
-"""The conditions of a mechanism, written a second time: full products of vectors, in extended precision, nothing simplified.
+"""The conditions of a mechanism, written a second time: full products of vectors, in extended
+precision, nothing simplified.
 
-Nothing here comes from the primitives, rows or programs that are under test; only what the fields of a joint mean is shared. Every
-joint is a few rows, each a sum of terms of four kinds (a, b: directions fixed in body i and j; d: from a point of body i to one of
-body j; all carried by the bodies)
+Nothing here comes from the primitives, rows or programs that are under test; only what the fields
+of a joint mean is shared. Every joint is a few rows, each a sum of terms of four kinds (a, b:
+directions fixed in body i and j; d: from a point of body i to one of body j; all carried by the
+bodies)
 
     dot     a . b          slide   a . d          rod     (d . d - L^2) / 2 L          turn    the angle from i to j about h
 
-less a constant: the value at design, or zero. A row is of the size of what violates it, because lengths are measured in a unit near
-the mechanism's size. A turn is that of the arc tangent, taken to the whole turn that is nearest to a given angle.
+less a constant: the value at design, or zero. A row is of the size of what violates it, because
+lengths are measured in a unit near the mechanism's size. A turn is that of the arc tangent, taken
+to the whole turn that is nearest to a given angle.
 """
 
 from __future__ import annotations
@@ -36,11 +39,16 @@ def conditions(mechanism: Mechanism) -> Conditions:
     for joint in mechanism.joints:
         stated = JOINTS.get(joint.type)
         if stated is None:
-            raise NotStatedError(f"{joint}: the stress truth has no conditions for this type; known: {', '.join(JOINTS)}")
+            raise NotStatedError(
+                f"{joint}: the stress truth has no conditions for this type; known:"
+                f" {', '.join(JOINTS)}"
+            )
         stated(writer, joint)
     for coupler in mechanism.couplers:
         row = writer.row(coupler.name)
-        largest = max(abs(k) * (writer.unit if f == "translation" else 1.0) for f, k in _weights(coupler))
+        largest = max(
+            abs(k) * (writer.unit if f == "translation" else 1.0) for f, k in _weights(coupler)
+        )
         for name, (freedom, k) in zip(coupler.joints, _weights(coupler), strict=True):
             metres = writer.unit if freedom == "translation" else 1.0
             writer.coordinate(row, mechanism.joint(name), freedom, k * metres / largest)
@@ -50,13 +58,17 @@ def conditions(mechanism: Mechanism) -> Conditions:
         if isinstance(driver, PointCoordinate):
             point = mechanism.point(driver.point)
             direction = unit(extended(driver.direction))
-            writer.slide(row, 0, writer.index(point.body), direction, point.position, point.position)
+            writer.slide(
+                row, 0, writer.index(point.body), direction, point.position, point.position
+            )
             driven.append((row, 1.0 / writer.unit))
         elif isinstance(driver, JointDriver):
             writer.coordinate(row, mechanism.joint(driver.joint), driver.freedom, 1.0)
             driven.append((row, 1.0 if driver.turns else 1.0 / writer.unit))
         else:
-            raise NotStatedError(f"driver {driver.name!r} ({driver.type}): the stress truth cannot drive it")
+            raise NotStatedError(
+                f"driver {driver.name!r} ({driver.type}): the stress truth cannot drive it"
+            )
     return writer.finished(driven)
 
 

@@ -16,7 +16,9 @@ from .long_double import Real, extended, triad
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One term: its bodies (0 is the ground), its vectors at design, and the row it is added to with a weight."""
+    """One term: its bodies (0 is the ground), its vectors at design, and the row it is added to
+    with a weight.
+    """
 
     i: int
     j: int
@@ -32,8 +34,10 @@ class Conditions:
     Attributes:
         unit: of length [m].
         bodies: names of the moving bodies; body k of a term is bodies[k - 1].
-        centres: reference point of each moving body, from the global origin [units], shape (bodies, 3).
-        origin: what global positions are measured from before they are scaled [m]; takes out a far offset.
+        centres: reference point of each moving body, from the global origin [units], shape (bodies,
+            3).
+        origin: what global positions are measured from before they are scaled [m]; takes out a far
+            offset.
         dots, slides, rods, turns: the terms; see `Writer` for their vectors.
         constants: what is taken off each row.
         driven: the row of each driver, in order, and the size of one unit of its value there.
@@ -68,24 +72,33 @@ class Writer:
     owners: list[str] = field(default_factory=list[str])
     constants: list[Any] = field(default_factory=list[Any])
     turning: list[str] = field(default_factory=list[str])
-    terms: dict[str, list[Term]] = field(default_factory=lambda: {kind: [] for kind in ("dots", "slides", "rods", "turns")})
+    terms: dict[str, list[Term]] = field(
+        default_factory=lambda: {kind: [] for kind in ("dots", "slides", "rods", "turns")}
+    )
 
     def __post_init__(self) -> None:
         mechanism = self.mechanism
-        on: dict[str, list[Sequence[float]]] = {body.name: [] for body in mechanism.bodies} | {"ground": []}
+        on: dict[str, list[Sequence[float]]] = {body.name: [] for body in mechanism.bodies} | {
+            "ground": []
+        }
         for point in mechanism.points:
             on[point.body].append(point.position)
         for joint in mechanism.joints:
             points = getattr(joint, "points", None)
             here = getattr(joint, "point", None)
             for k, name in enumerate(joint.bodies):
-                on[name] += [points[k]] if points is not None else [here] if here is not None else []
+                on[name] += (
+                    [points[k]] if points is not None else [here] if here is not None else []
+                )
         every = extended([p for points in on.values() for p in points] or [[0.0, 0.0, 0.0]])
         self.origin = every[0]
         extent = float(np.ptp(every, axis=0).max())
         self.unit = 2.0 ** round(math.log2(extent)) if extent > 0.0 else 1.0
         self.names = [body.name for body in mechanism.moving]
-        self.centres = [self.place(on[name][0] if on[name] else mechanism.body(name).origin) for name in self.names]
+        self.centres = [
+            self.place(on[name][0] if on[name] else mechanism.body(name).origin)
+            for name in self.names
+        ]
 
     def index(self, body: str) -> int:
         """Zero for whatever does not move."""
@@ -99,31 +112,52 @@ class Writer:
         return (extended(position) - self.origin) / extended(self.unit)
 
     def arm(self, body: int, position: Sequence[float]) -> Real:
-        return self.place(position) - (self.centres[body - 1] if body else extended([0.0, 0.0, 0.0]))
+        return self.place(position) - (
+            self.centres[body - 1] if body else extended([0.0, 0.0, 0.0])
+        )
 
     def row(self, owner: str) -> int:
         self.owners.append(owner)
         self.constants.append(extended(0.0))
         return len(self.owners) - 1
 
-    def dot(self, row: int, i: int, j: int, a: Real, b: Real, weight: float = 1.0, *, held: bool = False) -> None:
+    def dot(
+        self, row: int, i: int, j: int, a: Real, b: Real, weight: float = 1.0, *, held: bool = False
+    ) -> None:
         """a on i, b on j; held at its design value, or else zero."""
         self.terms["dots"].append(Term(i, j, (a, b), row, weight))
         if held:
             self.constants[row] = self.constants[row] + weight * (a @ b)
 
-    def slide(self, row: int, i: int, j: int, a: Real, first: Any, second: Any, weight: float = 1.0, *, held: bool = False) -> None:
+    def slide(
+        self,
+        row: int,
+        i: int,
+        j: int,
+        a: Real,
+        first: Any,
+        second: Any,
+        weight: float = 1.0,
+        *,
+        held: bool = False,
+    ) -> None:
         """a on i; d from the first point, on i, to the second, on j."""
         d0 = (extended(second) - extended(first)) / extended(self.unit)
-        self.terms["slides"].append(Term(i, j, (a, self.arm(i, first), self.arm(j, second), d0), row, weight))
+        self.terms["slides"].append(
+            Term(i, j, (a, self.arm(i, first), self.arm(j, second), d0), row, weight)
+        )
         if held:
             self.constants[row] = self.constants[row] + weight * (a @ d0)
 
     def rod(self, row: int, i: int, j: int, first: Any, second: Any, length: float | None) -> None:
-        """d from the first point, on i, to the second, on j, as long as at design unless a length [m] is given."""
+        """d from the first point, on i, to the second, on j, as long as at design unless a length
+        [m] is given.
+        """
         d0 = (extended(second) - extended(first)) / extended(self.unit)
         size = np.sqrt(d0 @ d0) if length is None else extended(length) / extended(self.unit)
-        self.terms["rods"].append(Term(i, j, (self.arm(i, first), self.arm(j, second), d0, size[None]), row))
+        self.terms["rods"].append(
+            Term(i, j, (self.arm(i, first), self.arm(j, second), d0, size[None]), row)
+        )
 
     def coordinate(self, row: int, joint: Joint, freedom: str, weight: float) -> None:
         """A coordinate of an axial joint: that of its second body relative to its first."""

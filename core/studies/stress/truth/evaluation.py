@@ -1,11 +1,13 @@
-"""The conditions evaluated at poses of many samples at once: residuals, Jacobian, and what the second derivative has beyond it.
+"""The conditions evaluated at poses of many samples at once: residuals, Jacobian, and what the
+second derivative has beyond it.
 
-Bodies turn by quaternions since the design; the unknowns of a body are its shift and its turn in global axes (dA = w x A). With
-s an arm, r = w x (w x s) and a' = w x a:
+Bodies turn by quaternions since the design; the unknowns of a body are its shift and its turn in
+global axes (dA = w x A). With s an arm, r = w x (w x s) and a' = w x a:
 
     dot     (a . b)'   = w_i . (a x b) + w_j . (b x a)                 beyond: a'' . b + 2 a' . b' + a . b''
     slide   (a . d)'   = w_i . (a x d) + a . d',  d' = v_j + w_j x s_j - v_i - w_i x s_i
-                                                                      beyond: a'' . d + 2 a' . d' + a . (r_j - r_i)
+                                                                      beyond: a'' . d + 2 a' . d' +
+                                                                          a . (r_j - r_i)
     rod     d . d' / L                                                beyond: (d' . d' + d . (r_j - r_i)) / L
     turn    h_i . (w_j - w_i)                                         beyond: h_i' . (w_j - w_i)
 """
@@ -69,7 +71,8 @@ class Poses:
         u, q = self.u.copy(), self.q.copy()
         u[1:] += step[:, :3]
         q[1:] += 0.5 * spun(step[:, 3:], q[1:])
-        # the tangent step and the projection onto the sphere turn by 2 atan(|w| / 2): the same turn to third order
+        # the tangent step and the projection onto the sphere turn by 2 atan(|w| / 2): the same turn
+        # to third order
         return Poses(u, q / np.sqrt((q * q).sum(axis=1, keepdims=True)))
 
 
@@ -95,7 +98,9 @@ def inner(a: Real, b: Real) -> Real:
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    """The terms of one kind as arrays: bodies, rows and weights of shape (m,), vectors of shape (m, 3, 1)."""
+    """The terms of one kind as arrays: bodies, rows and weights of shape (m,), vectors of shape (m,
+    3, 1).
+    """
 
     i: Indices
     j: Indices
@@ -108,7 +113,9 @@ class _Kind:
         if not terms:
             return None
         i, j, row = (np.array([getattr(t, name) for t in terms]) for name in ("i", "j", "row"))
-        vectors = [np.stack(each)[..., None] for each in zip(*(t.vectors for t in terms), strict=True)]
+        vectors = [
+            np.stack(each)[..., None] for each in zip(*(t.vectors for t in terms), strict=True)
+        ]
         return _Kind(i, j, row, extended([t.weight for t in terms])[:, None], vectors)
 
 
@@ -131,7 +138,10 @@ class Evaluator:
         k = self.turns
         if k is None:
             return np.zeros((0, poses.samples), dtype=np.longdouble)
-        f_i, g_i, f_j = (_carried(poses, b, a) for b, a in ((k.i, k.vectors[0]), (k.i, k.vectors[1]), (k.j, k.vectors[0])))
+        f_i, g_i, f_j = (
+            _carried(poses, b, a)
+            for b, a in ((k.i, k.vectors[0]), (k.i, k.vectors[1]), (k.j, k.vectors[0]))
+        )
         return np.arctan2(inner(g_i, f_j), inner(f_i, f_j))
 
     def residual(self, poses: Poses, driven: Real, near: Real) -> Real:
@@ -151,9 +161,17 @@ class Evaluator:
     def _values(self, poses: Poses, near: Real) -> list[tuple[Indices, Real]]:
         found: list[tuple[Indices, Real]] = []
         if k := self.dots:
-            found.append((k.row, k.weight * inner(_carried(poses, k.i, k.vectors[0]), _carried(poses, k.j, k.vectors[1]))))
+            found.append(
+                (
+                    k.row,
+                    k.weight
+                    * inner(_carried(poses, k.i, k.vectors[0]), _carried(poses, k.j, k.vectors[1])),
+                )
+            )
         if k := self.slides:
-            found.append((k.row, k.weight * inner(_carried(poses, k.i, k.vectors[0]), _line(poses, k, 1)[0])))
+            found.append(
+                (k.row, k.weight * inner(_carried(poses, k.i, k.vectors[0]), _line(poses, k, 1)[0]))
+            )
         if k := self.rods:
             d, length = _line(poses, k, 0)[0], k.vectors[3][:, 0]
             found.append((k.row, k.weight * (inner(d, d) - length * length) / (2.0 * length)))
@@ -164,17 +182,29 @@ class Evaluator:
         return found
 
     def jacobian(self, poses: Poses) -> NDArray[np.float64]:
-        """Derivative of the rows by the unknowns, in double precision, shape (n, rows, unknowns)."""
+        """Derivative of the rows by the unknowns, in double precision, shape (n, rows,
+        unknowns).
+        """
         found = np.zeros((self.stated.rows, self.bodies + 1, 6, poses.samples))
         for k, parts in self._gradients(poses):
             for body, (shift, turn) in zip((k.i, k.j), parts, strict=True):
                 if shift is not None:
-                    np.add.at(found[:, :, :3], (k.row, body), (k.weight[..., None] * shift).astype(np.float64))
-                np.add.at(found[:, :, 3:], (k.row, body), (k.weight[..., None] * turn).astype(np.float64))
-        return np.ascontiguousarray(np.moveaxis(found[:, 1:].reshape(self.stated.rows, self.unknowns, -1), -1, 0))
+                    np.add.at(
+                        found[:, :, :3],
+                        (k.row, body),
+                        (k.weight[..., None] * shift).astype(np.float64),
+                    )
+                np.add.at(
+                    found[:, :, 3:], (k.row, body), (k.weight[..., None] * turn).astype(np.float64)
+                )
+        return np.ascontiguousarray(
+            np.moveaxis(found[:, 1:].reshape(self.stated.rows, self.unknowns, -1), -1, 0)
+        )
 
     def _gradients(self, poses: Poses) -> list[tuple[_Kind, list[tuple[Real | None, Real]]]]:
-        """Of each kind the derivatives by shift and turn of body i, then of body j, each of shape (m, 3, n)."""
+        """Of each kind the derivatives by shift and turn of body i, then of body j, each of shape
+        (m, 3, n).
+        """
         found: list[tuple[_Kind, list[tuple[Real | None, Real]]]] = []
         if k := self.dots:
             a, b = _carried(poses, k.i, k.vectors[0]), _carried(poses, k.j, k.vectors[1])
@@ -213,15 +243,21 @@ class Evaluator:
         if k := self.dots:
             a, b = _carried(poses, k.i, k.vectors[0]), _carried(poses, k.j, k.vectors[1])
             (a_t, a_tt), (b_t, b_tt) = swing(k.i, a), swing(k.j, b)
-            np.add.at(found, k.row, k.weight * (inner(a_tt, b) + 2.0 * inner(a_t, b_t) + inner(a, b_tt)))
+            np.add.at(
+                found, k.row, k.weight * (inner(a_tt, b) + 2.0 * inner(a_t, b_t) + inner(a, b_tt))
+            )
         if k := self.slides:
             a, (d, s_i, s_j) = _carried(poses, k.i, k.vectors[0]), _line(poses, k, 1)
             (a_t, a_tt), (d_t, bent) = swing(k.i, a), parting(k, s_i, s_j)
-            np.add.at(found, k.row, k.weight * (inner(a_tt, d) + 2.0 * inner(a_t, d_t) + inner(a, bent)))
+            np.add.at(
+                found, k.row, k.weight * (inner(a_tt, d) + 2.0 * inner(a_t, d_t) + inner(a, bent))
+            )
         if k := self.rods:
             d, s_i, s_j = _line(poses, k, 0)
             d_t, bent = parting(k, s_i, s_j)
-            np.add.at(found, k.row, k.weight * (inner(d_t, d_t) + inner(d, bent)) / k.vectors[3][:, 0])
+            np.add.at(
+                found, k.row, k.weight * (inner(d_t, d_t) + inner(d, bent)) / k.vectors[3][:, 0]
+            )
         if k := self.turns:
             h_t, _ = swing(k.i, _carried(poses, k.i, k.vectors[2]))
             np.add.at(found, k.row, k.weight * inner(h_t, w[k.j] - w[k.i]))
@@ -234,7 +270,9 @@ def _carried(poses: Poses, body: Indices, a: Real) -> Real:
 
 
 def _line(poses: Poses, k: _Kind, first: int) -> tuple[Real, Real, Real]:
-    """d, and the arms of body i and j; the arms and d at design are the vectors from the first on."""
+    """d, and the arms of body i and j; the arms and d at design are the vectors from the first
+    on.
+    """
     s_i, s_j, d0 = (k.vectors[first + each] for each in range(3))
     now_i, now_j = _carried(poses, k.i, s_i), _carried(poses, k.j, s_j)
     return d0 + (poses.u[k.j] + (now_j - s_j)) - (poses.u[k.i] + (now_i - s_i)), now_i, now_j

@@ -62,7 +62,9 @@ def _length(w: Writer, joint: Any) -> None:
 
 
 def _twistless(w: Writer, joint: Any) -> None:
-    """f_i . g_j = g_i . f_j; shaft j's axes are shaft i's, carried over by the shortest rotation."""
+    """f_i . g_j = g_i . f_j; shaft j's axes are shaft i's, carried over by the shortest
+    rotation.
+    """
     f, g, h = triad(joint.axes[0])
     k = unit(extended(joint.axes[1]))
     n = np.cross(h, k)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ....errors import KincheckError
 
 Real: TypeAlias = NDArray[Any]
-"""Of longdoubles, which numpy's types lose wherever a plain number is near. On x86 they have 64 bits of mantissa: a two-thousandth
-of the round-off of what is judged by them."""
+"""Of longdoubles, which numpy's types lose wherever a plain number is near. On x86 they have 64
+bits of mantissa: a two-thousandth of the round-off of what is judged by them."""
 
 
 def extended(values: Any) -> Real:
@@ -28,8 +28,8 @@ def require_extended() -> None:
     """Raise KincheckError where the machine has nothing between double precision and software."""
     if np.finfo(np.longdouble).eps > 1e-18:
         raise KincheckError(
-            "kincheck stress: numpy's longdouble is no wider than a double on this machine, so there is nothing to judge by; "
-            "run it on x86-64 Linux"
+            "kincheck stress: numpy's longdouble is no wider than a double on this machine, so"
+            " there is nothing to judge by; run it on x86-64 Linux"
         )
 
 

@@ -1,11 +1,13 @@
-"""A case as equations in extended precision: its samples polished, its rates, its condition, and its way from the design.
+"""A case as equations in extended precision: its samples polished, its rates, its condition, and
+its way from the design.
 
-The way is followed here, by nobody else's predictor. A step dx from one knot to the next is taken where J0^-1 J1 - I is less than a
-half in the norm of row sums: the simplified iteration from the knot then contracts all along the step, so that its solution is the
-one that continues the motion (Newton-Kantorovich). Near a singular pose that asks for steps as small as the smallest singular
-value; there it is enough that (J0^-1 J1 - I) dx is less than a half of dx, seen from both ends, and that det(J0^-1 J1) is
-positive: on the other side of a gap between two solutions it is negative. Samples between two knots are interpolated, polished,
-and held to the same from the nearer knot.
+The way is followed here, by nobody else's predictor. A step dx from one knot to the next is taken
+where J0^-1 J1 - I is less than a half in the norm of row sums: the simplified iteration from the
+knot then contracts all along the step, so that its solution is the one that continues the motion
+(Newton-Kantorovich). Near a singular pose that asks for steps as small as the smallest singular
+value; there it is enough that (J0^-1 J1 - I) dx is less than a half of dx, seen from both ends, and
+that det(J0^-1 J1) is positive: on the other side of a gap between two solutions it is negative.
+Samples between two knots are interpolated, polished, and held to the same from the nearer knot.
 """
 
 from __future__ import annotations
@@ -23,21 +25,25 @@ from .conditions import conditions
 from .evaluation import Evaluator, Poses, cross, spun
 from .long_double import Real, extended
 
-# Largest change of J between neighbours. At 1 the simplified iteration may fail; a half leaves as much again for what J does
-# between the two.
+# Largest change of J between neighbours. At 1 the simplified iteration may fail; a half leaves as
+# much again for what J does between the two.
 LARGEST_CHANGE = 0.5
 # Below this part of the way steps are judged by where they go, no longer in all directions.
 SMALL_PART = 2.0**-6
-# A step is at most this part of the way: a sweep of one or two turns is seen at sixteen places or more.
+# A step is at most this part of the way: a sweep of one or two turns is seen at sixteen places or
+# more.
 FIRST_PART = 1.0 / 16.0
-# Below this part of the way it is a singular pose and no coarse step: there the solution changes as the root of what is left.
+# Below this part of the way it is a singular pose and no coarse step: there the solution changes as
+# the root of what is left.
 SMALLEST_PART = 2.0**-30
-# Singular values below this part of the largest are those of redundant rows: as `freedom.RANK_TOLERANCE`.
+# Singular values below this part of the largest are those of redundant rows: as
+# `freedom.RANK_TOLERANCE`.
 RANK = 1e-9
 # Samples at a time: keeps the arrays of the largest mechanisms in the cache.
 LANES = 256
 MOST_STEPS = 8
-# A polished sample is right to this part of its condition: a hundredth of what an engine is allowed.
+# A polished sample is right to this part of its condition: a hundredth of what an engine is
+# allowed.
 POLISHED = 1e-16
 
 
@@ -84,9 +90,15 @@ class Solved:
 
     def repeated(self, count: int) -> Solved:
         """One sample so many times."""
-        lanes = [np.repeat(each, count, axis=-1) for each in (self.poses.u, self.poses.q, self.angles, self.v, self.a)]
+        lanes = [
+            np.repeat(each, count, axis=-1)
+            for each in (self.poses.u, self.poses.q, self.angles, self.v, self.a)
+        ]
         u, q, angles, v, a = lanes
-        first = [np.repeat(each, count, axis=0) for each in (self.times, self.jacobian, self.inverse, self.step)]
+        first = [
+            np.repeat(each, count, axis=0)
+            for each in (self.times, self.jacobian, self.inverse, self.step)
+        ]
         times, jacobian, inverse, step = first
         return Solved(times, Poses(u, q), angles, jacobian, inverse, v, a, step)
 
@@ -99,7 +111,9 @@ class System:
         self.rows = Evaluator(conditions(case.mechanism))
         self.path = case.sweep.path
         self.names = [driver.name for driver in self.mechanism.drivers]
-        self.driving = {d.joint: k for k, d in enumerate(self.mechanism.drivers) if isinstance(d, JointAngle)}
+        self.driving = {
+            d.joint: k for k, d in enumerate(self.mechanism.drivers) if isinstance(d, JointAngle)
+        }
 
     def drives(self, times: Array) -> Real:
         """Value, velocity and acceleration of all drivers [SI], shape (3, drivers, n)."""
@@ -109,14 +123,17 @@ class System:
         """The same at samples of the sweep, the swept value as it was given."""
         found = self.drives(self.path.times[samples])
         if self.case.sweep.driver in self.names:
-            found[0, self.names.index(self.case.sweep.driver)] = extended(self.case.sweep.change[samples])
+            found[0, self.names.index(self.case.sweep.driver)] = extended(
+                self.case.sweep.change[samples]
+            )
         return found
 
     def solved(self, poses: Poses, drives: Real, times: Array, near: Real) -> Solved:
         """Newton's iteration from poses near to solutions, and the rates there.
 
         Args:
-            near: angles of the turns nearby [rad], shape (turns, n); those that are driven are known.
+            near: angles of the turns nearby [rad], shape (turns, n); those that are driven are
+                known.
         """
         near = self._known(near, drives)
         jacobian = self.rows.jacobian(poses)
@@ -134,7 +151,8 @@ class System:
             if (last[good] <= 1e-3 * POLISHED).all() or not good.any():
                 break
             before, largest = largest, float(size[good].max())
-            if largest > 1e-5 or largest > 1e-3 * before:  # else the old J gains three digits or more
+            # else the old J gains three digits or more
+            if largest > 1e-5 or largest > 1e-3 * before:
                 jacobian = self.rows.jacobian(poses)
                 inverse = inverted(jacobian)
         jacobian = self.rows.jacobian(poses)
@@ -160,10 +178,17 @@ class System:
         """The design position, moving as the path says."""
         start = np.zeros(1)
         poses = Poses.design(self.rows.bodies, 1)
-        return self.solved(poses, self.drives(start), start, np.zeros((len(self.rows.stated.turns), 1), dtype=np.longdouble))
+        return self.solved(
+            poses,
+            self.drives(start),
+            start,
+            np.zeros((len(self.rows.stated.turns), 1), dtype=np.longdouble),
+        )
 
     def knots(self, stop: float) -> tuple[list[Solved], float | None]:
-        """The way from the design to a time, as far as it goes, and the time at which it folds back, where that ends it."""
+        """The way from the design to a time, as far as it goes, and the time at which it folds
+        back, where that ends it.
+        """
         found, h = [self.design()], stop * FIRST_PART
         if not found[0].step[0] <= POLISHED:
             return [], None
@@ -188,7 +213,9 @@ class System:
         return found, None
 
     def between(self, knots: Sequence[Solved], samples: NDArray[np.intp]) -> Solved:
-        """Samples of the sweep on the way through the knots; steps are infinite where J changes too much from the nearer knot."""
+        """Samples of the sweep on the way through the knots; steps are infinite where J changes too
+        much from the nearer knot.
+        """
         times = self.path.times[samples]
         at = np.array([knot.times[0] for knot in knots])
         left = np.clip(np.searchsorted(np.abs(at), np.abs(times), side="right") - 1, 0, len(at) - 2)
@@ -214,12 +241,16 @@ class System:
 
 
 def condition(inverse: Array) -> Array:
-    """How far all unknowns together move [units, rad] for rows that are off by one each, shape (n,)."""
+    """How far all unknowns together move [units, rad] for rows that are off by one each, shape
+    (n,).
+    """
     return np.maximum(1.0, np.abs(inverse).sum(axis=2).max(axis=1))
 
 
 def inverted(jacobian: Array) -> Array:
-    """The inverses, or the pseudo-inverses where there are redundant rows; NaN where there is none."""
+    """The inverses, or the pseudo-inverses where there are redundant rows; NaN where there is
+    none.
+    """
     finite = np.isfinite(jacobian).all(axis=(1, 2), keepdims=True)
     sound = np.where(finite, jacobian, 0.0)
     try:
@@ -234,8 +265,13 @@ def inverted(jacobian: Array) -> Array:
 
 
 def changes(knots: Sequence[Solved], nearest: NDArray[np.intp], new: Solved) -> tuple[Array, Array]:
-    """How J has changed from knots to other samples, in all directions and along the way there; infinite beyond a gap."""
-    inverse, jacobian = (np.concatenate([getattr(k, name) for k in knots])[nearest] for name in ("inverse", "jacobian"))
+    """How J has changed from knots to other samples, in all directions and along the way there;
+    infinite beyond a gap.
+    """
+    inverse, jacobian = (
+        np.concatenate([getattr(k, name) for k in knots])[nearest]
+        for name in ("inverse", "jacobian")
+    )
     product = inverse @ new.jacobian
     turned = np.linalg.slogdet(product)[0] <= 0.0
     product[:, range(product.shape[1]), range(product.shape[1])] -= 1.0
@@ -253,7 +289,9 @@ def _way(knots: Sequence[Solved], nearest: NDArray[np.intp], new: Solved) -> Arr
     u = new.poses.u[1:] - np.concatenate([k.poses.u[1:] for k in knots], axis=-1)[..., nearest]
     q0 = np.concatenate([k.poses.q[1:] for k in knots], axis=-1)[..., nearest]
     turn = 2.0 * _vector(new.poses.q[1:], q0)
-    return np.concatenate([u, turn], axis=1).reshape(-1, u.shape[-1]).T[..., None].astype(np.float64)
+    return (
+        np.concatenate([u, turn], axis=1).reshape(-1, u.shape[-1]).T[..., None].astype(np.float64)
+    )
 
 
 def _vector(q: Real, p: Real) -> Real:
@@ -262,12 +300,18 @@ def _vector(q: Real, p: Real) -> Real:
 
 
 def _fold(at: Solved, stop: float) -> float | None:
-    """Where the motion turns back: there unknowns go as the root of the time left, tau, and so v / 2a = tau."""
+    """Where the motion turns back: there unknowns go as the root of the time left, tau, and so v /
+    2a = tau.
+    """
     k = int(np.abs(at.a).argmax())
     v, a = float(at.v.ravel()[k]), float(at.a.ravel()[k])
     left = v / (2.0 * a) if a else np.inf
     # the last step was refused, being too long a part of what is left
-    return float(at.times[0]) + left if 0.0 < left * np.sign(stop) <= 64.0 * SMALLEST_PART * abs(stop) else None
+    return (
+        float(at.times[0]) + left
+        if 0.0 < left * np.sign(stop) <= 64.0 * SMALLEST_PART * abs(stop)
+        else None
+    )
 
 
 def _bodies(x: Array) -> Real:
@@ -284,7 +328,9 @@ def _spin(knot: Solved) -> Real:
     return 0.5 * spun(np.concatenate([still, knot.v[:, 3:]]), knot.poses.q)[..., 0]
 
 
-def _hermite(x: Sequence[Real], rates: Sequence[Real], left: NDArray[np.intp], s: Real, span: Array) -> Real:
+def _hermite(
+    x: Sequence[Real], rates: Sequence[Real], left: NDArray[np.intp], s: Real, span: Array
+) -> Real:
     """The cubic through values and rates of the knots on both sides, shape (bodies, 3 or 4, n)."""
     values, slopes = np.stack(x, axis=-1), np.stack(rates, axis=-1)
     s2, s3 = s * s, s * s * s

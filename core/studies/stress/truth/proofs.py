@@ -1,4 +1,6 @@
-"""Proving the truth itself: a share of its samples is shown to lie near exactly one solution of the engine's equations."""
+"""Proving the truth itself: a share of its samples is shown to lie near exactly one solution of the
+engine's equations.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
         UnprovedError: there is no proof: the pose is singular.
         KincheckError: python-flint is not installed, or the engine's rows cannot be selected.
     """
-    part, k = next((p, int(np.flatnonzero(at == sample)[0])) for at, p in truth.parts if sample in at)
+    part, k = next(
+        (p, int(np.flatnonzero(at == sample)[0])) for at, p in truth.parts if sample in at
+    )
     at, system = part.at(k), truth.system
     mechanism, points = system.mechanism, system.case.points
     path = system.path
@@ -45,7 +49,8 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
         traced = equations(exact_mechanism(mechanism, as_double), tuple(path.motions), points, kept)
         driven = [
             [
-                flint().arb(_exact(x)) / (1.0 if mechanism.driver(name).turns else traced.frame.unit)
+                flint().arb(_exact(x))
+                / (1.0 if mechanism.driver(name).turns else traced.frame.unit)
                 for x in drives[:, system.names.index(name)]
             ]
             for name in path.motions
@@ -67,7 +72,9 @@ def _exact(x: Any) -> Any:
     return flint().fmpq(exact.numerator, exact.denominator)
 
 
-def _state(truth: Truth, at: Solved, names: Sequence[str], metres: float, origins: Mapping[str, Vec3]) -> Array:
+def _state(
+    truth: Truth, at: Solved, names: Sequence[str], metres: float, origins: Mapping[str, Vec3]
+) -> Array:
     """The scalars that fix the configuration, as the proof has them."""
     stated = truth.system.rows.stated
     found: list[float] = []
@@ -93,7 +100,8 @@ def _coordinate(truth: Truth, at: Solved, name: str, metres: float) -> float:
     stated = truth.system.rows.stated
     if freedom == "rotation":
         return float(at.angles[stated.turning.index(joint), 0])
-    # the way from the joint's point on the first body to that on the second, along the axis of the first
+    # the way from the joint's point on the first body to that on the second, along the axis of the
+    # first
     axial: Any = truth.system.mechanism.joint(joint)
     place = (extended(axial.point) - stated.origin) / stated.unit
     moved: list[Real] = []
@@ -101,6 +109,8 @@ def _coordinate(truth: Truth, at: Solved, name: str, metres: float) -> float:
     for body in axial.bodies[::-1]:
         k = 0 if truth.system.mechanism.is_fixed(body) else stated.bodies.index(body) + 1
         turned = at.poses.turned[k, :, :, 0]
-        moved.append(at.poses.u[k, :, 0] + turned @ (place - stated.centres[k - 1]) if k else 0.0 * h)
+        moved.append(
+            at.poses.u[k, :, 0] + turned @ (place - stated.centres[k - 1]) if k else 0.0 * h
+        )
         h = h + turned @ h if body == axial.i else h
     return float((moved[0] - moved[1]) @ h) * stated.unit / metres

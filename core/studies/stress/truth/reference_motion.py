@@ -1,15 +1,17 @@
-"""The truth about a case: where its points are at every sample that can be reached, and what error may be called round-off.
+"""The truth about a case: where its points are at every sample that can be reached, and what error
+may be called round-off.
 
-An error is right up to 1e-14 of size times condition. That is 90 half units in the last place: a row is a sum of up to some forty
-products of carried vectors, each with a rounding or two.
+An error is right up to 1e-14 of size times condition. That is 90 half units in the last place: a
+row is a sum of up to some forty products of carried vectors, each with a rounding or two.
 
     position        1e-14 (K_x L + |x|)             K_x: how far the point moves for rows that are off by one each
     velocity        1e-14 K_x (1 + K) V L           V: the fastest unknown
     acceleration    1e-14 K_x (1 + K)^2 A L         A: the largest second rate, or V^2
 
-L is the mechanism's size and K the condition of all unknowns. The reason for the powers: J v = c_t is solved with a J that is off
-by the error of the pose, which has a K already, and J a = ... with a v that is. |x| is what a position far from the origin loses
-by being written down. Where two solutions meet, errors are roots of those of the rows: no position may be off by more than
+L is the mechanism's size and K the condition of all unknowns. The reason for the powers: J v = c_t
+is solved with a J that is off by the error of the pose, which has a K already, and J a = ... with a
+v that is. |x| is what a position far from the origin loses by being written down. Where two
+solutions meet, errors are roots of those of the rows: no position may be off by more than
 sqrt(1e-14) L, however large K is.
 """
 
@@ -32,10 +34,12 @@ from .newton_kantorovich import LANES, POLISHED, Solved, System, condition, inve
 
 ROUND_OFF = 1e-14
 AT_A_FOLD = ROUND_OFF**0.5
-# A residual of the tolerance of a run, 1e-12, leaves rates uncertain by the square of the condition times that. From here on it is
-# more than 1e-9 of them, to which outputs are held by default: an engine may give up, if it says why.
+# A residual of the tolerance of a run, 1e-12, leaves rates uncertain by the square of the condition
+# times that. From here on it is more than 1e-9 of them, to which outputs are held by default: an
+# engine may give up, if it says why.
 SINGULAR = (1e-9 / 1e-12) ** 0.5
-# Here it is the rounding of the mechanism itself, 1e-16, that leaves digits to the closed form that Newton's iteration has not.
+# Here it is the rounding of the mechanism itself, 1e-16, that leaves digits to the closed form that
+# Newton's iteration has not.
 UNPOLISHED = 1e6
 
 
@@ -52,14 +56,18 @@ class Truth:
     """The motion of the case's points.
 
     Attributes:
-        reach: of each sample, shape (n,): a solution that continues the design is known, or there is none, or neither is.
-        singular: whether the way to the sample leads through a pose at which it may be given up, shape (n,).
-        points: position [m], velocity and acceleration of each point, each of shape (n, 3); NaN where not reached.
+        reach: of each sample, shape (n,): a solution that continues the design is known, or there
+            is none, or neither is.
+        singular: whether the way to the sample leads through a pose at which it may be given up,
+            shape (n,).
+        points: position [m], velocity and acceleration of each point, each of shape (n, 3); NaN
+            where not reached.
         bounds: largest errors that are round-off, by point, shape (3, n).
         condition: of all unknowns, shape (n,).
         how: how it is known.
         system, parts: the equations, and the solved samples by their numbers in the sweep.
-        violated: what no answer can avoid to leave over, of contradictory geometry, by sample [m]; zero is not looked at.
+        violated: what no answer can avoid to leave over, of contradictory geometry, by sample [m];
+            zero is not looked at.
     """
 
     reach: NDArray[np.int_]
@@ -74,9 +82,10 @@ class Truth:
 
 
 Motion = Callable[[Real], Mapping[str, tuple[Real, Real, Real]]]
-"""A closed form: from the drivers' values, shape (drivers, n), to each moving body's turn since the design, a unit quaternion of
-shape (4, n), a point of the body at design [m], shape (3,), and how far that has come [m], shape (3, n): not where it is, which has
-fewer digits far from the origin. NaN where there is no solution."""
+"""A closed form: from the drivers' values, shape (drivers, n), to each moving body's turn since the
+design, a unit quaternion of shape (4, n), a point of the body at design [m], shape (3,), and how
+far that has come [m], shape (3, n): not where it is, which has fewer digits far from the origin.
+NaN where there is no solution."""
 
 
 class DefectError(KincheckError):
@@ -116,15 +125,19 @@ def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
     found.singular[past] = True
     if fold is not None:
         # what is so near to the fold that it may lie on either side is left open
-        found.reach[past[np.abs(system.path.times[past]) > abs(fold) + abs(abs(fold) - at[-1])]] = Reach.BEYOND
+        found.reach[past[np.abs(system.path.times[past]) > abs(fold) + abs(abs(fold) - at[-1])]] = (
+            Reach.BEYOND
+        )
 
 
 def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
-    """The truth by a closed form, polished to the last digit of the mechanism as it is written down.
+    """The truth by a closed form, polished to the last digit of the mechanism as it is written
+    down.
 
     Args:
-        nearest: values of the swept driver, from the design, at which it comes nearest to singular. Samples may lie on both sides,
-            and behind such a pose that double precision cannot tell from a singular one an engine may give up.
+        nearest: values of the swept driver, from the design, at which it comes nearest to singular.
+            Samples may lie on both sides, and behind such a pose that double precision cannot tell
+            from a singular one an engine may give up.
 
     Raises:
         DefectError: the closed form is not a solution of the case.
@@ -137,15 +150,19 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
         if not known.any():
             continue
         chunk, poses = chunk[known], poses.at(np.flatnonzero(known))
-        solved = system.solved(poses, system.sampled(chunk), system.path.times[chunk], system.rows.angles(poses))
+        solved = system.solved(
+            poses, system.sampled(chunk), system.path.times[chunk], system.rows.angles(poses)
+        )
         moved = np.abs(solved.poses.u - poses.u).max(axis=(0, 1)).astype(np.float64)
-        # the closed form is that of the mechanism without its rounding, which is one of 1e-16 of the rows
+        # the closed form is that of the mechanism without its rounding, which is one of 1e-16 of
+        # the rows
         bad = (moved > ROUND_OFF * solved.condition) & (solved.condition < UNPOLISHED)
         if bad.any():
             k = int(np.flatnonzero(bad)[0])
             raise DefectError(
-                f"{case.name}: the closed form is {moved[k]:.2g} of the mechanism's size off at {case.sweep.driver} = "
-                f"{case.sweep.values[chunk[k]]!r}, condition {solved.condition[k]:.2g}; correct the family"
+                f"{case.name}: the closed form is {moved[k]:.2g} of the mechanism's size off at"
+                f" {case.sweep.driver} = {case.sweep.values[chunk[k]]!r}, condition"
+                f" {solved.condition[k]:.2g}; correct the family"
             )
         found.reach[chunk] = Reach.REACHED
         found.singular[chunk] = solved.condition >= SINGULAR
@@ -165,19 +182,36 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
 
 
 def _replaced(found: Solved, poses: Poses, where: NDArray[np.bool_]) -> Solved:
-    u, q = (np.where(where, old, new) for old, new in ((poses.u, found.poses.u), (poses.q, found.poses.q)))
-    return Solved(found.times, Poses(u, q), found.angles, found.jacobian, found.inverse, found.v, found.a, found.step)
+    u, q = (
+        np.where(where, old, new)
+        for old, new in ((poses.u, found.poses.u), (poses.q, found.poses.q))
+    )
+    return Solved(
+        found.times,
+        Poses(u, q),
+        found.angles,
+        found.jacobian,
+        found.inverse,
+        found.v,
+        found.a,
+        found.step,
+    )
 
 
 def closed_poses(system: System, motion: Motion, values: Real) -> Poses:
-    """Poses of the bodies about their centres at values of the drivers, from those about the points that a closed form is about."""
+    """Poses of the bodies about their centres at values of the drivers, from those about the points
+    that a closed form is about.
+    """
     stated, moved = system.rows.stated, motion(values)
     n = next(iter(moved.values()))[0].shape[-1]
     found = Poses.design(len(stated.bodies), n)
     for k, name in enumerate(stated.bodies, 1):
         found.q[k], _, shift = moved[name]
         found.u[k] = shift / extended(stated.unit)
-    levers = [stated.centres[k] - (moved[name][1] - stated.origin) / stated.unit for k, name in enumerate(stated.bodies)]
+    levers = [
+        stated.centres[k] - (moved[name][1] - stated.origin) / stated.unit
+        for k, name in enumerate(stated.bodies)
+    ]
     for k, lever in enumerate(levers, 1):
         found.u[k] += np.einsum("abn,b->an", found.turned[k], lever)
     return found
@@ -192,11 +226,16 @@ class _Gathered:
         self.condition = np.full(n, np.inf)
         self.parts: list[tuple[NDArray[np.intp], Solved]] = []
         names = system.case.points
-        self.points = {name: tuple(np.full((n, 3), np.nan, dtype=np.longdouble) for _ in range(3)) for name in names}
+        self.points = {
+            name: tuple(np.full((n, 3), np.nan, dtype=np.longdouble) for _ in range(3))
+            for name in names
+        }
         self.bounds = {name: np.full((3, n), np.inf) for name in names}
 
     def add(self, samples: NDArray[np.intp], found: Solved, *, keep: bool) -> None:
-        """Solved samples; the solutions themselves are kept for proofs, not where they are a million."""
+        """Solved samples; the solutions themselves are kept for proofs, not where they are a
+        million.
+        """
         self.condition[samples] = found.condition
         for name, moved in self.points.items():
             for whole, part in zip(moved, _motion(self.system, found, name), strict=True):
@@ -212,7 +251,16 @@ class _Gathered:
             for whole in moved:
                 whole[unreached] = np.nan
         points = {name: (x, v, a) for name, (x, v, a) in self.points.items()}
-        return Truth(self.reach, self.singular, points, self.bounds, self.condition, how, self.system, self.parts)
+        return Truth(
+            self.reach,
+            self.singular,
+            points,
+            self.bounds,
+            self.condition,
+            how,
+            self.system,
+            self.parts,
+        )
 
 
 def _motion(system: System, found: Solved, name: str) -> tuple[Real, Real, Real]:
@@ -223,7 +271,9 @@ def _motion(system: System, found: Solved, name: str) -> tuple[Real, Real, Real]
         return zero + position[:, None], zero, zero
     swing = np.einsum("abn,b->an", found.poses.turned[body], arm)
     turned = (arm[:, None] + swing)[None]
-    v, w, v_t, w_t = (x[body - 1 : body, part] for x in (found.v, found.a) for part in (slice(0, 3), slice(3, 6)))
+    v, w, v_t, w_t = (
+        x[body - 1 : body, part] for x in (found.v, found.a) for part in (slice(0, 3), slice(3, 6))
+    )
     around = cross(w, turned)
     x = position[:, None] + unit * (found.poses.u[body] + swing)
     return x, unit * (v + around)[0], unit * (v_t + cross(w_t, turned) + cross(w, around))[0]
@@ -236,7 +286,9 @@ def _bounds(system: System, found: Solved, name: str) -> Array:
     x = np.abs(_motion(system, found, name)[0]).max(axis=0).astype(np.float64)
     if body == 0:
         return ROUND_OFF * np.stack([x, 0.0 * x, 0.0 * x])
-    turned = (arm[:, None] + np.einsum("abn,b->an", found.poses.turned[body], arm)).astype(np.float64)
+    turned = (arm[:, None] + np.einsum("abn,b->an", found.poses.turned[body], arm)).astype(
+        np.float64
+    )
     shift, turn = (found.inverse[:, 6 * (body - 1) + k : 6 * (body - 1) + k + 3] for k in (0, 3))
     moved = shift + np.stack([np.cross(turn[k].T, turned[:, k]).T for k in range(len(turn))])
     at_point, condition = np.abs(moved).sum(axis=2).max(axis=1), found.condition

@@ -1,4 +1,6 @@
-"""Templates of suspensions: each file the roles of its hardpoints and a function from their places to joints."""
+"""Templates of suspensions: each file the roles of its hardpoints and a function from their places
+to joints.
+"""
 
 from .base import Role, Template
 from .double_wishbone import DOUBLE_WISHBONE

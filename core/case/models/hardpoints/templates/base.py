@@ -1,6 +1,8 @@
-"""What a template of a suspension is: roles that hardpoints fill, and the joints that follow from where they are.
+"""What a template of a suspension is: roles that hardpoints fill, and the joints that follow from
+where they are.
 
-Places are in metres, x forward, y left, z up; a template is of the left side, the chassis is the ground, the steering is locked.
+Places are in metres, x forward, y left, z up; a template is of the left side, the chassis is the
+ground, the steering is locked.
 """
 
 from __future__ import annotations
@@ -42,8 +44,10 @@ class Template:
     Attributes:
         also: names that files have for it.
         joints: from places by role; bodies are those that the joints name.
-        watched: roles, points of the knuckle that do not lie on a line: their motion is compared, and the knuckle's with it.
-        upper, lower: roles, the first of which stands above the second in any car: axes that point elsewhere show by it.
+        watched: roles, points of the knuckle that do not lie on a line: their motion is compared,
+            and the knuckle's with it.
+        upper, lower: roles, the first of which stands above the second in any car: axes that point
+            elsewhere show by it.
     """
 
     name: str
@@ -56,8 +60,15 @@ class Template:
 
 
 def normal(name: str) -> str:
-    """A hardpoint's name without the differences that do not matter: case, blanks, the prefix of Adams/Car, spelling of centre."""
-    plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_").replace("centre", "center").replace("tie_rod", "tierod")
+    """A hardpoint's name without the differences that do not matter: case, blanks, the prefix of
+    Adams/Car, spelling of centre.
+    """
+    plain = (
+        re.sub(r"[^a-z0-9]+", "_", name.lower())
+        .strip("_")
+        .replace("centre", "center")
+        .replace("tie_rod", "tierod")
+    )
     return re.sub(r"^hp[ls]_", "", plain)
 
 
@@ -68,8 +79,12 @@ def between(a: Vector, b: Vector) -> Vector:
 
 WHEEL_CENTER = Role("wheel_center", "the wheel's centre", ("wheel", "Spindle/COM"))
 TIEROD_INNER = Role(
-    "tierod_inner", "the tie rod's joint on the rack or chassis", ("Tierod/Location Chassis", "tierod_chassis", "tierod_rack")
+    "tierod_inner",
+    "the tie rod's joint on the rack or chassis",
+    ("Tierod/Location Chassis", "tierod_chassis", "tierod_rack"),
 )
 TIEROD_OUTER = Role(
-    "tierod_outer", "the tie rod's joint on the knuckle", ("Tierod/Location Upright", "tierod_upright", "tierod_knuckle")
+    "tierod_outer",
+    "the tie rod's joint on the knuckle",
+    ("Tierod/Location Upright", "tierod_upright", "tierod_knuckle"),
 )

@@ -11,8 +11,12 @@ from .base import KNUCKLE, TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER, Role, Templ
 
 def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
     return (
-        Revolute("uca_pivot", GROUND, "uca", at["uca_rear"], between(at["uca_rear"], at["uca_front"])),
-        Revolute("lca_pivot", GROUND, "lca", at["lca_rear"], between(at["lca_rear"], at["lca_front"])),
+        Revolute(
+            "uca_pivot", GROUND, "uca", at["uca_rear"], between(at["uca_rear"], at["uca_front"])
+        ),
+        Revolute(
+            "lca_pivot", GROUND, "lca", at["lca_rear"], between(at["lca_rear"], at["lca_front"])
+        ),
         Spherical("upper_ball", "uca", KNUCKLE, at["uca_outer"]),
         Spherical("lower_ball", "lca", KNUCKLE, at["lca_outer"]),
         Distance("tie_rod", GROUND, KNUCKLE, (at["tierod_inner"], at["tierod_outer"])),
@@ -23,10 +27,20 @@ def _arm(arm: str, level: str) -> tuple[Role, Role, Role]:
     chrono, plain = f"{level.capitalize()} Control Arm", f"{level}_arm"
     return (
         Role(
-            f"{arm}_front", f"the {level} arm's front pivot on the chassis", (f"{chrono}/Location Chassis Front", f"{plain}_front")
+            f"{arm}_front",
+            f"the {level} arm's front pivot on the chassis",
+            (f"{chrono}/Location Chassis Front", f"{plain}_front"),
         ),
-        Role(f"{arm}_rear", f"the {level} arm's rear pivot on the chassis", (f"{chrono}/Location Chassis Back", f"{plain}_rear")),
-        Role(f"{arm}_outer", f"the {level} arm's ball joint on the knuckle", (f"{chrono}/Location Upright", f"{plain}_outer")),
+        Role(
+            f"{arm}_rear",
+            f"the {level} arm's rear pivot on the chassis",
+            (f"{chrono}/Location Chassis Back", f"{plain}_rear"),
+        ),
+        Role(
+            f"{arm}_outer",
+            f"the {level} arm's ball joint on the knuckle",
+            (f"{chrono}/Location Upright", f"{plain}_outer"),
+        ),
     )
 
 

@@ -1,4 +1,6 @@
-"""Five links: the knuckle on five rods. An arm with two pivots and one ball is two of them, which move the wheel alike."""
+"""Five links: the knuckle on five rods. An arm with two pivots and one ball is two of them, which
+move the wheel alike.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +14,24 @@ LINKS = ("upper_front", "upper_rear", "lower_front", "lower_rear", "tierod")
 
 
 def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
-    return [Distance(link, GROUND, KNUCKLE, (at[f"{link}_inner"], at[f"{link}_outer"])) for link in LINKS]
+    return [
+        Distance(link, GROUND, KNUCKLE, (at[f"{link}_inner"], at[f"{link}_outer"]))
+        for link in LINKS
+    ]
 
 
 def _link(link: str, inner: Sequence[str], outer: Sequence[str]) -> tuple[Role, Role]:
     name = f"the {link.replace('_', ' ')} link's joint"
-    return Role(f"{link}_inner", f"{name} on the chassis", inner), Role(f"{link}_outer", f"{name} on the knuckle", outer)
+    return Role(f"{link}_inner", f"{name} on the chassis", inner), Role(
+        f"{link}_outer", f"{name} on the knuckle", outer
+    )
 
 
 def _chrono(link: str) -> tuple[Sequence[str], Sequence[str]]:
-    return (f"{link}/Location Chassis", f"{link} chassis", f"{link} inner"), (f"{link}/Location Upright", f"{link} outer")
+    return (f"{link}/Location Chassis", f"{link} chassis", f"{link} inner"), (
+        f"{link}/Location Upright",
+        f"{link} outer",
+    )
 
 
 _UPPER_ARM = ("Upper Arm/Location Upright", "uca_outer")

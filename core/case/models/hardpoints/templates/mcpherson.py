@@ -1,4 +1,6 @@
-"""McPherson strut: an arm, the knuckle, a strut that slides on the knuckle and turns in its top mount, a tie rod."""
+"""McPherson strut: an arm, the knuckle, a strut that slides on the knuckle and turns in its top
+mount, a tie rod.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +12,21 @@ from .base import KNUCKLE, TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER, Role, Templ
 
 
 def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
-    """The decomposition of SAE 943745: translational and spherical; Chrono's cylindrical and universal moves the wheel alike."""
+    """The decomposition of SAE 943745: translational and spherical; Chrono's cylindrical and
+    universal moves the wheel alike.
+    """
     return (
-        Revolute("lca_pivot", GROUND, "lca", at["lca_rear"], between(at["lca_rear"], at["lca_front"])),
+        Revolute(
+            "lca_pivot", GROUND, "lca", at["lca_rear"], between(at["lca_rear"], at["lca_front"])
+        ),
         Spherical("lower_ball", "lca", KNUCKLE, at["lca_outer"]),
-        Translational("strut_slide", KNUCKLE, "strut", at["strut_lower"], between(at["strut_lower"], at["strut_upper"])),
+        Translational(
+            "strut_slide",
+            KNUCKLE,
+            "strut",
+            at["strut_lower"],
+            between(at["strut_lower"], at["strut_upper"]),
+        ),
         Spherical("strut_top", GROUND, "strut", at["strut_upper"]),
         Distance("tie_rod", GROUND, KNUCKLE, (at["tierod_inner"], at["tierod_outer"])),
     )
@@ -24,9 +36,21 @@ MCPHERSON = Template(
     "mcpherson",
     ("macpherson", "MacPhersonStrut"),
     (
-        Role("lca_front", "the arm's front pivot on the chassis", ("Control Arm/Location Chassis Front", "lower_arm_front")),
-        Role("lca_rear", "the arm's rear pivot on the chassis", ("Control Arm/Location Chassis Back", "lower_arm_rear")),
-        Role("lca_outer", "the arm's ball joint on the knuckle", ("Control Arm/Location Upright", "lower_arm_outer")),
+        Role(
+            "lca_front",
+            "the arm's front pivot on the chassis",
+            ("Control Arm/Location Chassis Front", "lower_arm_front"),
+        ),
+        Role(
+            "lca_rear",
+            "the arm's rear pivot on the chassis",
+            ("Control Arm/Location Chassis Back", "lower_arm_rear"),
+        ),
+        Role(
+            "lca_outer",
+            "the arm's ball joint on the knuckle",
+            ("Control Arm/Location Upright", "lower_arm_outer"),
+        ),
         Role(
             "strut_lower",
             "a point of the strut's axis on the knuckle",
