@@ -6,12 +6,12 @@ import importlib
 from typing import Any
 
 ENGINES = {
-    "native": "Native",
-    "mujoco": "MuJoCo",
-    "pinocchio": "Pinocchio",
-    "exudyn": "Exudyn",
+    "native": ("native", "Native"),
+    "mujoco": ("mujoco.mujoco", "MuJoCo"),
+    "pinocchio": ("pinocchio.pinocchio", "Pinocchio"),
+    "exudyn": ("exudyn.exudyn", "Exudyn"),
 }
-"""Name on the command line (and of the module) -> class: the engines in projection mode."""
+"""Name on the command line: module and class of the engine in projection mode."""
 
 SIMULATIONS = {
     "mujoco": ("mujoco.steps", "stiff"),
@@ -34,7 +34,7 @@ may be ranked with what a matter of a list.
 
 def engine(name: str, mode: str = "projection") -> Any:
     """The engine of that name and mode, ready to use; its simulator is not imported yet."""
-    module, maker = (name, ENGINES[name]) if mode == "projection" else SIMULATIONS[name]
+    module, maker = ENGINES[name] if mode == "projection" else SIMULATIONS[name]
     return getattr(importlib.import_module(f".{module}", __name__), maker)()
 
 

@@ -19,7 +19,6 @@ from ..history.queries import History
 from .trends import trends
 
 _HERE = Path(__file__).parent
-_LOOK = _HERE.parent / "reporting"
 
 
 def write_plot(history: History, path: Path, *, title: str) -> None:
@@ -46,7 +45,7 @@ def page(history: History, *, title: str) -> str:
             figures[plots[-1].figure] = figure
         cases.append((case, [styles[name] for name in dict.fromkeys(past.engine for past in each)], plots))
     environment = Environment(
-        loader=FileSystemLoader([_HERE, _LOOK]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     # which the macros use
     cast("dict[str, Any]", environment.filters).update(number=number, known=known)
@@ -54,8 +53,8 @@ def page(history: History, *, title: str) -> str:
         title=title,
         runs=len(history.runs),
         cases=cases,
-        css=(_LOOK / "report.css").read_text("utf-8"),
-        script=(_LOOK / "report.js").read_text("utf-8"),
+        css=(_HERE / "report.css").read_text("utf-8"),
+        script=(_HERE / "report.js").read_text("utf-8"),
         data=packed(json.dumps({"drivers": {}, "figures": figures, "scenes": {}}, allow_nan=False)),
         plotlyjs=packed(plotly.get_plotlyjs()),
     )

@@ -110,10 +110,8 @@ def print_report(report: Report, file: TextIO) -> None:
 def page(report: Report) -> str:
     """The report as one HTML file, in the look of a run's."""
     here = Path(__file__).parent
-    # its style sheet, macros and script, so that there is one of each
-    reporting = here.parent / "reporting"
     environment = Environment(
-        loader=FileSystemLoader([here, reporting]), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(here), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     # which the macros use
     cast("dict[str, Any]", environment.filters).update(number=number, known=known)
@@ -125,7 +123,7 @@ def page(report: Report) -> str:
         shown = {
             "data": packed(data),
             "plotlyjs": packed(plotly.get_plotlyjs()),
-            "script": (reporting / "report.js").read_text("utf-8"),
+            "script": (here / "report.js").read_text("utf-8"),
         }
-    css = (reporting / "report.css").read_text("utf-8")
+    css = (here / "report.css").read_text("utf-8")
     return environment.get_template("bench.html").render(report=report, css=css, shown=shown)

@@ -233,7 +233,7 @@ def cut_elsewhere(mechanism):
 @pytest.mark.parametrize("name", [each.name for each in probes()])
 @pytest.mark.parametrize("to", ["mjcf", "urdf"])
 def test_a_joint_closes_a_loop_as_it_carries_a_body(to, name, tmp_path, monkeypatch):
-    monkeypatch.setattr(f"kincheck.adapters.write_{to}.spanning_tree", cut_elsewhere)
+    monkeypatch.setattr(f"kincheck.adapters.writers.{to}.spanning_tree", cut_elsewhere)
     found, path = reading(to, name, tmp_path)
     assert_read(found, CASES[name].mechanism, path, True)
 

@@ -313,7 +313,7 @@ def test_a_defect_of_ours_is_shown_and_is_no_deviation(kincheck_main, capsys, mo
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
-KINCHECK = "import sys; from kincheck.core.harness import cli; sys.exit(cli.main())"
+KINCHECK = "import sys; from kincheck.core.cli import main as cli; sys.exit(cli.main())"
 
 
 def kincheck(*arguments, out=subprocess.PIPE, **env):

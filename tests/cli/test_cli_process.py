@@ -29,17 +29,17 @@ def test_the_package_is_the_command_too(tmp_path):
 
 def test_a_command_loads_no_other():
     code = (
-        "import sys; from kincheck.core.harness import cli; cli.main(['check-joint',"
+        "import sys; from kincheck.core.cli import main as cli; cli.main(['check-joint',"
         " '--help']);print(*sorted(name.rpartition('.')[2] for name in sys.modules if"
-        " '.harness.commands.' in name))"
+        " name.startswith('kincheck.core.cli.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "check_joint house"
+    assert done.stdout.splitlines()[-1] == "check_joint main registry"
 
 
 def test_the_start_loads_nothing_that_is_not_needed():
     code = (
-        "import sys; from kincheck.core.harness import cli; status ="
+        "import sys; from kincheck.core.cli import main as cli; status ="
         " cli.main(['--version']);print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio',"
         " 'exudyn', 'scipy', 'llvmlite', 'flint', 'pyarrow','sqlite3', 'asyncio',"
         " 'multiprocessing', 'distributed', 'kincheck.core.kinematics', 'kincheck.core.program'}&"

@@ -59,7 +59,7 @@ def test_a_run_with_a_history_outlives_a_simulator_that_cannot_be_loaded(deed, t
         "--json",
         "r.json",
     ]
-    code = "import sys; from kincheck.core.harness import cli; sys.exit(cli.main(sys.argv[1:]))"
+    code = "import sys; from kincheck.core.cli import main as cli; sys.exit(cli.main(sys.argv[1:]))"
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
     found = subprocess.run(
         [sys.executable, "-c", code, *command],

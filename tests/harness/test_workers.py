@@ -229,7 +229,7 @@ def test_an_interrupt_ends_the_workers_at_once(deaf):
 def test_a_worker_that_hangs_dies_with_its_parent(deaf):
     marker = mark()
     code = (
-        "from tests.test_workers import *; run([crank('deaf')], [Bad()], tol=TOL,"
+        "from tests.harness.test_workers import *; run([crank('deaf')], [Bad()], tol=TOL,"
         " solver=in_workers(1, Limits()))"
     )
     with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT) as parent:

@@ -42,7 +42,7 @@ def kincheck(*arguments, limit=None, **environment):
     command = [
         sys.executable,
         "-c",
-        f"{restrict}import sys; from tests.drill import main; sys.exit(main())",
+        f"{restrict}import sys; from tests.support.drill import main; sys.exit(main())",
         *map(str, arguments),
     ]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -135,6 +135,9 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_records(path, stop):
 
 
 def test_only_the_same_run_without_an_end_is_resumed(path, monkeypatch):
+    # the same code everywhere, with or without a repository
+    here = {"commit": "a" * 40, "changed": False}
+    monkeypatch.setattr("kincheck.core.harness.provenance.git_state", lambda _: here)
     case = crank()
     stopped, _ = kept(path, [case], ENGINES, stop=1)
     others = {
@@ -193,7 +196,7 @@ import sys
 from pathlib import Path
 from kincheck.core.history.store import Store
 from kincheck.core.harness.run import run
-from tests.fakes import Fake, crank
+from tests.support.fakes import Fake, crank
 records = run([crank(f"c{k}") for k in range(40)], [Fake()], tol=1e-12).records
 with Store(Path(sys.argv[1])) as store:
     number = store.begin_run("same", [(each.case, each.engine, each.mode) for each in records], {"started": "now", "command": ""})

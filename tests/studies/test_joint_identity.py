@@ -44,7 +44,9 @@ def run(folder, *arguments):
     done = subprocess.run(
         [*command, *arguments], cwd=folder, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stderr
+    # only native knows the joint, so nothing is compared
+    assert done.returncode == 2, done.stderr
+    assert "nothing was compared" in done.stderr
     return done.stderr
 
 

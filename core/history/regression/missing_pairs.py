@@ -44,5 +44,8 @@ def _last(subject: Subject, store: Store) -> RunRow | None:
         numbers = store.connection.execute(
             query, (subject.facts.get("command"), subject.before, subject.before)
         ).fetchall()
-    rows = (store.run(number) for (number,) in numbers)
-    return next((row for row in rows if row.status != "running"), None)
+    for (number,) in numbers:
+        with store.sparing():  # a damaged run is passed over, and named at the end
+            if (row := store.run(number)).status != "running":
+                return row
+    return None

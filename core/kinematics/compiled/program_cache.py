@@ -87,15 +87,20 @@ def ours(mechanism: Mechanism) -> bool:
 
 @cache
 def _source() -> bytes:
-    """A digest of the source that tracing runs through, and whatever stands beside it."""
+    """Return a digest of the source that tracing runs through."""
     digest = hashlib.sha256()
-    for folder in (
-        CORE,
-        *(CORE / name for name in ("primitives", "joints", "program", "analysis")),
-    ):
-        for file in sorted(folder.glob("*.py" if folder is CORE else "**/*.py")):
-            digest.update(file.read_bytes())
+    for file in source_files():
+        digest.update(file.read_bytes())
     return digest.digest()
+
+
+def source_files() -> list[Path]:
+    """Return the files of every folder that tracing imports from; a test compares them."""
+    folders = [
+        CORE / name for name in ("primitives", "joints", "mechanism", "program", "kinematics")
+    ]
+    nested = [file for folder in folders for file in folder.rglob("*.py")]
+    return sorted([*CORE.glob("*.py"), *nested])
 
 
 def _trace(mechanism: Mechanism, request: Request, section: Section | None, lanes: int) -> Tracing:

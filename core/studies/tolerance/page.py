@@ -21,7 +21,7 @@ from ...report.report import packed
 from .results import Envelope, Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
-_LOOK = _HERE.parent / "reporting"
+_LOOK = _HERE.parents[1] / "report"
 
 # Bars of a tornado diagram: what is left out is smaller than all of these.
 MOST_BARS = 15

@@ -119,7 +119,7 @@ def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str |
     size = max(math.dist(a, b) for a in positions for b in positions)
     if found := SUSPENSIONS.improbable(size, unit_of(table, units)):
         problem = f"the points span {found} They are in another unit"
-        raise fault(table.file, "", f"{problem}: correct --units, or the unit in the file")
+        raise fault(table.file, "", f"{problem}; correct --units, or the unit in the file")
 
 
 def unit_of(table: HardpointTable, said: str | None) -> Unit:
